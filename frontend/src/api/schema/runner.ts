@@ -1017,8 +1017,8 @@ export interface RunnerApi {
     };
     /**
      * Registration
-     * @description How to reach a robot. `name` is the wake word that its engine answers to; without `rmw` the
-     *     middleware of this process is meant.
+     * @description The data by which a robot is reached. `name` is the wake word that its engine answers to; an empty `rmw`
+     *     means the middleware of this process.
      */
     Registration: {
         name: string;
@@ -1090,7 +1090,7 @@ export interface RunnerApi {
     };
     /**
      * RestRequest
-     * @description Somebody has seen that a run is at rest. `how`: by what.
+     * @description A person's word that a run is at rest; `how` says by what that was seen.
      */
     RestRequest: {
         how: string;

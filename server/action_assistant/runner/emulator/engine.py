@@ -1,9 +1,9 @@
-"""The emulated engine: messages in, messages out, at times that its caller counts.
+"""The emulated engine: takes messages and returns messages, at times that its caller gives.
 
-No ROS, no clock, no I/O: the same seed and the same messages give the same answers. What graphs do is
-`umrf.semantics`; here is what the node around it makes of that: one thread that a slow command holds
-up, topics on which the newest message wins, a ring of snapshots that is emptied twice a second, and
-refusals that only its log knows (docs/umrf-and-the-engine.md 4, and recordings of real nodes).
+It has no ROS, no clock and no I/O: the same seed and the same messages give the same answers. `umrf.semantics`
+runs the graphs; this module adds the node around them: one thread that a slow command blocks, topics on which
+the newest message wins, a ring of snapshots that is sent twice a second, and refusals that are only logged
+(docs/umrf-and-the-engine.md 4, and recordings of real nodes).
 """
 
 import random
@@ -51,10 +51,10 @@ _Command: TypeAlias = Callable[[str, float], list[Trace]]
 
 
 class EmulatedEngine:
-    """One life of one engine. `hear` and `ask` bring messages, `advance` gives what it has to say.
+    """One life of one engine. `hear` and `ask` bring it messages, `advance` returns its own.
 
-    `born_ms` is the moment of its start, which its feedback keeps time with; `epoch_ms` is 0 ms as
-    milliseconds since 1970. `performer`: of its behaviours, where time is real.
+    `born_ms` is the moment of its start, from which the beats of its feedback count; `epoch_ms` is its 0 ms in
+    milliseconds since 1970. `performer` runs its behaviours, where time is real.
     """
 
     def __init__(
@@ -97,7 +97,7 @@ class EmulatedEngine:
 
     @property
     def due(self) -> float | None:
-        """When it does something next by itself, in ms; None if nothing is planned."""
+        """The time of its next own action, in ms; None if nothing is planned."""
         if self._out or (self.performer is not None and self.performer.has_returned):
             return self._now
         if self._frozen or self.gone:
@@ -107,17 +107,17 @@ class EmulatedEngine:
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """The truth: running names of graphs in which the code of an action goes on, whatever is
-        said of it."""
+        """The running names of graphs in which the code of an action really goes on, whatever states the
+        engine shows."""
         return tuple(dict.fromkeys(each.graph for each in self.executing))
 
     @property
     def executing(self) -> tuple[Execution, ...]:
-        """The calls of actions' code that have not returned. A frozen one goes on when it wakes."""
+        """The calls of actions' code that have not returned. Those of a frozen engine go on when it thaws."""
         return () if self.gone else tuple(self._engine.executing(self._awake_ms))
 
     def hear(self, message: Message, at_ms: float) -> None:
-        """A command has arrived; it may wait, and be overwritten while it does."""
+        """Take in a command; it may have to wait, and a newer one of its topic replaces it then."""
         self._pass(at_ms)
         if isinstance(message, Start) and self.quirks.late_ms:
             self._later(self.quirks.late_ms, partial(self._arrive, message))
@@ -131,36 +131,37 @@ class EmulatedEngine:
         self._plan_work(self.quirks.reaction_ms)
 
     def ask(self, ticket: int, at_ms: float) -> None:
-        """A get has arrived; its answer carries the ticket, if one ever comes."""
+        """Take in a get; the answer, if one comes, carries the ticket."""
         self._pass(at_ms)
         if not self._deaf and not self.gone:
             self._inbox.put_get(ticket)
             self._plan_work(self.quirks.reaction_ms)
 
     def advance(self, to_ms: float) -> list[Said]:
-        """Everything that it says up to and including this moment, in order."""
+        """Return all messages that the engine sends up to and including this moment, in order."""
         self._pass(to_ms)
         said, self._out = self._out, []
         return said
 
     def reindex(self, index: EmulatedIndex) -> None:
-        """It has looked at its folder again. What runs already stays as it was looked up."""
+        """Replace the index, as when the engine reads its folder again. Running graphs stay as they are."""
         self._view.reindex(index)
 
     def freeze(self, at_ms: float) -> None:
-        """Its process is stopped (SIGSTOP): it does nothing, and messages wait."""
+        """Stop the process (SIGSTOP): the engine does nothing, and messages wait."""
         self._pass(at_ms)
         self._frozen, self._frozen_ms = True, self._now
 
     def thaw(self, at_ms: float) -> None:
-        """Its process goes on; what was due meanwhile happens now."""
+        """Let the process go on (SIGCONT); what was due meanwhile happens now."""
         self._frozen = False
         self._now = self._engine.now = self._tick = at_ms
         self._take(self._engine.advance(at_ms))  # threads of actions wake before the one that hears
         self._pass(at_ms)
 
     def quit(self, at_ms: float) -> None:
-        """It is told to end (SIGINT): deaf and mute from now on, it drives its graphs to their end."""
+        """Tell the process to end (SIGINT): it neither hears nor sends any more, and runs its graphs to their
+        end."""
         self._pass(at_ms)
         self._deaf = True
         self._inbox.clear()
@@ -168,7 +169,7 @@ class EmulatedEngine:
         self._leave_if_idle()
 
     def kill(self, why: str = "killed") -> None:
-        """Its process ends without a word, and everything that it moved stops being driven."""
+        """End the process at once (SIGKILL), and the code of all actions with it."""
         self.gone = self.gone or why
 
     # --- time ---------------------------------------------------------------------------------
@@ -190,7 +191,7 @@ class EmulatedEngine:
                 self._take(self._engine.returned(returned, self._now))
 
     def _next(self) -> tuple[float, float]:
-        """When the node and when the engine in it do something next."""
+        """Return when the node and when the engine inside are due next, in ms; infinity for never."""
         engine = self._engine.due
         return self._tasks[0][0] if self._tasks else inf, inf if engine is None else engine
 
@@ -215,7 +216,7 @@ class EmulatedEngine:
             self._later(wait_ms, self._work)
 
     def _work(self) -> None:
-        """Take up what waits: commands in the order of their topics, then gets."""
+        """Take up the next message that waits: commands in the order of their topics, then gets."""
         self._works = False
         if self._blocked or self._deaf:
             return
@@ -229,7 +230,7 @@ class EmulatedEngine:
         self._plan_work(_NEXT_MS)
 
     def _hold(self, then: Callable[[], None]) -> None:
-        """The command is under way until the engine has done it."""
+        """Block the thread until the engine has carried the command out, then call `then`."""
         self._under_way.append(then)
         self._see_to_it()
 
@@ -243,7 +244,7 @@ class EmulatedEngine:
             self._plan_work(_NEXT_MS)
 
     def _linger(self, wait_ms: float, then: Callable[[], None]) -> None:
-        """The thread stays with a command a little longer."""
+        """Block the thread for so long after a command, then call `then`."""
         self._lingers += 1
 
         def leave() -> None:
@@ -368,7 +369,7 @@ class EmulatedEngine:
         self._keep_time()
 
     def _keep_time(self) -> None:
-        """Feedback goes out at the next beat, if there is any."""
+        """Plan feedback for the next beat, if the ring has any snapshot."""
         if self._view.waiting and not self._drains:
             self._drains = True
             period = self._facts.feedback_period_ms

@@ -1,4 +1,4 @@
-"""The messages of the robot emulator, and which traits of a real engine it has."""
+"""The messages of the robot emulator, and the traits of a real engine that it has."""
 
 import json
 from collections.abc import Container, Iterable
@@ -14,12 +14,12 @@ from action_assistant.umrf.semantics import Engine, Performer, Script
 from action_assistant.umrf.semantics.printing import printed_action
 from action_assistant.umrf.signatures import signature_of
 
-#: What its node is called, like the engine's.
+#: The name of the node, which is that of the real engine's.
 NODE: Final = "action_engine_node"
 
 
 class EngineTraits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """In which ways a stand-in behaves as a real engine does; every one can be switched off.
+    """The traits of a real engine that an emulated one has; each can be switched off.
 
     `depth`: commands of one topic that wait, the newest win (0: all wait). `blocks`: a stop, pause or
     modify that is under way makes it deaf (up to 5 s). `restart_stops`: a start of a running graph
@@ -54,7 +54,7 @@ class EngineTraits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
 
 class Start(msgspec.Struct, frozen=True, kw_only=True):
-    """Start the graph of the text, or, when it is empty, the indexed one of that name."""
+    """A command to start the graph of a text or, where that is empty, the indexed graph of this name."""
 
     topic: ClassVar[str] = "start"
 
@@ -64,7 +64,7 @@ class Start(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Stop(msgspec.Struct, frozen=True, kw_only=True):
-    """Stop a graph."""
+    """A command to stop a graph."""
 
     topic: ClassVar[str] = "stop"
 
@@ -73,7 +73,7 @@ class Stop(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Pause(msgspec.Struct, frozen=True, kw_only=True):
-    """Pause a graph."""
+    """A command to pause a graph."""
 
     topic: ClassVar[str] = "pause"
 
@@ -82,7 +82,7 @@ class Pause(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Resume(msgspec.Struct, frozen=True, kw_only=True):
-    """Let a paused graph go on."""
+    """A command to let a paused graph go on."""
 
     topic: ClassVar[str] = "resume"
 
@@ -91,7 +91,7 @@ class Resume(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Modify(msgspec.Struct, frozen=True, kw_only=True):
-    """Put another graph in the place of the one that is called as `modified_graph` says."""
+    """A command to put `modified_graph` in the place of the graph of its name."""
 
     topic: ClassVar[str] = "modify"
 
@@ -102,7 +102,7 @@ class Modify(msgspec.Struct, frozen=True, kw_only=True):
 
 
 Message: TypeAlias = Start | Stop | Pause | Resume | Modify
-#: The order in which an engine that wakes takes up what waits.
+#: The order in which an engine takes up messages that wait.
 TOPICS: Final = tuple(kind.topic for kind in (Start, Stop, Pause, Resume, Modify))
 
 
@@ -128,14 +128,14 @@ class GetResponse(msgspec.Struct, frozen=True):
 
 
 class LogMessage(msgspec.Struct, frozen=True):
-    """A line of its log, which goes to /rosout."""
+    """A line of the engine's log, which goes to /rosout."""
 
     at_ms: float
     text: str
 
 
 class Gone(msgspec.Struct, frozen=True):
-    """The process has ended."""
+    """The end of the engine's process, and why."""
 
     at_ms: float
     why: str
@@ -148,8 +148,8 @@ Said: TypeAlias = FeedbackMessage | GetResponse | LogMessage | Gone
 
 
 class GraphPlan(msgspec.Struct, frozen=True):
-    """A graph as a message or a file gave it. `attributes`: `gui_attributes` by full name; `states`:
-    those that the text carries, which real engines believe."""
+    """A graph as it was read from a message or file. `attributes` are the `gui_attributes` by full name;
+    `states` are those that the text carries, which real engines take over."""
 
     graph: Graph
     attributes: dict[str, Any] = {}
@@ -157,11 +157,11 @@ class GraphPlan(msgspec.Struct, frozen=True):
 
 
 class Refusal(Exception):
-    """The parser of the engine refuses a text; its words, as they stand in its log."""
+    """The refusal of a text by the engine's parser, in the words of its log."""
 
 
 def graph_plan_of(text: str) -> GraphPlan:
-    """The graph of a text. Raises Refusal."""
+    """Read a graph as the engine's parser does. Raises Refusal."""
     try:
         tree = json.loads(text)
     except ValueError as wrong:
@@ -197,8 +197,8 @@ def _syntax(why: str) -> str:
 
 
 class EmulatedIndex(msgspec.Struct, frozen=True):
-    """The actions and graphs that an engine has found in its folder. Without actions a stand-in has
-    every action with any parameters."""
+    """The actions and graphs that an engine has found in its folder. Without any action an emulated engine has
+    every action, with any parameters."""
 
     texts: tuple[str, ...] = ()
     actions: dict[str, Signature] = {}
@@ -206,7 +206,7 @@ class EmulatedIndex(msgspec.Struct, frozen=True):
 
 
 def index_of(actions: Iterable[str], graphs: Iterable[str]) -> EmulatedIndex:
-    """The index of files with these texts; what cannot be read is left out, as engines do."""
+    """Return the index of files with these texts, without those that cannot be read, as engines do."""
     texts: list[str] = []
     found: dict[str, Signature] = {}
     for text in actions:
@@ -227,12 +227,12 @@ def index_of(actions: Iterable[str], graphs: Iterable[str]) -> EmulatedIndex:
 
 
 def library_of(index: EmulatedIndex) -> dict[str, Graph]:
-    """The graphs that can be sub-graphs, by name."""
+    """Return the graphs that can be sub-graphs, by name."""
     return {name: plan.graph for name, plan in index.graphs.items()}
 
 
 def signatures_of(index: EmulatedIndex, quirks: EngineTraits) -> dict[str, Signature] | None:
-    """The actions that it has; None where it has every action."""
+    """Return the signatures of the actions that the engine has, by name; None where it has every action."""
     return index.actions if index.actions and quirks.checks_actions else None
 
 
@@ -244,7 +244,7 @@ def engine_inside(
     actor: str,
     performer: Performer | None,
 ) -> Engine:
-    """What runs the graphs, without the node around it."""
+    """Return the engine that runs the graphs, without the node around it."""
     return Engine(
         facts=facts,
         script=script,
@@ -257,8 +257,8 @@ def engine_inside(
 
 
 def asked_for(message: Start, index: EmulatedIndex, held: Container[str]) -> GraphPlan:
-    """The graph that a start means. `held`: the names that the engine holds, which it does not look
-    for in its index. Raises Refusal."""
+    """Return the graph that a start is about. `held` are the names of graphs that the engine holds, for which
+    it does not look in its index. Raises Refusal."""
     if not message.graph_json:
         plan = index.graphs.get(message.graph_name)
         if plan is None:
@@ -275,17 +275,17 @@ def asked_for(message: Start, index: EmulatedIndex, held: Container[str]) -> Gra
 
 
 def unknown(verb: str, name: str) -> str:
-    """What the log says of a command for a graph that the engine does not hold."""
+    """Return the log line for a command about a graph that the engine does not hold."""
     return f"origin [in {verb}Graph]: Cannot {verb} UMRF graph '{name}' because it doesn't exist.\n"
 
 
 def active(name: str, state: str) -> str:
-    """Why a graph that runs is not started."""
+    """Return the engine's reason for not starting a graph that is running."""
     return f"Cannot execute UMRF graph '{name}' because it's already active ({state})"
 
 
 def refusal(why: str, message: Start) -> str:
-    """What the log says of a start that the engine throws out."""
+    """Return the log line for a start that the engine refuses."""
     by_name = not message.graph_json
     if why == "map::at":  # no error of its own
         return why

@@ -1,7 +1,4 @@
-"""The robot emulator as a node of ROS 2, which sends what an engine's node would.
-
-All of what it does is `standin_engine`; here are the topics, the service and the clock around it.
-"""
+"""The emulated engine as a node of ROS 2, with the topics, service and clock of an engine's node around it."""
 
 import logging
 import time
@@ -47,14 +44,15 @@ log: Final = logging.getLogger(__name__)
 
 _INFO: Final = 20
 _LONGEST_S: Final = 0.5  # between two looks at whether it shall end
-_WAITING: Final = 100  # commands that wait on the wire when the quirk of one is switched off
+_WAITING: Final = 100  # messages of one topic that wait, without the trait of a queue of one
 
 
 class EmulatorNode:
-    """A node for one life of a stand-in. `make(epoch_ms)` gives it, at 0 ms of the node's own clock.
+    """A node for one life of an emulated engine. `make(epoch_ms)` returns that engine, at 0 ms of the node's own
+    clock.
 
-    `told` hears of everything that it says; `indexes` is asked every so many seconds what its folder has.
-    Raises RuntimeError when the domain cannot be joined.
+    `told` is called with every message of the engine; `indexes` is a period in seconds and a function that
+    reads the engine's folder. Raises RuntimeError when the domain cannot be joined.
     """
 
     def __init__(
@@ -128,7 +126,7 @@ class EmulatorNode:
         subscribe(UmrfGraphModify, facts.modify_topic, modify, depth)
 
     def spin(self) -> str:
-        """Live until `end` or until the engine ends by itself; why it did."""
+        """Run the node until `end` is called or the engine ends by itself; return why it did, "" for `end`."""
         try:
             while not self._ending and not self.robot.gone:
                 due = self.robot.due
@@ -147,7 +145,7 @@ class EmulatorNode:
         return self.robot.gone
 
     def _turn(self, wait_s: float) -> None:
-        """Take in a message, if one comes."""
+        """Take in one message, if one comes within `wait_s`."""
         try:
             self._executor.spin_once(timeout_sec=wait_s)
         except (RuntimeError, SystemError) as error:  # whoever asked has left before the answer
@@ -164,7 +162,7 @@ class EmulatorNode:
             self._indexed = time.monotonic()
 
     def end(self) -> None:
-        """Leave; may be called on any thread."""
+        """Let `spin` return; may be called on any thread."""
         self._ending = True
         self._executor.wake()
 
@@ -177,7 +175,7 @@ class EmulatorNode:
     async def _ask(
         self, _: UmrfGraphGet.Request, response: UmrfGraphGet.Response
     ) -> UmrfGraphGet.Response:
-        """The answer comes when the engine has time for it."""
+        """Pass a get to the engine, and answer when the engine has."""
         self._asked += 1
         ticket, answered = self._asked, Future(executor=self._executor)
         self._tickets[ticket] = answered

@@ -1,4 +1,4 @@
-"""What the emulator publishes of its graphs: a little late, and not all of it, as engines do."""
+"""The graphs of an emulated engine as it publishes them: a little late and incomplete, as engines do."""
 
 import random
 from collections import deque
@@ -39,14 +39,14 @@ class _Held:
         self.messages: dict[str, tuple[tuple[int, str], ...]] = {}
 
     def text(self) -> str:
-        """As the engine prints it."""
+        """Return the graph as the engine prints it."""
         return self.sheet.text(self.state, self.states, self.messages)
 
 
 class PublishedGraphs:
     """The graphs of an engine as feedback and answers show them, and the ring of snapshots.
 
-    `taken`: somebody holds the map of graphs, so that every snapshot is lost.
+    `taken`: the map of graphs is locked, so that every snapshot is lost.
     """
 
     def __init__(
@@ -69,7 +69,7 @@ class PublishedGraphs:
         self._ring: deque[str] = deque(maxlen=quirks.ring)
 
     def reindex(self, index: EmulatedIndex) -> None:
-        """Other actions and graphs are indexed now."""
+        """Replace the index of actions and graphs."""
         self.index = index
         self._engine.library = library_of(index)
         self._engine.signatures = signatures_of(index, self._quirks)
@@ -77,18 +77,16 @@ class PublishedGraphs:
         self.plans |= index.graphs
 
     def take(self, traces: Sequence[Trace], now_ms: float) -> list[str]:
-        """What happened in the engine; the graphs that have ended by it, but no sub-graphs."""
+        """Take in traces of the engine; return the names of the graphs that they ended, without sub-graphs."""
         ended: list[str] = []
         seen = _as_threads_do(traces)
-        connection_limits = sum(
-            isinstance(each, NodeStateEvent) and each.state in _SHOWN for each in seen
-        )
+        at_once = sum(isinstance(each, NodeStateEvent) and each.state in _SHOWN for each in seen)
         for trace in seen:
             if isinstance(trace, NodeResultEvent):
                 self._remember(trace.graph, trace.node, round(self._epoch_ms + now_ms))
         for trace in seen:
             if isinstance(trace, NodeStateEvent):
-                self._node(trace, connection_limits)
+                self._node(trace, at_once)
             elif isinstance(trace, GraphStateEvent) and (held := self._of(trace.graph)):
                 held.state = trace.state
                 if trace.state in ENDED and held.running.home is None:
@@ -96,40 +94,41 @@ class PublishedGraphs:
         return ended
 
     def running(self) -> tuple[str, ...]:
-        """Every graph that a get lists as running, printed."""
+        """Return every graph that a get lists as running, printed."""
         keeps = self._quirks.keeps_ended
         shown = [held for _, held in sorted(self._held.items())]
         return tuple(each.text() for each in shown if keeps or each.state not in ENDED)
 
-    def snapshot(self, name: str, connection_limits: int = 1) -> None:
-        """One more snapshot in the ring, unless somebody else looks at the graphs just now."""
+    def snapshot(self, name: str, at_once: int = 1) -> None:
+        """Add a snapshot to the ring, unless the map of graphs is locked or chance drops it: of `at_once`
+        snapshots that come together about one is kept."""
         held = self._held.get(name)
         if held is None or self.taken or self._engine.locked:
             return
-        kept = (1 - self._quirks.loss) / max(1, connection_limits - 1)
+        kept = (1 - self._quirks.loss) / max(1, at_once - 1)
         if not self._quirks.loss or self._chance.random() < kept:
             self._ring.appendleft(held.text())
 
     @property
     def waiting(self) -> bool:
-        """Whether the ring has anything."""
+        """True while the ring has a snapshot."""
         return bool(self._ring)
 
     def drained(self) -> tuple[str, ...]:
-        """The snapshots of the ring, which is empty now; the newest first."""
+        """Empty the ring; return its snapshots, the newest first."""
         history = tuple(self._ring)
         self._ring.clear()
         return history if self._quirks.newest_first else history[::-1]
 
     def modified(self, name: str, plan: GraphPlan) -> None:
-        """A graph has another structure now."""
+        """Take in that a graph has another structure now."""
         held, known = self._held.get(name), self.plans.get(name)
         if held is not None:
             before = known.attributes if known is not None else {}
             self.plans[name] = GraphPlan(plan.graph, before | plan.attributes)
             held.sheet = self._sheet(held.running)
 
-    def _node(self, trace: NodeStateEvent, connection_limits: int) -> None:
+    def _node(self, trace: NodeStateEvent, at_once: int) -> None:
         held = self._of(trace.graph)
         if held is None or trace.state == "INITIALIZED":
             return
@@ -137,7 +136,7 @@ class PublishedGraphs:
         held.states[trace.node] = trace.state
         resumed = before in {"PAUSED", "PAUSE_REQUESTED"} and trace.state == "RUNNING"
         if trace.state in _SHOWN and not resumed:
-            self.snapshot(trace.graph, connection_limits)
+            self.snapshot(trace.graph, at_once)
 
     def _of(self, name: str) -> _Held | None:
         running = self._engine.graphs.get(name)
@@ -148,8 +147,8 @@ class PublishedGraphs:
         return held
 
     def _sheet(self, running: Running, *, again: bool = False) -> GraphPrinter:
-        """A graph loses its description when it is matched; the text of one that is held already is
-        not matched again."""
+        """Return the printer of a graph. A graph loses its description when its actions are matched with the
+        index, which is not done again for a graph that is held already (`again`)."""
         plan = self.plans.get(running.own if running.home else running.name)
         whole = not self._quirks.drops_fields
         return GraphPrinter(
@@ -160,7 +159,7 @@ class PublishedGraphs:
         )
 
     def _remember(self, graph: str, node: str, at: int) -> None:
-        """What an action had to say is known when its run is over."""
+        """Keep the message of an action, which is known once the action has ended."""
         held = self._held.get(graph)
         found = held.running.nodes.get(node) if held is not None else None
         if held is not None and found is not None and found.call.message:
@@ -169,7 +168,8 @@ class PublishedGraphs:
 
 
 def _as_threads_do(traces: Sequence[Trace]) -> list[Trace]:
-    """Actions begin on threads of their own: what ends at an instant is seen before what begins."""
+    """Sort the traces of one instant as a real engine shows them: actions begin on threads of their own, so an
+    end is seen before a begin."""
     last = {(e.graph, e.node): e for e in traces if isinstance(e, NodeStateEvent)}
 
     def begins(trace: Trace) -> bool:
@@ -183,7 +183,7 @@ def _as_threads_do(traces: Sequence[Trace]) -> list[Trace]:
 
 
 def _printed(plan: GraphPlan) -> str:
-    """An indexed graph, which keeps its description."""
+    """Return an indexed graph as the engine prints it; it keeps its description."""
     running = Running(plan.graph.name, plan.graph, None, None)
     build(running, {action.key: (DEFAULT,) for action in plan.graph.actions})
     return GraphPrinter(running, plan.attributes, described=True).text("UNINITIALIZED", {}, {})

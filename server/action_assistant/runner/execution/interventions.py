@@ -105,7 +105,7 @@ async def modify(
 
 
 def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
-    """What would start the other version, which is looked at in the same way."""
+    """Return a change as a request to start the other version, which is checked in the same way."""
     return StartRequest(
         version=asked.version,
         digest=asked.digest,
@@ -118,7 +118,8 @@ def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
 
 
 async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInWorker) -> None:
-    """A change is taken without looking anything up. Raises Conflict."""
+    """Refuse a change with actions that the engine cannot build, since it looks none up for a change:
+    sub-graphs, and actions that it does not know. Raises Conflict."""
     held = {each.graph for each in engine.answer.graphs} if engine.answer is not None else set()
     index = await engine.index(run_in_worker)
     lost = await run_in_worker(not_matched_in, umrf, engine.facts, index, held)
@@ -131,7 +132,7 @@ async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInW
 
 
 class RestRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Somebody has seen that a run is at rest. `how`: by what."""
+    """A person's word that a run is at rest; `how` says by what that was seen."""
 
     how: Annotated[str, msgspec.Meta(min_length=3, max_length=500)]
 

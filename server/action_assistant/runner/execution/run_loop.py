@@ -125,7 +125,7 @@ class OpenRun:
 
     @property
     def failed(self) -> frozenset[tuple[str, str]]:
-        """What its engine calls ERROR, as far as was seen: running names of graphs, and full names."""
+        """The actions that the engine calls ERROR, as pairs of the graph's running name and the full name."""
         return self._doubts.places
 
     async def pause(self, author: Author) -> None:
@@ -186,11 +186,11 @@ class OpenRun:
 
     @property
     def pauses(self) -> bool:
-        """Whether pausing is safe on this engine."""
+        """True when pausing is safe on this engine."""
         return self._link.pauses
 
     def hear_of(self, command: ForeignCommand) -> None:
-        """Somebody else has told this robot something while the run goes on there."""
+        """Take in a command that somebody else has sent to the robot of this run."""
         if self._is_ours(command.graph):
             self._doubts.reach()
         if command.command in SET_GOING and command.graph == self.run.graph_name:
@@ -231,8 +231,8 @@ class OpenRun:
         self._changed(self)
 
     async def drive(self, order: Order | None, incarnation: str = "") -> None:
-        """Live through the run until it is over and stored. With an order it is started first,
-        exactly once; without one it is taken up where it stands."""
+        """Drive the run until it is over and stored. With an order it is started first, exactly once; without
+        one it is followed from where it stands."""
         async with anyio.create_task_group() as outer:
             outer.start_soon(self.recorder.run)
             if order is None:
@@ -250,7 +250,8 @@ class OpenRun:
             outer.cancel_scope.cancel()
 
     async def _recall(self) -> None:
-        """What an earlier process sent. Nothing waits for it: it only says what the run waits for."""
+        """Give the monitor the graph that an earlier process has sent. Nothing waits for that, since it is needed
+        only to name what the run waits for."""
         try:
             umrf = await sent_of(self._store, self.run)
         except (Refused, msgspec.DecodeError):
@@ -260,7 +261,8 @@ class OpenRun:
                 self.watch.recalls(umrf)
 
     def moves_again(self, event: MovesAgain) -> bool:
-        """It had ended and moves: it is open again. False when it is stored and left already."""
+        """Open the run again, since it had ended and moves. Return False when its end is stored and nobody drives
+        it any more."""
         if self._is_left or self.run.end is None:
             return not self._is_left
         umrf, self.watch = self.watch.umrf, self._watched()
@@ -282,7 +284,7 @@ class OpenRun:
         )
 
     async def _opens_again(self) -> bool:
-        """Wait until everything is stored, or until it moves before that."""
+        """Wait until everything is stored, or until the run moves again; return whether it moves again."""
         async with anyio.create_task_group() as tasks:
 
             async def wait_until_stored() -> None:
@@ -324,7 +326,7 @@ class OpenRun:
                 return
 
     def look(self) -> None:
-        """Ask the engine now."""
+        """Have the engine asked now, without waiting for it."""
         self._asks.set()
 
     async def _ask(self) -> None:
@@ -368,7 +370,8 @@ class OpenRun:
             self.look()
 
     async def _steadily(self, work: Callable[[], Awaitable[None]]) -> None:
-        """A fault in one of these must neither end the others nor itself."""
+        """Run `work` until it returns, and again after each exception, so that a fault ends neither this task nor
+        the others."""
         told = False
         while True:
             try:
@@ -420,7 +423,7 @@ class OpenRun:
         return Published(at, incarnation, now.process if now.incarnation == incarnation else None)
 
     def _let_early_ones_in(self) -> None:
-        """What the engine showed while the start was handed over follows it in the history."""
+        """Take in the reports that came while the start was handed over, so that they follow it in the history."""
         self.published.set()
         early, self._early = self._early, []
         for report in early:

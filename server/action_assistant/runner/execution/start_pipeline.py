@@ -71,8 +71,8 @@ CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[
 
 
 class StartSources(msgspec.Struct, frozen=True):
-    """Where starts find what robots do not tell: the folder of Python `behaviours`, the check of expected
-    `courses`, and the folders that robots index, by the names of the robots."""
+    """The sources of what robots do not tell and starts need: the folder of Python `behaviours`, the check of
+    expected `courses`, and the folders that robots index, by the names of the robots."""
 
     behaviours: BehaviourFolder | None = None
     courses: CoursesOf | None = None

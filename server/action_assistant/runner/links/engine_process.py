@@ -1,8 +1,7 @@
-"""The operating system's process of an engine on this computer, identified beyond doubt.
+"""Identifies the operating system's process of an engine on this computer, and its threads.
 
-All threads of a process end with it, so that the code of an action is known to have ended when its
-engine's process is seen to. That can only be seen here: on another computer, in another container
-or after a reboot nothing is known.
+The code of an action has ended when the engine's process has, since all threads of a process end with it.
+That can only be seen on this computer: in another container or after a reboot nothing is known.
 """
 
 import re
@@ -28,8 +27,8 @@ class Thread(msgspec.Struct, frozen=True):
 
 
 class EngineProcess(msgspec.Struct, frozen=True):
-    """`boot`: the kernel's boot id; `namespace`: of process ids; `started`: clock ticks after boot.
-    Together they never name another process."""
+    """One process. `boot` is the kernel's boot id, `namespace` that of process ids, `started` is in clock ticks
+    after boot: together with `pid` they never name another process."""
 
     boot: str
     namespace: str
@@ -38,7 +37,7 @@ class EngineProcess(msgspec.Struct, frozen=True):
 
 
 def process(pid: int) -> EngineProcess | None:
-    """The process of this number, if there is one and the kernel tells."""
+    """Return the process with this id; None when there is none or the kernel does not tell."""
     try:
         started = _started(pid)
         return None if started is None else EngineProcess(*_here(), pid, started)
@@ -47,7 +46,8 @@ def process(pid: int) -> EngineProcess | None:
 
 
 def has_ended(known: EngineProcess) -> bool:
-    """Whether the process is certainly over: same boot, same numbering, and not there any more."""
+    """Return whether a process has certainly ended: it is the same boot and namespace, and the process is not
+    there any more."""
     try:
         if _here() != (known.boot, known.namespace):
             return False
@@ -57,12 +57,12 @@ def has_ended(known: EngineProcess) -> bool:
 
 
 def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProcess | None:
-    """The process behind a DDS participant, when it certainly is one of this computer.
+    """Return the process behind a DDS participant when it certainly is one of this computer, else None.
 
     `prefix` and `ours` are GUID prefixes in hex, of the engine and of this process. Fast DDS puts two
     bytes of the host and the low two of the process id into them. Containers on one network share the
     former and count processes anew, so the process must also hold a port of that domain and have been
-    started with the engine's name. None wherever that leaves a doubt, and for every other middleware.
+    started with the engine's name. For every other middleware the result is None.
     """
     if len(prefix) < 24 or prefix[:8] != ours[:8] or not prefix.startswith(_FAST_DDS):
         return None
@@ -110,7 +110,8 @@ def _here() -> tuple[str, str]:
 
 
 def _started(pid: int) -> int | None:
-    """When a process began; None when it is over, also while its parent has not taken note of it."""
+    """Return when a process began, in clock ticks after boot; None when it has ended, also when its parent has
+    not waited for it yet."""
     folder = _PROC / str(pid)
     try:
         fields = _fields(folder)
@@ -138,7 +139,7 @@ def _pids() -> Iterator[int]:
 
 
 def _is_called(pid: int, name: str) -> bool:
-    """Whether a word of its command line is the name."""
+    """Return whether a word of the process's command line is the name."""
     try:
         line = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace")
     except OSError:
@@ -147,7 +148,8 @@ def _is_called(pid: int, name: str) -> bool:
 
 
 def _speaks_dds(pid: int, domain: int) -> bool:
-    """Whether a process has a socket on a port of this domain. False where that cannot be seen."""
+    """Return whether a process has a UDP socket on a DDS port of this domain; False where that cannot be
+    seen."""
     folder = _PROC / str(pid)
     try:
         inodes = {_socket(each) for each in (folder / "fd").iterdir()}

@@ -20,7 +20,7 @@ _HALTING: Final = frozenset({"stop", "pause"})
 
 
 class NotAGraph(ValueError):
-    """The text is nothing that an engine writes; the message says why."""
+    """The text is not a graph as an engine writes it; the message says why."""
 
 
 class _Runtime(msgspec.Struct, frozen=True):
@@ -96,7 +96,7 @@ _MESSAGES = msgspec.json.Decoder(tuple[_Said | str, ...])
 def snapshot(
     text: str, *, at: int, source: Literal["get", "feedback"], asked_at: int | None = None
 ) -> Snapshot:
-    """One graph as an engine shows it, seen at `at` (microseconds UTC). Raises NotAGraph."""
+    """Read one graph as an engine wrote it, seen at `at` (microseconds UTC). Raises NotAGraph."""
     try:
         graph = _GRAPH.decode(text)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
@@ -124,7 +124,7 @@ def snapshot(
 
 
 def name_of(text: str) -> str:
-    """The name inside a graph's text; empty where there is none."""
+    """Return the name inside a graph's text; "" where there is none."""
     try:
         return _NAMED.decode(text).graph_name
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -132,7 +132,8 @@ def name_of(text: str) -> str:
 
 
 def run_in(text: str) -> str | None:
-    """The run whose mark a graph carries that somebody sent; None where there is none."""
+    """Return the id of the run that is written into the actions of a graph that somebody sent; None where there
+    is none."""
     try:
         return _run(_SENT.decode(text).actions)
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -140,7 +141,8 @@ def run_in(text: str) -> str | None:
 
 
 def _run(actions: tuple[_Action, ...] | tuple[_Marked, ...]) -> str | None:
-    """The run whose mark every action carries; a graph that was put together from others has none."""
+    """Return the id of the run that every action carries; None when they differ, as in a graph that was put
+    together from others."""
     marks = {_mark(each) for each in actions}
     return marks.pop() if len(marks) == 1 else None
 
@@ -161,15 +163,15 @@ def _messages(action: _Action) -> tuple[str, ...]:
 
 
 def _stoppable(text: str, failed: frozenset[str]) -> frozenset[str]:
-    """The nodes that their graph itself may stop or pause: by a response of a relation, or as one that
-    a spontaneous action leads to. All that have failed, where that cannot be read."""
+    """Return the nodes that their graph itself may stop or pause: by a response of a relation, or because a
+    spontaneous action leads to them. Return all of `failed` when the text cannot be read."""
     try:
         actions = _RELATED.decode(text).actions
     except (msgspec.DecodeError, RecursionError, UnicodeError):
         return failed
     leads_to: dict[str, list[str]] = {}
     found: set[str] = set()
-    behind: set[str] = set()
+    reachable: set[str] = set()
     for each in actions:
         name = f"{each.name}_{each.instance_id}"
         for parent in each.parents:
@@ -178,14 +180,15 @@ def _stoppable(text: str, failed: frozenset[str]) -> frozenset[str]:
                 found.add(name)
     open_ = [f"{each.name}_{each.instance_id}" for each in actions if each.type == "spontaneous"]
     while open_:
-        reached = [each for each in leads_to.get(open_.pop(), ()) if each not in behind]
-        behind.update(reached)
+        reached = [each for each in leads_to.get(open_.pop(), ()) if each not in reachable]
+        reachable.update(reached)
         open_ += reached
-    return frozenset(found | behind)
+    return frozenset(found | reachable)
 
 
 def _inputs(nodes: Mapping[str, _Action]) -> dict[str, Values]:
-    """Values of the actions that move: after that the engine forgets what came from parents."""
+    """Return the input values of the actions that move, by full name; the engine drops them when an action
+    ends."""
     found: dict[str, Values] = {}
     for name, each in nodes.items():
         if each.state in ACTIVE and (values := reported(bytes(each.input_parameters))) is not None:

@@ -14,13 +14,13 @@ class Listeners(Generic[_News]):
         self._all: list[Callable[[_News], None]] = []
 
     def tell(self, news: _News) -> None:
-        """Everybody who listens now hears it, also whoever ends listening because of it."""
+        """Call every listener that is there now, also one that another listener removes meanwhile."""
         for hear in tuple(self._all):
             hear(news)
 
     @contextmanager
     def listening(self, hear: Callable[[_News], None]) -> Iterator[None]:
-        """Hear everything from now until the end of the block."""
+        """Add a listener until the end of the block."""
         self._all.append(hear)
         try:
             yield

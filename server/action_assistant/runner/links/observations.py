@@ -90,7 +90,7 @@ class Hazard(
 class Snapshot(
     msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="snapshot", tag_field="kind"
 ):
-    """One graph as the engine showed it at `at`; what happened in between is not known.
+    """One graph as the engine showed it at `at`; what happened between two snapshots is not known.
 
     `source`: `get` was asked for by us at `asked_at`, `feedback` came by itself and may be late.
     `since`: when the answer before this came, and `since_asked` when that one was asked for: it showed
@@ -120,7 +120,7 @@ class Snapshot(
 
     @property
     def active(self) -> bool:
-        """Whether any node moves or may move again."""
+        """True when any node moves, or may move again without a new start."""
         return any(state in ACTIVE for state in self.nodes.values())
 
 
@@ -129,12 +129,12 @@ Seen: TypeAlias = Exact | Snapshot
 
 
 def failed_in(shown: Snapshot) -> list[str]:
-    """The actions that an engine calls ERROR."""
+    """Return the full names of the actions that an engine calls ERROR."""
     return [node for node, state in shown.nodes.items() if state == "ERROR"]
 
 
 def did_not_obey(names: Sequence[str]) -> str:
-    """The sentence for actions that an engine has given up."""
+    """Return the sentence for actions that an engine has given up as ERROR."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return (
         f"{', '.join(names[:_NAMED])}{more} did not obey within 5 s, or failed while it was told to "

@@ -23,7 +23,8 @@ Values = dict[str, str]
 
 
 def values_of(slots: Iterable[Slot]) -> Values:
-    """What these parameters hold; those without a value are left out."""
+    """Return the values of these parameters as JSON texts by flat name; parameters without a value are left
+    out."""
     found: Values = {}
     for slot in slots:
         if slot.has_value() and not isinstance(slot.value, Opaque) and len(found) < MOST:
@@ -32,7 +33,7 @@ def values_of(slots: Iterable[Slot]) -> Values:
 
 
 def reported(text: bytes) -> Values | None:
-    """The values in `input_parameters` as an engine wrote them; None when they cannot be read."""
+    """Return the values in `input_parameters` as an engine wrote them; None when they cannot be read."""
     try:
         group = parse(text)
     except Unreadable:
@@ -41,7 +42,7 @@ def reported(text: bytes) -> Values | None:
 
 
 def sent(umrf: str) -> dict[str, Values]:
-    """The values of every action, by full name, in a graph as it was sent."""
+    """Return the values of every action in a graph as it was sent, by full name."""
     try:
         graph = codec.read(umrf.encode()).graph
     except codec.Unreadable:

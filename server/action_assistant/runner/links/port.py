@@ -1,10 +1,9 @@
-"""The port between the runner and an engine: commands without answers, one question, reports.
+"""The port between the runner and an engine: commands without answers, one query (`get`), and reports.
 
-`Link` is one engine, `Reach` is how links to robots come to be.
-
-A command's return says that the message has left, never that it was obeyed. Only `get` is answered.
-Whoever implements this keeps messages on one topic apart as the engine needs (the runner may call
-`stop` for several graphs at once) and never repeats a start.
+A `Link` is the connection to one engine; a `Reach` makes links to robots. When a command returns, its message
+has left; that says nothing about whether the engine obeyed. An implementation keeps messages on one topic as
+far apart as the engine needs (the runner may call `stop` for several graphs at once) and never repeats a
+start.
 """
 
 from collections.abc import Callable
@@ -30,11 +29,11 @@ Generation: TypeAlias = Literal["current", "older", "unknown"]
 
 
 class NotSent(Exception):
-    """The message has certainly not left; the text says why."""
+    """The message of a command has certainly not left; the text says why."""
 
 
 class EngineRefused(Exception):
-    """The engine has said that it does not do this; the text is its own."""
+    """The engine has refused a command; the text is the engine's own."""
 
 
 class NoAnswer(Exception):
@@ -42,14 +41,14 @@ class NoAnswer(Exception):
 
 
 class GraphOutline(msgspec.Struct, frozen=True):
-    """What the runner itself knows of a graph: its name, and the aid of each action by full name."""
+    """The part of a graph that the runner uses itself: its name, and the key of each action by full name."""
 
     name: str
     actions: dict[str, str]
 
 
 def graph_outline(graph: Graph | GraphOutline) -> GraphOutline:
-    """What the runner needs to know of a graph."""
+    """Return the outline of a graph."""
     if isinstance(graph, GraphOutline):
         return graph
     named = {each.full_name: each.key for each in graph.actions if not each.missing}
@@ -57,9 +56,9 @@ def graph_outline(graph: Graph | GraphOutline) -> GraphOutline:
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True):
-    """One start: the text that carries the run's identity, and what it is of. Whoever needs the
-    graph reads the text, beside the runner; where it is at hand it may be given along. `inside`: the
-    texts of all graphs inside, for an engine that has no index of its own."""
+    """One start of a graph. `umrf` is its text, which carries the id of the run; `graph` is the graph or its
+    outline. `targets` are the names of the engines that it is for; `inside` are the texts of all its
+    sub-graphs, for an engine that has no index of its own."""
 
     run: str
     graph: Graph | GraphOutline
@@ -69,7 +68,7 @@ class Order(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
-    """What an engine answered to one get: every graph it holds, ended ones too.
+    """The answer of an engine to one get: every graph that it holds, ended ones too.
 
     `asked_at` and `at` are microseconds UTC; `incarnation` changes when the engine is restarted.
     `texts` are those graphs as the engine wrote them, by running name. `known_actions` and
@@ -86,7 +85,7 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Standing(msgspec.Struct, frozen=True, kw_only=True):
-    """What is known of an engine at this moment without asking it.
+    """The standing of an engine at this moment, as far as it is known without asking the engine.
 
     `servers`: how many answer on the path of its get; only one of them makes answers a proof.
     `newcomers`: names of nodes that hear starts and may be a second engine of this path, which does
@@ -123,21 +122,21 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Transitions(msgspec.Struct, frozen=True, kw_only=True):
-    """Exact changes, oldest first. Only the simulator can tell them."""
+    """Exact changes of one run, oldest first. Only the simulator can tell them."""
 
     run: str
     changes: tuple[Exact, ...]
 
 
 class Feedback(msgspec.Struct, frozen=True, kw_only=True):
-    """Snapshots that came by themselves, oldest first. Some are always missing."""
+    """Snapshots that the engine sent unasked, oldest first. The engine always leaves some out."""
 
     actor: str
     snapshots: tuple[Snapshot, ...]
 
 
 class EngineLog(msgspec.Struct, frozen=True, kw_only=True):
-    """A line of the engine's log. Evidence for a person, proof of nothing."""
+    """A line of the engine's log, for people to read; it proves nothing."""
 
     at: int
     text: str
@@ -145,7 +144,7 @@ class EngineLog(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EngineChanged(msgspec.Struct, frozen=True, kw_only=True):
-    """The engine came, went, or is another one than before; `why` is for people."""
+    """A report that the engine came, went, or is another one than before; `why` is for people."""
 
     at: int
     state: EngineState
@@ -154,7 +153,7 @@ class EngineChanged(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ForeignCommand(msgspec.Struct, frozen=True, kw_only=True):
-    """Somebody else published a command to this engine. `sender` tells publishers apart."""
+    """A command to this engine that somebody else has published. `sender` tells publishers apart."""
 
     at: int
     command: Command
@@ -172,25 +171,25 @@ Leaves: TypeAlias = Callable[[], None]
 
 
 def unwatched() -> None:
-    """What leaves, with nobody who must know the moment."""
+    """Do nothing, for a message of which nobody needs to know when it leaves."""
 
 
 class Link(Protocol):
-    """An engine within reach."""
+    """The connection to one engine, as the runner uses it."""
 
     @property
     def simulated(self) -> bool:
-        """Whether nothing moves in the world when this engine is told to."""
+        """True for an engine whose actions move nothing in the world."""
         ...
 
     @property
     def pauses(self) -> bool:
-        """Whether pausing is safe on this engine."""
+        """True for an engine on which pausing is safe."""
         ...
 
     @property
     def standing(self) -> Standing:
-        """What is known of the engine now; every change of its state is also reported."""
+        """The standing of the engine now; every change of its state is also reported."""
         ...
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
@@ -220,22 +219,22 @@ class Link(Protocol):
         ...
 
     async def run(self) -> None:
-        """Serve until cancelled. The runner keeps this going for as long as it needs the link."""
+        """Keep the link alive until cancelled. It hears and answers only while this runs."""
         ...
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Be told everything the engine shows by itself, on the event loop, in order, at once: a
-        report that came before an answer is heard before `get` returns."""
+        """Call `hear` with every report of the engine until the end of the block, on the event loop and in
+        order: a report that came before an answer is passed on before `get` returns."""
         ...
 
     async def aclose(self) -> None:
-        """Let go of the engine. A real one goes on; a simulated one ends."""
+        """Close the link. A real engine goes on; a simulated one ends."""
         ...
 
 
 class Registration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """How to reach a robot. `name` is the wake word that its engine answers to; without `rmw` the
-    middleware of this process is meant."""
+    """The data by which a robot is reached. `name` is the wake word that its engine answers to; an empty `rmw`
+    means the middleware of this process."""
 
     name: str
     domain: Annotated[int, msgspec.Meta(ge=0, le=232)] = 0
@@ -266,11 +265,11 @@ class Sighting(msgspec.Struct, frozen=True):
 
 
 class Reach(Protocol):
-    """What makes links to robots. One per process; owns what the links share."""
+    """Makes links to robots, and owns what they share. There is one in a process."""
 
     @property
     def rmw(self) -> str:
-        """The middleware of this process; robots on another one are out of reach."""
+        """The name of the middleware of this process; robots on another one cannot be reached."""
         ...
 
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
@@ -289,5 +288,5 @@ class Reach(Protocol):
         ...
 
     async def aclose(self) -> None:
-        """Let go of everything. Links are closed before."""
+        """Leave all domains. The links have to be closed before."""
         ...

@@ -66,7 +66,8 @@ _COMMANDS: Final = frozenset({"start", "stop", "pause", "resume", "modify", "get
 
 
 class Simulators:
-    """Makes links. What they report takes a bounded share of the runner's time, all together."""
+    """Makes links to simulated engines, and bounds the share of the runner's time that their reports take in
+    total."""
 
     def __init__(self) -> None:
         self._turn = anyio.Lock()
@@ -79,7 +80,7 @@ class Simulators:
         clock_us: Callable[[], int],
         behaviours: BehaviourFolder | None = None,
     ) -> "SimulatedLink":
-        """A simulated engine. Its process begins with its first start. Raises TooMany."""
+        """Return a link to a new simulated engine, whose process begins with its first start. Raises TooMany."""
         going = [each for each in self._links if each.is_alive]
         if len(going) >= MOST:
             raise TooMany(f"{MOST} simulated runs go on already; stop some, or wait.")
@@ -92,7 +93,7 @@ class Simulators:
         return link
 
     async def take(self, report: Callable[[], None]) -> None:
-        """Take in one report, then leave time for others."""
+        """Call `report` in turn with those of other runs, then wait for three times as long as it took."""
         async with self._turn:
             began = time.perf_counter()
             report()
@@ -100,7 +101,7 @@ class Simulators:
 
 
 class _Made(msgspec.Struct, frozen=True):
-    """What a simulated engine is made of."""
+    """The configuration of a simulated engine."""
 
     facts: EngineFacts
     script: str
@@ -108,7 +109,7 @@ class _Made(msgspec.Struct, frozen=True):
 
 
 class SimulatedLink:
-    """A simulated engine in another process."""
+    """The link to a simulated engine in another process."""
 
     simulated: Final = True
     pauses: Final = True
@@ -134,7 +135,7 @@ class SimulatedLink:
 
     @property
     def standing(self) -> Standing:
-        """Answering until it has crashed, hangs, or its process has ended."""
+        """The standing: answering until the engine has crashed or hangs, or its process has ended."""
         if self._why:
             return Standing(state=self._state, why=self._why, incarnation=self._incarnation)
         return Standing(
@@ -143,16 +144,16 @@ class SimulatedLink:
 
     @property
     def is_alive(self) -> bool:
-        """Whether it has a process."""
+        """True while the engine has a process."""
         return self._process is not None and self._state != "gone"
 
     @property
     def has_behaviours(self) -> bool:
-        """Whether actions of it may be processes of their own."""
+        """True when actions of the engine may be processes of their own."""
         return self._made.behaviours is not None
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Start at this moment; the first start begins the process. Raises NotSent, EngineRefused."""
+        """Start a graph now; the first start also starts the process. Raises NotSent, EngineRefused."""
         leaves()
         with anyio.CancelScope(shield=True):  # a Stop that comes meanwhile finds something to stop
             if self._process is None and not self._why:
@@ -160,23 +161,23 @@ class SimulatedLink:
             await self._told("start", order)
 
     async def stop(self, graph_name: str) -> None:
-        """Stop at this moment."""
+        """Tell the engine to stop a graph now."""
         self._say(next(self._numbers), "stop", graph_name)
 
     async def pause(self, graph_name: str) -> None:
-        """Pause at this moment."""
+        """Tell the engine to pause a graph now."""
         self._say(next(self._numbers), "pause", graph_name)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Resume at this moment."""
+        """Tell the engine to resume a paused graph now."""
         self._say(next(self._numbers), "resume", graph_name, continue_from)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Change the graph at this moment. Raises NotSent, EngineRefused."""
+        """Change a running graph now. Raises NotSent, EngineRefused."""
         await self._told("modify", order, continue_from)
 
     async def get(self) -> Answer:
-        """What the engine holds right now. Raises NoAnswer."""
+        """Return all graphs that the engine holds now. Raises NoAnswer."""
         if self._process is None and not self._why:  # nothing was started yet
             at = self._clock_us()
             return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=())
@@ -188,15 +189,15 @@ class SimulatedLink:
         return msgspec.structs.replace(found, asked_at=asked_at, incarnation=self._incarnation)
 
     async def run(self) -> None:
-        """The process lives by itself."""
+        """Wait until cancelled: the process of the engine needs no help."""
         await anyio.sleep_forever()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Every transition from now on."""
+        """Call `hear` with every transition until the end of the block."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """End the engine, and its process. One with behaviours ends them first, and itself."""
+        """End the engine and its process. An engine with behaviours gets 4 s to end them and itself."""
         if self.has_behaviours and self._process is not None and self._writer is not None:
             self._why = self._why or _GONE
             self._writer.close()
@@ -222,7 +223,7 @@ class SimulatedLink:
         self._reading = asyncio.create_task(self._read(reader))
 
     async def _told(self, command: str, *args: Any) -> Any:
-        """What the engine says to a command. Raises NotSent, EngineRefused, NoAnswer."""
+        """Send a command and return the engine's answer. Raises NotSent, EngineRefused, NoAnswer."""
         number = next(self._numbers)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         self._asked[number] = future
@@ -240,7 +241,7 @@ class SimulatedLink:
         return True
 
     async def _read(self, reader: asyncio.StreamReader) -> None:
-        """Take in what the process says, until it has ended."""
+        """Read answers and reports of the process until it has ended."""
         try:
             while True:
                 size = int.from_bytes(await reader.readexactly(_HEAD), "big")
@@ -267,7 +268,7 @@ class SimulatedLink:
         self._subscribers.tell(report)
 
     def _end(self, why: str) -> None:
-        """The engine is no more; whoever waits for it is told."""
+        """Mark the engine as gone, kill its process, and fail everything that waits for an answer."""
         was, self._state = self._state, "gone"
         fresh, self._why = not self._why, self._why or why
         if self._writer is not None:
@@ -295,7 +296,7 @@ def _framed(value: object) -> bytes:
 
 
 def _live(wire: socket.socket, made: _Made) -> None:
-    """One engine, until nobody listens any more."""
+    """Run one engine until the runner closes its end of the socket."""
     performer = None
     if made.behaviours is not None:
         bound_address_space()
@@ -322,7 +323,7 @@ async def _serve(wire: socket.socket, made: _Made, performer: BehaviourPerformer
             writer.write(_framed((0, part)))
 
     async def live() -> None:
-        """Not faster than it is listened to: what waits to be read is bounded."""
+        """Let the engine run no faster than the runner reads, so that what waits in between is bounded."""
         await link.run(writer.drain)
 
     async def obey() -> None:
@@ -341,7 +342,7 @@ async def _serve(wire: socket.socket, made: _Made, performer: BehaviourPerformer
 
 
 def _woken(loop: asyncio.AbstractEventLoop, link: SimulatorLink) -> None:
-    """On a thread of a behaviour: the engine has something to take."""
+    """Wake the engine from a thread of a behaviour, since a call has ended."""
     with suppress(RuntimeError):  # the loop has ended, and the engine with it
         loop.call_soon_threadsafe(link.wake)
 
@@ -355,7 +356,7 @@ async def _obeyed(link: SimulatorLink, command: str, args: tuple[Any, ...]) -> o
 
 
 def _parts(report: Report) -> Iterator[Report]:
-    """A report that the runner can take in without doing nothing else for long."""
+    """Split a report into parts of at most 100 changes, so that none keeps the runner busy for long."""
     if not isinstance(report, Transitions):
         yield report
         return

@@ -57,7 +57,7 @@ _SLICE: Final = 50  # engine steps between two turns of the event loop
 
 
 class Simulator(Protocol):
-    """What makes a simulated engine of these facts."""
+    """A factory of simulated engines."""
 
     def __call__(
         self,
@@ -66,7 +66,8 @@ class Simulator(Protocol):
         clock_us: Callable[[], int],
         behaviours: BehaviourFolder | None = None,
     ) -> Link:
-        """One that follows a script (JSON; "" for none), and behaviours before that."""
+        """Return a link to an engine with these facts. It follows a script (JSON; "" for none), and for actions
+        that have one the behaviour instead."""
 
 
 def in_this_process(
@@ -75,7 +76,8 @@ def in_this_process(
     clock_us: Callable[[], int],
     behaviours: BehaviourFolder | None = None,
 ) -> "SimulatorLink":
-    """A simulated engine that shares the event loop: where time is virtual, and nothing real is."""
+    """Return a simulated engine that shares the event loop, for tests in virtual time. Raises Unavailable for
+    behaviours."""
     if behaviours is not None:
         raise Unavailable("Behaviours need a simulated engine in a process of its own.")
     return SimulatorLink(engine_of(facts, script), clock_us=clock_us)
@@ -84,14 +86,14 @@ def in_this_process(
 def engine_of(
     facts: EngineFacts, script: str, performer: BehaviourPerformer | None = None
 ) -> semantics.Engine:
-    """An engine that follows a script which was admitted."""
+    """Return an engine that follows a script (JSON), which has been checked before; "" for none."""
     chosen = slowed(semantics.script_from(msgspec.json.decode(script))) if script else None
     return semantics.Engine(facts=facts, script=chosen, performer=performer)
 
 
 class SimulatorLink:
-    """A simulated engine in this process. `clock_us` gives microseconds UTC. `performer`: the one of
-    its behaviours, if it has any; they need a clock that is not virtual."""
+    """The link to a simulated engine in this process. `clock_us` gives microseconds UTC. `performer` runs its
+    behaviours, if it has any; they need real time."""
 
     simulated: Final = True
 
@@ -115,12 +117,12 @@ class SimulatorLink:
 
     @property
     def pauses(self) -> bool:
-        """What is true of the engine that it plays."""
+        """True when pausing is safe on the kind of engine that is simulated."""
         return self._engine.facts.pauses_safely
 
     @property
     def standing(self) -> Standing:
-        """Answering until it has crashed or hangs."""
+        """The standing: answering until the engine has crashed or hangs."""
         if self._dead is not None:
             return Standing(state="gone", why=self._dead, incarnation=self._incarnation)
         return Standing(
@@ -128,7 +130,7 @@ class SimulatorLink:
         )
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Start at this moment. Raises EngineRefused."""
+        """Start a graph now. Raises EngineRefused, NoAnswer."""
         self._alive()
         leaves()
         graph = _whole(order)
@@ -144,22 +146,22 @@ class SimulatorLink:
             raise EngineRefused(str(refused)) from refused
 
     async def stop(self, graph_name: str) -> None:
-        """Stop at this moment; the engine lets a second stop wait for the first one."""
+        """Stop a graph now; the engine lets a second stop wait for the first one."""
         if self._dead is None:
             self._tell(self._engine.stop(graph_name, self._now()))
 
     async def pause(self, graph_name: str) -> None:
-        """Pause at this moment."""
+        """Tell the engine to pause a graph now."""
         if self._dead is None:
             self._tell(self._engine.pause(graph_name, self._now()))
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Resume at this moment."""
+        """Tell the engine to resume a paused graph now."""
         if self._dead is None:
             self._tell(self._engine.resume(graph_name, self._now(), continue_from=continue_from))
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Change the graph at this moment. Raises NotSent, EngineRefused."""
+        """Change a running graph now. Raises NotSent, EngineRefused."""
         if self._dead is not None:
             raise NotSent(self._dead)
         try:
@@ -169,8 +171,8 @@ class SimulatorLink:
             raise EngineRefused(str(refused)) from refused
 
     async def get(self) -> Answer:
-        """What the engine holds right now. While a behaviour is being killed it says nothing: whoever
-        asks shall not take that action for over."""
+        """Return all graphs that the engine holds now. Raises NoAnswer, also while a behaviour is being killed,
+        so that its action is not taken for ended."""
         self._alive()
         self._advance()
         if self._performer is not None and self._performer.is_killing:
@@ -190,7 +192,7 @@ class SimulatorLink:
         return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=graphs)
 
     async def run(self, heard: Callable[[], Awaitable[None]] | None = None) -> None:
-        """Let the engine live until cancelled, not faster than what it says is `heard`."""
+        """Run the engine until cancelled, no faster than `heard` returns after each batch of reports."""
         heard = heard or anyio.lowlevel.checkpoint
         while True:
             due = self._engine.due
@@ -207,17 +209,17 @@ class SimulatorLink:
                 self._wake.set()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Every transition from now on."""
+        """Call `hear` with every transition until the end of the block."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """End the engine, and its behaviours."""
+        """End the engine and its behaviours."""
         self._dead = "the simulated engine was switched off"
         if self._performer is not None:
             await anyio.to_thread.run_sync(self._performer.end, abandon_on_cancel=True)
 
     def wake(self) -> None:
-        """Look again at what there is to do; to be called on the thread of the loop."""
+        """Look again at what is due; called on the thread of the event loop."""
         self._wake.set()
 
     def _now(self) -> float:
@@ -228,7 +230,7 @@ class SimulatorLink:
             raise NoAnswer(self._dead)
 
     def _advance(self) -> bool:
-        """Catch up with the clock, a slice at most. Whether nothing is left to do now."""
+        """Catch up with the clock, by at most 50 steps; return whether nothing is due any more."""
         told: list[semantics.Trace] = []
         for returned in self._performer.taken() if self._performer is not None else ():
             told += self._engine.returned(returned, self._now())
@@ -260,8 +262,8 @@ class SimulatorLink:
                 self._fail(trace)
 
     def _begun(self, traces: Sequence[semantics.Trace]) -> dict[int, Values]:
-        """What nodes that have just begun and still run began with, by the trace that says so. Of
-        those that have ended meanwhile it is gone."""
+        """Return the input values of nodes that have just begun and still run, by the `id` of the trace that
+        tells of the begin. Nodes that have ended meanwhile have lost theirs."""
         last = {
             (trace.graph, trace.node): trace
             for trace in traces
@@ -275,7 +277,8 @@ class SimulatorLink:
         return found
 
     def _fail(self, hazard: semantics.HazardEvent) -> None:
-        """From now on nobody answers, as with the real engine; a hung one still exists."""
+        """Let the engine answer nothing any more after a crash or a hang, as a real one; tell listeners that it is
+        gone (crash) or busy (hang)."""
         what = "has crashed" if hazard.effect == "crash" else "hangs"
         why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
         self._dead = why
@@ -288,7 +291,8 @@ class SimulatorLink:
         return self._origin_wall + round(t_ms * 1000)
 
     def _run_of(self, graph: str) -> str | None:
-        """Sub-graphs run as `GRAPH__NAME__ID`; the longest known beginning owns them."""
+        """Return the run that a graph belongs to. Sub-graphs run as `GRAPH__NAME__ID` and belong to the run of the
+        longest known beginning."""
         if graph in self._runs:
             return self._runs[graph]
         owners = [name for name in self._runs if graph.startswith(f"{name}__")]
@@ -300,13 +304,13 @@ def _whole(order: Order) -> Graph:
 
 
 def _inside(order: Order) -> dict[str, Graph]:
-    """What the engine has indexed for this run."""
+    """Return the sub-graphs that come with an order, by name: the index of the engine for this run."""
     graphs = [codec.read(text).graph for text in order.inside]
     return {graph.name: graph for graph in graphs}
 
 
 def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact | None:
-    """What of a trace is worth a place in the history; relations follow from results."""
+    """Return the change that a trace adds to the history; None for relations, which follow from results."""
     match trace:
         case semantics.NodeStateEvent():
             inputs = begun.get(id(trace))
@@ -326,7 +330,7 @@ def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact
 
 
 def slowed(script: Script) -> Script:
-    """The script without what is quicker than any simulated action may be."""
+    """Return the script with every action lasting at least 10 ms."""
     behaviours = {
         key: tuple(
             msgspec.structs.replace(each, after_s=max(each.after_s, _QUICKEST_S)) for each in calls

@@ -19,7 +19,8 @@ from action_assistant.runner.links.port import (
 
 
 class UnreachableLink:
-    """Stands in where a run is known but its robot is out of reach."""
+    """The link for a run whose robot cannot be reached: every command raises NotSent with the reason, `get`
+    raises NoAnswer, and nothing is ever reported."""
 
     simulated: Final = False
     pauses: Final = False
@@ -29,40 +30,40 @@ class UnreachableLink:
 
     @property
     def standing(self) -> Standing:
-        """Gone, for all anybody knows."""
+        """The standing `gone`, with the reason."""
         return Standing(state="gone", why=self._why)
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Refuses."""
+        """Raise NotSent: nobody can be told to start a graph."""
         raise NotSent(self._why)
 
     async def stop(self, graph_name: str) -> None:
-        """Refuses."""
+        """Raise NotSent: nobody can be told to stop a graph."""
         raise NotSent(self._why)
 
     async def pause(self, graph_name: str) -> None:
-        """Refuses."""
+        """Raise NotSent: nobody can be told to pause a graph."""
         raise NotSent(self._why)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Refuses."""
+        """Raise NotSent: nobody can be told to resume a graph."""
         raise NotSent(self._why)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Refuses."""
+        """Raise NotSent: nobody can be told to change a graph."""
         raise NotSent(self._why)
 
     async def get(self) -> Answer:
-        """Refuses."""
+        """Raise NoAnswer: nobody can be asked."""
         raise NoAnswer(self._why)
 
     async def run(self) -> None:
-        """Nothing to keep going."""
+        """Wait until cancelled; the link does nothing."""
         await anyio.sleep_forever()
 
     def listen(self, _: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Nothing is ever reported."""
+        """Return a context in which nothing is ever reported."""
         return nullcontext()
 
     async def aclose(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing, since the link holds nothing."""

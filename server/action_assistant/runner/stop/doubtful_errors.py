@@ -1,4 +1,4 @@
-"""ERRORs that are no proof of rest, since a stop or a pause may have caused them.
+"""Finds actions in ERROR that are no proof of rest, since a stop or a pause may have caused the ERROR.
 
 An engine waits five seconds for an action to stop, or until its `onStop` throws, and then calls it
 ERROR; the thread of the action goes on, and nothing that the engine says ever tells of its end. An
@@ -23,17 +23,17 @@ class DoubtfulErrors:
         self._open: dict[tuple[str, str], None] = {}
 
     def reach(self) -> None:
-        """From now on a stop, a pause or a change may reach the graph."""
+        """Note that from now on a stop, a pause or a change may reach the graph."""
         self._reached = True
 
     @property
     def places(self) -> frozenset[tuple[str, str]]:
-        """All actions in ERROR, doubtful and over: running names of graphs, and full names."""
+        """All actions in ERROR, doubtful or over, as pairs of the graph's running name and the full name."""
         return frozenset({*self._open, *self._thrown})
 
     def look(self, shown: Sequence[Snapshot]) -> str:
-        """After one more answer that shows a graph and its sub-graphs: why the code of an action may
-        still run; "" when nothing speaks for that."""
+        """Take in one more answer about a graph and its sub-graphs; return why the code of an action may still
+        run, "" when nothing speaks for that."""
         for each in shown:
             failed = failed_in(each)
             self._thrown -= {

@@ -48,9 +48,9 @@ Present: TypeAlias = Callable[[str], KnownEngine | None]
 
 
 class StoppedAll(msgspec.Struct, frozen=True):
-    """The answer to a stop of everything. `runs`: of ours that are being stopped. `graphs`: those of
-    others that are, by robot. `unknown`: why nothing is known of what a robot runs, by robot: whatever
-    it runs is not being stopped unless it was seen before."""
+    """The answer to a stop of everything. `runs` are the runs that are being stopped, `graphs` the graphs of
+    others, by robot. `unknown` says, by robot, why it is not known what a robot runs: a graph there is not
+    being stopped unless it was seen before."""
 
     runs: list[str]
     graphs: dict[str, list[str]] = {}
@@ -58,8 +58,8 @@ class StoppedAll(msgspec.Struct, frozen=True):
 
 
 class _ForeignStop:
-    """One stop that goes on. `life`: of the engine that was to stop the graph; `why`: that is not
-    proven yet, "" at first."""
+    """One stop that goes on. `life` is the incarnation of the engine that was to stop the graph; `why` says why
+    that is not proven yet, "" at first."""
 
     def __init__(self, robot: str, graph: str, life: str, why: str) -> None:
         self.robot = robot
@@ -74,9 +74,9 @@ class _ForeignStop:
 
 
 class ForeignStopLoop:
-    """All such stops that go on. `note` records; `changed` is told when people see something else;
-    `present` gives the engine of a robot as it is reached now, None without a link, and raises
-    NotFound for a robot that is registered no more."""
+    """Carries out all stops of graphs that others have started. `note` records an event; `changed` is called
+    when people see something else; `present` returns the engine of a robot as it is reached now, None without
+    a link, and raises NotFound for a robot that is not registered any more."""
 
     def __init__(
         self,
@@ -96,27 +96,27 @@ class ForeignStopLoop:
         self._going: dict[tuple[str, str], _ForeignStop] = {}
 
     def trouble(self, robot: str, graph: str) -> str | None:
-        """None when the graph is not being stopped; else why that is not proven yet, "" at first."""
+        """Return why the stop of a graph is not proven yet, "" at first; None when it is not being stopped."""
         found = self._going.get((robot, graph))
         return None if found is None else found.why
 
     def is_stopping(self, robot: str) -> bool:
-        """Whether something is being stopped there."""
+        """Return whether a graph is being stopped on a robot."""
         return any(name == robot for name, _ in self._going)
 
     def graphs(self) -> dict[str, list[str]]:
-        """The graphs that are being stopped, by robot."""
+        """Return the graphs that are being stopped, by robot."""
         found: dict[str, list[str]] = {}
         for robot, graph in sorted(self._going):
             found.setdefault(robot, []).append(graph)
         return found
 
     def pending(self) -> Iterator[tuple[str, str]]:
-        """The robot of each graph that is being stopped, and why that is not proven yet."""
+        """Return, for each graph that is being stopped, its robot and why the stop is not proven yet."""
         return ((each.robot, each.why) for each in self._going.values())
 
     def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
-        """Want a graph stopped. Never waits."""
+        """Begin to stop a graph. Never waits."""
         robot = engine.registration.name
         known = self._going.get((robot, graph))
         if known is not None:
@@ -133,14 +133,15 @@ class ForeignStopLoop:
             self._begin(_ForeignStop(robot, asked.graph, asked.life, _TAKEN_UP), None)
 
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
-        """Somebody else may just have set it going: what was asked before proves nothing any more."""
+        """Take in a command of somebody else, who may just have set a graph going: an answer that was asked for
+        before proves nothing any more."""
         found = self._going.get((robot, command.graph))
         if command.command in SET_GOING and found is not None:
             found.disturbed = True
             found.loading.meddle()
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """An engine shows these graphs, in an answer or by feedback. Never waits."""
+        """Take in graphs that an engine shows, in an answer or by feedback. Never waits."""
         for (robot, graph), it in self._going.items():
             if robot != engine.registration.name:
                 continue
@@ -169,8 +170,9 @@ class ForeignStopLoop:
             self._changed()
 
     async def _until_proven(self, it: _ForeignStop, known: KnownEngine | None) -> RobotEvent:
-        """`known`: the engine as it is reached, once it is the one that was to stop it. By another
-        link, or after a restart of the runner, it has to show that first."""
+        """Stop a graph until that is proven or can never be; return the event for that. `known` is the engine
+        once it is known to be the one that was to stop the graph; by another link, or after a restart of the
+        runner, it has to show that first."""
         began, gap = anyio.current_time(), _GAP_S
         while True:
             engine = self._present(it.robot)
@@ -193,8 +195,8 @@ class ForeignStopLoop:
             gap = min(1.5 * gap, _SLOWEST_S)
 
     async def _recognise(self, it: _ForeignStop, engine: KnownEngine) -> StopUnproven | str:
-        """Send nothing: "" when it is the engine that was to stop the graph, why that is not known
-        yet, or that it is another one."""
+        """Ask an engine whether it is the one that was to stop the graph, and send no stop. Return "" when it is,
+        why that is not known yet, or the event that it is another one."""
         answer = await _ask(engine)
         if answer is None:
             return engine.why or "the engine does not answer"
@@ -203,7 +205,7 @@ class ForeignStopLoop:
         return "" if answer.incarnation == it.life else self._unproven(it, _RESTARTED)
 
     async def _steadily(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
-        """Send once and look once. A fault of ours keeps no Stop from being sent again."""
+        """Send once and look once. An exception here does not keep the stop from being sent again."""
         try:
             return await self._once(it, engine)
         except Exception as error:
@@ -212,7 +214,7 @@ class ForeignStopLoop:
             return f"the runner failed: {error!r}"
 
     async def _once(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
-        """One message and one look: how it ends, or why it is not proven yet."""
+        """Send one message and look once; return the event that ends the stop, or why it is not proven yet."""
         why = await send_stop(engine, it.graph)
         asked = anyio.current_time()
         answer = await _ask(engine)
@@ -237,8 +239,8 @@ class ForeignStopLoop:
         return StopWasProven(at=answer.at, graph=it.graph, asked_at=answer.asked_at)
 
     async def _still_loading(self, it: _ForeignStop, answer: Answer) -> str:
-        """Return which of its actions may still be loading, in words; "" for none. A sub-graph that is
-        not of this start counts, too: nothing tells them apart."""
+        """Return in words which actions of the graph may still be loading; "" for none. Sub-graphs of another
+        start count, too, since nothing tells them apart."""
         shown = _shown(answer, it.graph)
         try:
             unread = it.loading.unread(shown)
@@ -260,7 +262,7 @@ async def _ask(engine: KnownEngine) -> Answer | None:
 
 
 def _at_rest(answer: Answer, graph: str, rest: RestProof, asked: float) -> bool:
-    """Whether neither the graph nor a sub-graph of it moves, or will by itself."""
+    """Return whether neither the graph nor a sub-graph of it moves, or will move by itself."""
     shown = _shown(answer, graph)
     is_held = bool(shown) and shown[0].graph == graph
     return rest.seen(shown, asked) if is_held else rest.missing(shown, asked)

@@ -1,7 +1,7 @@
-"""Late activity: runs that are over and move again, since an action was still being loaded.
+"""Late activity: opens runs again that are over and move, since an action was still being loaded.
 
-An engine neither counts nor shows an action that it loads, so nothing can be proven about one that
-takes longer than people would wait. What can be done is to look on, and to take back what was said.
+An engine neither counts nor shows an action that it loads. So runs are watched after their end, and an end
+that turns out to be wrong is taken back.
 """
 
 import logging
@@ -43,22 +43,23 @@ class Reopenable(Protocol):
     run: Run
 
     def moves_again(self, event: MovesAgain) -> bool:
-        """It had ended and moves. False when it is stored and left already."""
+        """Open the run again. Return False when its end is stored and nobody drives it any more."""
         ...
 
 
 class RobotRecords(Protocol):
-    """Where it is recorded what others told robots."""
+    """Gives the records of the commands that others have sent to robots."""
 
     @property
     def robot_log(self) -> RobotLog:
-        """The records."""
+        """The log of what happened to robots."""
         ...
 
 
 class LateActivity:
-    """Watches what engines show for runs that are over. `open` are the runs that are not;
-    `reopen` is given a run as stored, the seq of its last event, and what opens it again."""
+    """Watches what engines show for runs that are over and move. `open_` are the runs that are not over;
+    `reopen` is called with a run as it is stored, the seq of its last event, and the event that opens it
+    again."""
 
     def __init__(
         self,
@@ -85,22 +86,23 @@ class LateActivity:
         self._elsewhere: OrderedDict[tuple[str, str], None] = OrderedDict()
 
     def ended(self, run: Run, seq: int) -> None:
-        """A run is over and stored; its end is known without the journal then."""
+        """Remember a run that is over and stored, so that its end is known without the journal."""
         _put(self._ended, run.id, (run, seq))
 
     def sent_by_others(self, command: ForeignCommand) -> None:
-        """Whoever plays a start of ours again has started it, not we: it is a graph of theirs."""
+        """Note that somebody else has published a start message of this runner again: what it starts is their
+        graph."""
         run = run_in(command.umrf) if command.umrf else None
         if run is not None:
             _put(self._others, run, None)
 
     def is_of_others(self, robot: str, run: str) -> bool:
-        """Whether what a robot shows as this run was started by somebody else."""
+        """Return whether somebody else has started the graph that a robot shows under this run's id."""
         return run in self._others or (robot, run) in self._elsewhere
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """An engine shows these graphs, in an answer or by feedback. Never waits; feedback comes
-        outside of any task, so that none can be started here."""
+        """Take in graphs that an engine shows, in an answer or by feedback. Never waits, and starts no task, since
+        feedback comes outside of any task."""
         robot = engine.registration.name
         for each in snapshots:
             if each.run is None or not each.active or (robot, each.run) in self._looking:
@@ -111,7 +113,7 @@ class LateActivity:
                 self._news.set()
 
     async def run(self) -> None:
-        """Look into what was shown, until cancelled."""
+        """Look into each run that was shown moving after its end, until cancelled."""
         while True:
             await self._news.wait()
             self._news = anyio.Event()
@@ -153,8 +155,8 @@ class LateActivity:
             self._reopen(*found, self._told(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
-        """A run that is not open, and its last seq; None when there is no such run here, or when an
-        earlier process has recorded that somebody else played its start again."""
+        """Return a run that is not open, and its last seq. Return None when there is no such run, or when an
+        earlier process has recorded that somebody else published its start again."""
         ended = self._ended.get(run)
         if ended is not None:
             if ended[0].engine == robot:
@@ -186,8 +188,8 @@ class LateActivity:
 
 
 async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | None:
-    """What an answer says about what feedback has shown, which may be late or made up; without any
-    answer the feedback is believed."""
+    """Return the run as an answer shows it moving, or None. Feedback may be late or made up, so an answer
+    decides; when none comes within 3 s, the feedback is believed."""
     with anyio.move_on_after(_PATIENCE_S):
         while True:
             try:
@@ -203,7 +205,7 @@ async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | N
 
 
 def _is_of(run: Run, engine: KnownEngine) -> bool:
-    """Whether a run went to this life of this engine."""
+    """Return whether a run was sent to this engine in its present life."""
     lives = {run.incarnation, engine.standing.incarnation} - {None, ""}
     return run.engine == engine.registration.name and len(lives) <= 1
 

@@ -45,8 +45,8 @@ class LoadingAction(msgspec.Struct, frozen=True):
 
 
 def read_triggers(text: str | None, sent: Sequence[str], meddled: bool) -> Triggers | None:
-    """Return what a graph says of triggering; None where it cannot be read. `sent`: as it was sent, and
-    changed since, if that is known. For workers."""
+    """Return the arrows of a graph as far as triggering goes; None where it cannot be read. `text` is the graph
+    as the engine wrote it, `sent` are the texts that were sent, changes last. For workers."""
     try:
         versions = [triggers_of(codec.read(each).graph, exits_known=True) for each in sent]
         if len(versions) == 1 and not meddled:
@@ -63,10 +63,10 @@ def read_triggers(text: str | None, sent: Sequence[str], meddled: bool) -> Trigg
 
 
 class LoadingWatch:
-    """What was seen of one graph and its sub-graphs that tells who may have been triggered.
+    """Collects what was seen of one graph and its sub-graphs, and tells which actions may be loading.
 
-    `meddled`: somebody may have changed the graph, or set actions of it going, so that they may have
-    run more often than its arrows say, and beside each other.
+    `meddled`: somebody else may have changed the graph or set actions of it going, so that they may have run
+    more often than its arrows say, and beside each other.
     """
 
     def __init__(self, main: str, *, meddled: bool = False) -> None:
@@ -92,32 +92,31 @@ class LoadingWatch:
                 self._after[each.graph] = first, _and(seen, each)
 
     def sends(self, umrf: str, *, beside: bool = False) -> None:
-        """This graph is handed over: the first one, or a change. `beside`: an action of it is started
+        """Note that this graph is handed over: the first one, or a change. `beside`: an action of it is started
         beside those that go on."""
         self.forget()
         self._sent.append(umrf)
         self._meddled = self._meddled or beside
 
     def recalls(self, umrf: str) -> None:
-        """This graph was handed over by an earlier process, or before the run had ended once."""
+        """Note that this graph was handed over by an earlier process, or before the run had ended once."""
         if not self._sent and not self._meddled:
             self._sent.append(umrf)
             self._read.pop(self._main, None)
 
     def meddle(self) -> None:
-        """Somebody else may have changed it, or set it going."""
+        """Note that somebody else may have changed the graph, or set it going."""
         self.forget()
         self._meddled = True
 
     def forget(self) -> None:
-        """What was seen proves nothing any more."""
+        """Forget everything that was seen, since it proves nothing any more."""
         self._after.clear()
         self._read.clear()
         self._age += 1
 
     def unread(self, shown: Sequence[Snapshot]) -> tuple[str, ...]:
-        """Return the graphs of which it depends on the arrows who may be loading, and these have not
-        been read."""
+        """Return the graphs whose arrows have to be read to tell which actions may be loading."""
         return tuple(
             each.graph for each in shown if _is_open(each) and each.graph not in self._read
         )
@@ -162,10 +161,10 @@ class LoadingWatch:
 
 
 class LoadingTimes:
-    """How long actions took from their trigger until they were seen to begin, by robot and by their own
-    name, since this runner began. It only changes words: no time tells whether an action will come.
+    """Learns how long actions take from their trigger until they are seen to begin, by robot and action name,
+    since this runner began. Only sentences use it: no time tells whether an action will come.
 
-    Learnt is what is certain: the first action of a run that begins was triggered by its start.
+    It learns from the first action of a run that begins, which was certainly triggered by the start.
     """
 
     def __init__(self) -> None:

@@ -1,4 +1,4 @@
-"""The proof of rest: a get asked after the stop, and for how long rest must be seen."""
+"""Sends stop messages, and decides whether answers show a graph at rest for long enough to prove it."""
 
 import hashlib
 import logging
@@ -24,7 +24,7 @@ SET_GOING: Final = frozenset({"start", "resume", "modify"})
 
 
 async def send_stop(link: Link, graph: str) -> str:
-    """One stop message; what went wrong, if anything. Never raises."""
+    """Send one stop message; return what went wrong, "" for nothing. Never raises."""
     try:
         with anyio.fail_after(_SEND_S):
             await link.stop(graph)
@@ -39,12 +39,13 @@ async def send_stop(link: Link, graph: str) -> str:
 
 
 def hash_of(shown: Sequence[Snapshot]) -> str:
-    """SHA-256 over what an answer showed, for the record of a proof."""
+    """Return the SHA-256 of what an answer showed, for the record of a proof."""
     return hashlib.sha256(msgspec.json.encode(list(shown))).hexdigest()
 
 
 class RestProof:
-    """Tells whether a graph has come to rest, actions that may still be loading aside (`loading`).
+    """Decides from several looks whether a graph has come to rest. Actions that may be loading are not its
+    subject (`loading`).
 
     An action that has run before and was triggered again is not loaded again: what passes until the
     engine shows it RUNNING is the start of a thread. So one look is not enough: a graph must be seen at
@@ -57,16 +58,17 @@ class RestProof:
         self._since: float | None = None
 
     def forget(self) -> None:
-        """It was not seen."""
+        """Start over: the graph was not seen, or somebody may have set it going."""
         self._since = None
 
     @property
     def pending(self) -> bool:
-        """Whether it looked at rest, but not for long enough yet."""
+        """True after a look at which the graph was at rest."""
         return self._since is not None
 
     def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
-        """After one more look, asked for at `asked`, at a graph and then its sub-graphs."""
+        """Take in one more look at a graph and then its sub-graphs, asked for at `asked` (seconds); return whether
+        they have been at rest for long enough."""
         state = shown[0].state
         moving = any(each.active for each in shown)
         if moving or state not in TERMINAL | NEVER_BEGAN:
@@ -78,8 +80,8 @@ class RestProof:
         return asked - self._since >= _long_enough(shown)
 
     def missing(self, parts: Sequence[Snapshot], asked: float) -> bool:
-        """After one more look, asked for at `asked`, that did not show the graph itself: an engine
-        that has just been told to start it does not show it yet."""
+        """Take in one more look that did not show the graph itself, only `parts` of it; return whether that has
+        lasted for long enough. An engine that has just been told to start a graph does not show it yet."""
         if any(each.active for each in parts):
             self._since = None
             return False

@@ -1,4 +1,4 @@
-"""Whether this process can reach robots over ROS 2, and why not."""
+"""Finds out whether this process can reach robots over ROS 2, and why not."""
 
 import importlib
 import importlib.util
@@ -19,7 +19,7 @@ _MAKE: Final = "`make ros` in a checkout, or `source` the ROS 2 workspace before
 def ros2_reach(
     clock_us: Callable[[], int], environ: Mapping[str, str] = os.environ
 ) -> "Reach | str":
-    """What reaches robots over ROS 2 from this process, or why nothing does, in one sentence.
+    """Return a reach over ROS 2, or one sentence that says why this process can have none.
 
     `clock_us` gives microseconds UTC. rclpy is imported here and not before: an editor's computer has
     none, and its wheels start their interpreter anew.
@@ -36,7 +36,7 @@ def ros2_reach(
 
 
 def why_not(environ: Mapping[str, str] = os.environ) -> str:
-    """Why this interpreter cannot speak ROS 2; empty when it can."""
+    """Return why this interpreter cannot speak ROS 2; "" when it can."""
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     ros_workspace.offer(environ)
     if importlib.util.find_spec("rclpy") is None:
@@ -74,7 +74,8 @@ def why_not(environ: Mapping[str, str] = os.environ) -> str:
 
 
 def _survives(rmw: str, environ: Mapping[str, str]) -> bool:
-    """Whether rclpy can be imported with this middleware: if not, it ends the process (code 102)."""
+    """Return whether rclpy can be imported with this middleware. It is tried in a process of its own, which an
+    unknown middleware ends with code 102."""
     asked = {**environ, "RMW_IMPLEMENTATION": rmw}
     command = [
         *(sys.executable, "-c"),

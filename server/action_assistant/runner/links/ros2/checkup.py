@@ -1,5 +1,5 @@
-"""What is wrong with ROS 2 here, as far as can be seen from this process: its environment, who is on
-its domains, and whether each registered robot answers."""
+"""Looks for faults of ROS 2 from this process: in its environment, among the engines on its domains, and
+whether each registered robot answers. For `doctor`."""
 
 import asyncio
 import importlib
@@ -43,7 +43,8 @@ async def look(
     clock_us: Callable[[], int],
     environ: Mapping[str, str] = os.environ,
 ) -> list[Diagnostic]:
-    """Everything there is to say, the ground first. Takes some seconds; never raises for trouble."""
+    """Return all findings, those about the environment first. Takes some seconds; a fault of ROS 2 is a finding
+    and raises nothing."""
     seen = [*_sourced(environ), *_domain(environ)]
     reach = ros2_reach(clock_us, environ)
     if isinstance(reach, str):
@@ -88,7 +89,7 @@ async def look(
 
 
 def _no_reach(why: str, robots: Sequence[Registration]) -> Diagnostic:
-    """A computer without robots needs no ROS 2."""
+    """Return the finding for a process that cannot reach robots. Without registered robots that is no fault."""
     if "ROS_DOMAIN_ID" in why:
         return found(
             "domain-wrong", "ROS_DOMAIN_ID", why, "Set it to the robot's domain, or unset it."
@@ -139,8 +140,8 @@ def _domain(environ: Mapping[str, str]) -> list[Diagnostic]:
 
 
 def shared_memory(environ: Mapping[str, str]) -> list[Diagnostic]:
-    """Whether nodes of this computer can share memory with ours; that there is any is looked at
-    elsewhere."""
+    """Return what keeps nodes of this computer from sharing memory with this process. Missing shared memory is
+    another check's."""
     if not sys.platform.startswith("linux") or _SAYS_FASTRTPS in environ:
         return []
     seen: list[Diagnostic] = []
@@ -171,7 +172,7 @@ def shared_memory(environ: Mapping[str, str]) -> list[Diagnostic]:
 
 
 def _is_private() -> bool:
-    """Whether the memory is a container's own: engines of containers call what they mount `shm`."""
+    """Return whether /dev/shm belongs to this container alone: container engines mount it as `tmpfs shm`."""
     try:
         return _OWN_SHM.search(_MOUNTS.read_text()) is not None
     except OSError:
@@ -179,7 +180,7 @@ def _is_private() -> bool:
 
 
 def _owners() -> set[int]:
-    """The users whose nodes have shared memory here; it comes and goes while one looks."""
+    """Return the ids of the users whose nodes have shared memory here. Files may vanish meanwhile."""
     found: set[int] = set()
     for each in _SHM.glob("fastrtps_*"):
         with suppress(OSError):
@@ -188,7 +189,7 @@ def _owners() -> set[int]:
 
 
 def _origin(module: str) -> str:
-    """Where a package of ROS 2 comes from, for people."""
+    """Return the folder that a package of ROS 2 was installed to, for people."""
     place = getattr(importlib.import_module(module), "__file__", None)
     return ros_workspace.prefix_of(place) if place else "an unknown place"
 
@@ -196,7 +197,7 @@ def _origin(module: str) -> str:
 async def _standings(
     reach: Reach, robots: Sequence[Registration], seen: list[Diagnostic]
 ) -> list[tuple[Registration, Standing]]:
-    """How each registered robot stands, all asked at once. Raises RuntimeError."""
+    """Return the standing of each registered robot; all are asked at once. Raises RuntimeError."""
     links: list[tuple[Registration, Link]] = []
     for each in robots:
         try:
@@ -216,7 +217,7 @@ async def _standings(
 
 
 async def _answering(link: Link) -> None:
-    """Wait until an engine answers."""
+    """Wait until the engine of a link answers."""
     answers = anyio.Event()
 
     def hear(report: Report) -> None:
@@ -247,7 +248,7 @@ def _likely(
 
 
 def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
-    """What one robot's standing means. `elsewhere`: engines on another domain that may be it."""
+    """Return the finding for one robot. `elsewhere` are engines on another domain that may be it."""
     if standing.generation == "older":
         return found(
             "robot-older",
@@ -271,7 +272,7 @@ def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidat
 
 
 def _silent(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
-    """Why a robot does not answer, as far as can be seen from here."""
+    """Return the finding for a robot that does not answer, with the reason as far as it can be seen from here."""
     if "RMW_IMPLEMENTATION" in standing.why:
         return found(
             "robot-middleware",
@@ -310,8 +311,8 @@ def _engines(
     strangers: Sequence[Candidate],
     unseen: Sequence[Registration],
 ) -> list[Diagnostic]:
-    """Engines that nobody registered, and what is odd about any. `unseen`: robots of which no engine is
-    seen; one that says no name may be any of them, which is said once, with the engine."""
+    """Return findings for engines that nobody registered, and for faults of any engine. `unseen` are robots of
+    which no engine is seen; an engine that says no name may be any of them, which is said with the engine."""
     seen: list[Diagnostic] = []
     for each in candidates:
         place = f"{each.get_service}, domain {each.domain}"

@@ -1,8 +1,8 @@
-"""One ROS 2 domain as this process sees it: a context, a node, a thread, and what all links share.
+"""One ROS 2 domain as this process sees it: a context, a node and a thread, which all links share.
 
-The thread waits for messages, reads them and hands them to the event loop. Publishing and looking
-at who is there happen on the event loop itself, since neither waits for anybody. Entities are
-destroyed after the thread has ended: taking one from under a waiting executor breaks it.
+The thread waits for messages, reads them and hands them to the event loop. Publishing and discovery queries
+run on the event loop itself, since neither waits. Entities are destroyed after the thread has ended:
+destroying one under a waiting executor breaks it.
 """
 
 import asyncio
@@ -62,15 +62,15 @@ Subscriber: TypeAlias = Callable[[RosValue], None]
 
 
 class Domain:
-    """A domain that this process takes part in."""
+    """The participation of this process in one domain."""
 
     def __init__(
         self, number: int, topics: Topics, loop: asyncio.AbstractEventLoop, clock_us: Clock
     ) -> None:
-        """Join. Takes up to some seconds, so it is done in a thread. Raises RuntimeError."""
+        """Join the domain. Takes up to some seconds, so it is called in a thread. Raises RuntimeError."""
         self.number = number
         self.topics = topics
-        self.actors: set[str] = set()  # who was heard
+        self.actors: set[str] = set()  # names in feedback so far
         self.settled_at = time.monotonic() + DISCOVERY_S
         self._loop = loop
         self._clock_us = clock_us
@@ -95,7 +95,7 @@ class Domain:
         self._thread.start()
 
     def leave(self) -> None:
-        """End the thread, then let go of everything. Waits for it: call it in a thread."""
+        """End the thread, then destroy the node. Waits for both, so it is called in a thread."""
         self._leaving = True
         self._executor.create_task(lambda: None)  # a mere wake-up would be slept through
         self._thread.join()
@@ -106,14 +106,14 @@ class Domain:
 
     @property
     def settled(self) -> bool:
-        """Whether everybody who is there must have been seen."""
+        """True once discovery has had the time to show every participant."""
         return time.monotonic() >= self.settled_at
 
     # --- the one question ---------------------------------------------------------------------
 
     async def ask(self, path: str) -> GetResult:
-        """Ask whoever serves a path. Waits for as long as the caller likes; the answer to a question
-        that was given up goes nowhere. Raises NotAGraph, RuntimeError."""
+        """Call the get service on a path and return the answer. The caller sets the deadline; an answer that
+        comes after a cancelled call is dropped. Raises NotAGraph, RuntimeError."""
         loop = asyncio.get_running_loop()
         answered: asyncio.Future[GetResult] = loop.create_future()
         client, asked_at = self.client(path), self._clock_us()
@@ -127,7 +127,7 @@ class Domain:
                 answered.set_result(got)
 
         def read(future: Future) -> None:
-            """On the thread of this domain, so that megabytes do not hold up the event loop."""
+            """Decode the answer, on the thread of this domain, so that megabytes do not block the event loop."""
             if future.cancelled():
                 return
             try:
@@ -144,7 +144,8 @@ class Domain:
             client.remove_pending_request(pending)
 
     def client(self, path: str) -> Client:
-        """The client of a path, made when it is first needed: an answer needs time to find it."""
+        """Return the client of a path. The first call creates it, early, because discovery needs time before an
+        answer can reach it."""
         if path not in self._clients:
             self._clients[path] = self._node.create_client(UmrfGraphGet, path)
         return self._clients[path]
@@ -152,20 +153,20 @@ class Domain:
     # --- who is there -------------------------------------------------------------------------
 
     def servers(self, path: str) -> tuple[Endpoint, ...]:
-        """Who answers on a path."""
+        """Return the servers of the get service on a path, without those of this process."""
         raw = self._node.get_subscriptions_info_by_topic(f"rq{_absolute(path)}Request", True)
         return self._others(raw)
 
     def listeners(self, topic: str) -> tuple[Endpoint, ...]:
-        """Who subscribes to a topic, beside us."""
+        """Return the subscriptions to a topic, without those of this process."""
         return self._others(self._node.get_subscriptions_info_by_topic(topic))
 
     def publishers(self, topic: str) -> tuple[Endpoint, ...]:
-        """Who publishes on a topic, beside us."""
+        """Return the publishers on a topic, without those of this process."""
         return self._others(self._node.get_publishers_info_by_topic(topic))
 
     def paths(self) -> tuple[str, ...]:
-        """Every path on which something answers as engines do."""
+        """Return every path with a get service of the engines' type."""
         found = self._node.get_service_names_and_types()
         return tuple(name for name, kinds in found if _KIND in kinds and self.servers(name))
 
@@ -184,7 +185,8 @@ class Domain:
         return tuple(each for each in ends if each.process != self.process)
 
     def _know_ourselves(self) -> tuple[str, str]:
-        """Our own process and the type of our own start messages, as others see them."""
+        """Return the gid prefix of this process and the type hash of its start messages, as others see them.
+        Raises RuntimeError."""
         name, deadline = (
             self._node.get_fully_qualified_name().lstrip("/"),
             time.monotonic() + _JOIN_S,
@@ -200,7 +202,7 @@ class Domain:
     # --- what comes by itself -----------------------------------------------------------------
 
     def hearing(self, subscriber: Subscriber) -> AbstractContextManager[None]:
-        """Be told, on the event loop, what comes by itself."""
+        """Call `subscriber` with every value that is heard until the end of the block, on the event loop."""
         return self._subscribers.listening(subscriber)
 
     def _listen(self) -> None:
@@ -215,6 +217,7 @@ class Domain:
 
     def _overhear(self, command: Command, kind: type[M], topic: str, ours: Outlet[M]) -> None:
         def heard(message: M, info: dict[str, int | None]) -> None:
+            """Report a command unless this process has sent it."""
             if ours.sent(message, info.get("source_timestamp")):
                 return
             graph, umrf = _named(message)
@@ -230,7 +233,8 @@ class Domain:
         self._node.create_subscription(kind, topic, heard, qos(50))
 
     def _sender(self, topic: str) -> str:
-        """Who it must have been, when there is only one; the middleware does not say."""
+        """Return the logger name of the one publisher on a topic; "" when there are several, since the
+        middleware does not say which one has sent a message."""
         loggers = {each.logger for each in self.publishers(topic)}
         return loggers.pop() if len(loggers) == 1 else ""
 
@@ -249,12 +253,12 @@ class Domain:
         self._tell(LogLine(message.name, message.msg))
 
     def _tell(self, value: RosValue) -> None:
-        """On the thread of this domain."""
+        """Queue a value for the event loop; called on the thread of this domain."""
         if self._waiting.add(value):
             self._to_loop(self._hand_over)
 
     def _hand_over(self) -> None:
-        """On the event loop, in order."""
+        """Pass the queued values to the subscribers, in order; called on the event loop."""
         taken = self._waiting.take()
         if taken.dropped:
             log.warning("domain %d: %d messages came too fast", self.number, taken.dropped)
@@ -264,13 +268,13 @@ class Domain:
         for value in taken.values:
             try:
                 self._subscribers.tell(value)
-            except Exception:  # whoever fails at one must not miss the others
+            except Exception:  # a subscriber that fails at one value must get the others
                 log.exception("domain %d: a message could not be told", self.number)
 
     def _to_loop(self, work: Callable[[], None]) -> None:
         try:
             self._loop.call_soon_threadsafe(work)
-        except RuntimeError:  # the loop is closed: nobody wants to know any more
+        except RuntimeError:  # the loop is closed
             if not self._leaving:
                 log.warning("domain %d goes on without an event loop", self.number)
 
@@ -298,8 +302,8 @@ def _endpoint(info: TopicEndpointInfo) -> Endpoint:
 
 
 def _named(message: Message) -> tuple[str, str]:
-    """The graph that engines take a command to mean, and its text: a name inside a text counts more
-    than the one beside it."""
+    """Return the name of the graph that a command is about, as engines see it, and the text of the graph. A
+    name inside the text counts more than the one beside it."""
     match message:
         case UmrfGraphStart(umrf_graph_json=text) | UmrfGraphModify(modified_graph=text):
             return (
@@ -310,7 +314,8 @@ def _named(message: Message) -> tuple[str, str]:
 
 
 def _read(response: UmrfGraphGet.Response, asked_at: int, at: int) -> GetResult:
-    """Raises NotAGraph: an answer that is not wholly understood proves nothing."""
+    """Decode an answer. Raises NotAGraph for any graph in it that cannot be read: an answer that is not wholly
+    understood proves nothing."""
     texts, graphs = {}, []
     for text in response.graph_jsons_running:
         shown = snapshot(text, at=at, source="get", asked_at=asked_at)

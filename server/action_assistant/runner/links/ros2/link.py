@@ -1,8 +1,8 @@
-"""One robot over ROS 2: what is told to its engine, what it is asked, and what it lets be known.
+"""The link to one robot over ROS 2: commands to its engine, gets, and reports.
 
-Nothing here waits for an engine: commands are published and that is all that is known of them. Only
-an answer of the one server on a robot's path says what the engine holds, and only while the same
-server stood there before and after.
+Nothing here waits for an engine: a command is published, and whether it was obeyed is not known. Only an
+answer of the one server on the robot's path says what the engine holds, and only if the same server was the
+only one before and after.
 """
 
 import time
@@ -63,7 +63,7 @@ Join: TypeAlias = Callable[[int, Topics], Awaitable[Domain]]
 
 
 class Ros2Link:
-    """One robot. It lives while `run` is kept going."""
+    """The link to one robot. It hears and answers only while `run` is running."""
 
     simulated: Final = False
 
@@ -94,18 +94,18 @@ class Ros2Link:
 
     @property
     def pauses(self) -> bool:
-        """What the robot's profile says."""
+        """True when the robot's profile says that pausing is safe."""
         return self._facts.pauses_safely
 
     @property
     def standing(self) -> Standing:
-        """As of a second ago, or of the last get."""
+        """The standing as of the last look, which is a second old at most, or of the last get."""
         return self._standing
 
     # --- commands -----------------------------------------------------------------------------
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start. Raises NotSent."""
+        """Publish one start message. Raises NotSent."""
         domain = self._reachable("start", self._topics.start)
         message = UmrfGraphStart(
             umrf_graph_name=order.graph.name,
@@ -117,22 +117,23 @@ class Ros2Link:
         await domain.outlets.send_start(self._name, order.run, message, leaves)
 
     async def stop(self, graph_name: str) -> None:
-        """Publish one stop, also when nobody seems to listen: what is seen may lag behind what is.
-        Raises NotSent."""
+        """Publish one stop message, also when nobody seems to listen, since discovery lags behind. Raises
+        NotSent, after the message has left where only the listener is missing."""
         domain = self._joined()
         with _sent_or_not():
             await domain.outlets.send_stop(graph_name, self._name)
         self._listened_to(domain, self._topics.stop)
 
     async def pause(self, graph_name: str) -> None:
-        """Publish one pause. Raises NotSent."""
+        """Publish one pause message. Raises NotSent."""
         domain = self._reachable("pause", self._topics.pause)
         message = UmrfGraphPause(umrf_graph_name=graph_name, targets=[self._name])
         with _sent_or_not():
             await domain.outlets.pause.send(lambda: message)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Publish one resume. Raises NotSent; over ROS 2 an engine goes on where it was."""
+        """Publish one resume message. Raises NotSent, also for `continue_from`: over ROS 2 a graph goes on where
+        it was."""
         if continue_from:
             raise NotSent("over ROS 2 a graph goes on where it was; no action can be named")
         domain = self._reachable("resume", self._topics.resume)
@@ -141,7 +142,7 @@ class Ros2Link:
             await domain.outlets.resume.send(lambda: message)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Publish one modify. Raises NotSent."""
+        """Publish one modify message. Raises NotSent."""
         domain = self._reachable("modify", self._topics.modify)
         message = UmrfGraphModify(
             umrf_graph_name=order.graph.name,
@@ -157,7 +158,7 @@ class Ros2Link:
         return self._domain
 
     def _reachable(self, command: str, topic: str) -> Domain:
-        """The domain, if this robot would take a command. Raises NotSent."""
+        """Return the domain, if this robot can take a command. Raises NotSent."""
         domain = self._joined()
         self._listened_to(domain, topic)
         if generation_of(domain, domain.servers(self._path)) == "older":
@@ -171,7 +172,7 @@ class Ros2Link:
     # --- the one question ---------------------------------------------------------------------
 
     async def get(self) -> Answer:
-        """Ask what the engine holds. Raises NoAnswer."""
+        """Ask the one engine on the path for all graphs that it holds. Raises NoAnswer."""
         if self._domain is None:
             raise NoAnswer(self._standing.why)
         domain = self._domain
@@ -207,7 +208,7 @@ class Ros2Link:
     # --- life ---------------------------------------------------------------------------------
 
     async def run(self) -> None:
-        """Join the domain, look every second who is there, and ask when nobody else does."""
+        """Join the domain, look every second who is there, and send a get when there was none for 10 s."""
         domain = await self._joining()
         domain.client(self._path)
         self._domain = domain
@@ -233,7 +234,7 @@ class Ros2Link:
                 await anyio.sleep(_AGAIN_S)
 
     def _due(self) -> bool:
-        """An engine that was not asked for a while, or has yet to say its first word, is asked."""
+        """Return whether the engine is to be asked: it has not answered yet, or was not asked for 10 s."""
         rested = time.monotonic() - self._asked_at
         return self._standing.servers == 1 and (not self._answered or rested >= _IDLE_GET_S)
 
@@ -246,16 +247,16 @@ class Ros2Link:
         self._look()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Everything that concerns this robot, from now on."""
+        """Call `hear` with every report about this robot until the end of the block."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """Nothing of its own: the domain is shared."""
+        """Do nothing, since the domain is shared."""
 
     # --- what is known ------------------------------------------------------------------------
 
     def _look(self) -> None:
-        """Look who is there and say what has changed."""
+        """Update the standing from discovery, and report a change of it."""
         domain = self._domain
         if domain is None:
             return
@@ -332,14 +333,14 @@ class Ros2Link:
             )
 
     def _actor(self, domain: Domain) -> str:
-        """What this robot's feedback calls itself, as far as that can be told."""
+        """Return the name that this robot's feedback carries; "" where that cannot be told."""
         if self._name in domain.actors:
             return self._name
         alone = len(domain.actors) == 1 and self._alone(domain)
         return next(iter(domain.actors)) if alone else ""
 
     def _alone(self, domain: Domain) -> bool:
-        """Whether all feedback on this domain comes from one engine."""
+        """Return whether all feedback on this domain comes from one process."""
         return len({each.process for each in domain.publishers(self._topics.feedback)}) <= 1
 
     # --- what is heard ------------------------------------------------------------------------
@@ -370,8 +371,8 @@ class Ros2Link:
                 assert_never(value)
 
     def _hear_feedback(self, value: Feedback) -> None:
-        """With several engines on a domain, the name inside tells them apart; what carries a run of
-        ours is ours under any name."""
+        """Report feedback of this robot. With several engines on a domain the name inside tells them apart;
+        snapshots that carry a run of this link are reported under any name."""
         domain = self._domain
         if domain is None:
             return
@@ -384,7 +385,7 @@ class Ros2Link:
         self._subscribers.tell(value)
 
     def _said(self, logger: str) -> bool:
-        """Whether a line can only be this engine's: nodes of one name cannot be told apart."""
+        """Return whether a log line can only be from this engine; nodes of one name cannot be told apart."""
         domain = self._domain
         if domain is None:
             return False
@@ -400,7 +401,8 @@ class Ros2Link:
 
 @contextmanager
 def _sent_or_not() -> Iterator[None]:
-    """What the middleware refuses has not left. Not for starts: of those nobody may be so sure."""
+    """Turn an error of the middleware into NotSent. Not for starts: one that failed may have left all the
+    same."""
     try:
         yield
     except RuntimeError as error:

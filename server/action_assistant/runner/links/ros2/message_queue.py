@@ -1,7 +1,7 @@
-"""What came on a domain's thread and waits for the event loop: bounded, commands apart from the rest.
+"""A bounded queue from the thread of a domain to its event loop, with commands apart from the rest.
 
-Nodes may log faster than anybody listens. What they push out is other lines and feedback, of which some
-is always missing; a command of somebody else is said once.
+Nodes may log faster than the loop reads. Log lines then push out other lines and feedback, of which some is
+always missing anyway, but never a command of somebody else, which is sent once.
 """
 
 import threading
@@ -18,7 +18,7 @@ _Numbered: TypeAlias = tuple[int, RosValue]
 
 
 class QueuedMessages(NamedTuple):
-    """What has waited, oldest first, and how much of it was pushed out."""
+    """The values that have waited, oldest first, and how many were dropped."""
 
     values: list[RosValue]
     dropped: int
@@ -26,7 +26,7 @@ class QueuedMessages(NamedTuple):
 
 
 class MessageQueue:
-    """Added to by one thread, taken from by another."""
+    """A queue that one thread adds to and another one takes from."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -40,7 +40,7 @@ class MessageQueue:
         self._is_empty = True
 
     def add(self, value: RosValue) -> bool:
-        """Keep it, and whether it is the first to wait: then somebody has to take it."""
+        """Add a value; return whether the queue was empty, so that the reader has to be woken."""
         with self._lock:
             self._number += 1
             if isinstance(value, OverheardCommand):
@@ -53,7 +53,7 @@ class MessageQueue:
             return is_first
 
     def take(self) -> QueuedMessages:
-        """All that waits."""
+        """Return all waiting values in order, and empty the queue."""
         with self._lock:
             commands, others = self._commands, self._others
             dropped, dropped_commands = self._dropped, self._dropped_commands

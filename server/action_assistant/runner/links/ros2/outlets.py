@@ -1,4 +1,4 @@
-"""The command topics of one ROS 2 domain: what leaves, how far apart, and which echoes are ours."""
+"""The command topics of one ROS 2 domain: spaces messages out, and recognizes the echo of our own."""
 
 import time
 from collections import deque
@@ -27,7 +27,7 @@ GAP_S: Final = 0.05
 #: Seconds at most that a start waits for a sign that its engine took the one before: an engine that
 #: is busy for longer than a gap would lose it to the next one, which need not be for it.
 TAKEN_S: Final = 2.0
-_ECHO_S: Final = 30.0  # for so long a message of ours is known when it comes back
+_ECHO_S: Final = 30.0  # for which the echo of a message is recognized
 
 Message: TypeAlias = (
     UmrfGraphStart | UmrfGraphStop | UmrfGraphPause | UmrfGraphResume | UmrfGraphModify
@@ -36,7 +36,7 @@ M = TypeVar("M", bound=Message)
 
 
 class Topics(msgspec.Struct, frozen=True, kw_only=True):
-    """Absolute names of what engines listen and speak on."""
+    """The absolute names of the topics of engines."""
 
     start: str
     stop: str
@@ -47,7 +47,7 @@ class Topics(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def qos(depth: int) -> QoSProfile:
-    """As engines have it: reliable, and nothing is kept for who comes late."""
+    """Return the quality of service that engines use: reliable, with nothing kept for late joiners."""
     return QoSProfile(
         depth=depth,
         history=HistoryPolicy.KEEP_LAST,
@@ -57,7 +57,7 @@ def qos(depth: int) -> QoSProfile:
 
 
 class _SentMessage:
-    """A message of ours and the time, in nanoseconds UTC, within which it was published."""
+    """A message of this process and the time in which it was published, in nanoseconds UTC."""
 
     def __init__(self, message: Message) -> None:
         self.message = message
@@ -66,7 +66,7 @@ class _SentMessage:
 
 
 class Outlet(Generic[M]):
-    """One command topic: messages leave one by one, `GAP_S` apart."""
+    """One command topic, on which messages leave one by one, `GAP_S` apart."""
 
     def __init__(self, publisher: "Publisher[M]") -> None:
         self._publisher = publisher
@@ -75,7 +75,7 @@ class Outlet(Generic[M]):
         self._free_at = 0.0
 
     async def send(self, make: Callable[[], M | None]) -> None:
-        """Publish what `make` gives when it is its turn; None is nothing."""
+        """Wait for the turn, then publish the message that `make` returns, if any."""
         async with self._turn:
             await anyio.sleep(max(0.0, self._free_at - time.monotonic()))
             message = make()
@@ -90,8 +90,8 @@ class Outlet(Generic[M]):
                 self._free_at = time.monotonic() + GAP_S
 
     def sent(self, message: Message, stamp: int | None) -> bool:
-        """Whether this is a message of ours that came back: the same words, and stamped (nanoseconds
-        UTC, by the sender) while we were publishing them. Called on any thread."""
+        """Return whether a message on this topic is one of this process: the same text, and stamped by its
+        sender (nanoseconds UTC) while this process was publishing it. Called on any thread."""
         horizon = time.time_ns() - int(_ECHO_S * 1e9)
         return any(
             mark.since >= horizon
@@ -102,7 +102,7 @@ class Outlet(Generic[M]):
 
 
 class Outlets:
-    """Everything that commands leave by."""
+    """The command topics of one domain."""
 
     def __init__(self, node: Node, topics: Topics) -> None:
         publish, each = node.create_publisher, qos(10)
@@ -118,8 +118,8 @@ class Outlets:
     async def send_start(
         self, robot: str, run: str, message: UmrfGraphStart, leaves: Callable[[], None]
     ) -> None:
-        """Publish the start of a run when the one before was taken in, or `TAKEN_S` after it. `leaves`
-        is called right before it leaves."""
+        """Publish the start of a run once its engine has taken in the start before, or `TAKEN_S` after that.
+        `leaves` is called right before the message leaves."""
 
         def leaving() -> UmrfGraphStart:
             leaves()
@@ -135,20 +135,20 @@ class Outlets:
             await self.start.send(leaving)
 
     def shown(self, graphs: Iterable[Snapshot]) -> None:
-        """Engines show these graphs: whose start was taken in."""
+        """Note which graphs engines show: the start of one of them was taken in."""
         last = self._untaken
         if last is not None and any(each.run == last.run for each in graphs):
             last.taken.set()
 
     def said(self, robot: str, line: str) -> None:
-        """The engine of a robot says this in its log."""
+        """Note a line of a robot's log: it may say that a start was taken in."""
         last = self._untaken
         if last is not None and (last.robot, last.receipt) == (robot, line.strip()):
             last.taken.set()
 
     async def send_stop(self, graph: str, target: str) -> None:
-        """Publish a stop. Those of one graph that wait for their turn leave as one message, with
-        every robot as a target; when that cannot be published, all of them learn it."""
+        """Publish a stop. Stops of one graph that wait for their turn leave as one message, with every robot
+        as a target; if that message cannot be published, each of the calls raises."""
         stops = self._stopping.setdefault(graph, _Stops())
         stops.targets.append(target)
 
@@ -178,7 +178,7 @@ class Outlets:
 
 
 class _Untaken:
-    """A start that has left, and nothing shows yet that its engine took it in."""
+    """A start that has left and is not known yet to have been taken in."""
 
     def __init__(self, robot: str, run: str, receipt: str) -> None:
         self.robot, self.run = robot, run
@@ -188,7 +188,7 @@ class _Untaken:
 
 
 class _Stops:
-    """Stops of one graph that leave as one message."""
+    """The stops of one graph that wait to leave as one message."""
 
     def __init__(self) -> None:
         self.targets: list[str] = []

@@ -1,4 +1,4 @@
-"""What can be told of engines on a ROS 2 domain by looking at their endpoints."""
+"""Reads from the endpoints on a ROS 2 domain which engines are there, and of which kind."""
 
 from typing import Final
 
@@ -17,7 +17,7 @@ _VENDORS: Final = {"010f": "Fast DDS", "0110": "Cyclone DDS", "0101": "Connext"}
 
 
 def topics_of(facts: EngineFacts) -> Topics:
-    """Where an engine of these facts listens and speaks."""
+    """Return the topics of an engine with these facts."""
     return Topics(
         start=facts.start_topic,
         stop=facts.stop_topic,
@@ -29,8 +29,8 @@ def topics_of(facts: EngineFacts) -> Topics:
 
 
 def generation_of(domain: Domain, servers: tuple[Endpoint, ...]) -> Generation:
-    """Whether an engine reads a start as we write it, by the hash of its type; old middlewares tell
-    none."""
+    """Return whether an engine reads a start as this process writes it, by the hash of the message type;
+    `unknown` with a middleware that gives no hash."""
     hashes = {each.type_hash for each in belonging(servers, domain.listeners(domain.topics.start))}
     known = {each for each in hashes if not each.upper().startswith("INVALID")}
     if not known:
@@ -48,13 +48,14 @@ def two_servers(place: str, count: int) -> str:
 
 
 def belonging(servers: tuple[Endpoint, ...], ends: tuple[Endpoint, ...]) -> tuple[Endpoint, ...]:
-    """Those endpoints that belong to the processes of these servers."""
+    """Return those of `ends` that belong to the processes of these servers."""
     processes = {each.process for each in servers}
     return tuple(each for each in ends if each.process in processes)
 
 
 def foreign_middleware(domain: Domain, server: Endpoint) -> str:
-    """The name of a server's middleware if it is not ours: then it may be seen but never answers."""
+    """Return the name of a server's middleware if it is not that of this process, else "". A server on another
+    one may be seen and never answers."""
     theirs = server.gid[:4]
     if theirs == domain.process[:4]:
         return ""

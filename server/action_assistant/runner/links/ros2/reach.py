@@ -21,8 +21,8 @@ from action_assistant.umrf.facts import PINNED, EngineFacts
 
 
 class Ros2:
-    """Makes the links, and holds the domains they share. One per process: a process has one
-    middleware, chosen by RMW_IMPLEMENTATION before anything else happens."""
+    """Makes links, and holds the domains that they share. There is one in a process, since a process has one
+    middleware, chosen by RMW_IMPLEMENTATION at its start."""
 
     def __init__(self, clock_us: Callable[[], int], home: int) -> None:
         self._clock_us = clock_us
@@ -32,11 +32,11 @@ class Ros2:
 
     @property
     def rmw(self) -> str:
-        """The middleware of this process."""
+        """The name of the middleware of this process."""
         return rclpy.get_rmw_implementation_identifier()
 
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
-        """A link to a robot; one that says why, if it is on another middleware."""
+        """Return a link to a robot; for a robot on another middleware one that cannot be reached and says why."""
         if registration.rmw not in {"", self.rmw}:
             return UnreachableLink(
                 f"{registration.name} is registered with {registration.rmw}, but this runner speaks "
@@ -46,7 +46,7 @@ class Ros2:
         return Ros2Link(self.domain, registration, facts, self._clock_us)
 
     async def domain(self, number: int, topics: Topics) -> Domain:
-        """A domain, joined when it is first asked for. Raises RuntimeError."""
+        """Return a domain, which the first call joins. Raises RuntimeError."""
         async with self._joining:
             known = self._domains.get((number, topics))
             if known is None:
@@ -58,7 +58,8 @@ class Ros2:
             return known
 
     async def sighting(self) -> Sighting:
-        """Return whoever answers as engines do, on the domains of links and the one of the environment."""
+        """Return the engines that are seen now, on the domains of links and on that of the environment. Raises
+        RuntimeError."""
         await self.domain(self._home, topics_of(PINNED))
         domains = tuple(self._domains.values())
         youngest = max(each.settled_at for each in domains)
@@ -71,7 +72,7 @@ class Ros2:
         return Sighting(engines, max(0.0, youngest - time.monotonic()))
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Return the same once discovery has had its time."""
+        """Return the engines that are seen once discovery has had its time. Raises RuntimeError."""
         seen = await self.sighting()
         await anyio.sleep(seen.left_s)
         return (await self.sighting()).engines if seen.left_s else seen.engines
@@ -94,7 +95,7 @@ class Ros2:
         )
 
     async def aclose(self) -> None:
-        """Leave every domain."""
+        """Leave every domain, even when cancelled."""
         with anyio.CancelScope(shield=True):
             while self._domains:
                 _, domain = self._domains.popitem()

@@ -1,6 +1,6 @@
-"""What is seen and heard on a ROS 2 domain, as values without ROS 2.
+"""The values that a ROS 2 domain gives to links, free of ROS 2 types: endpoints, messages and answers.
 
-`Domain` over rclpy tells its links these, and so does the air of virtual time in which tests fly.
+`Domain` makes them over rclpy; the fake network of tests in virtual time makes them, too.
 """
 
 import re
@@ -22,9 +22,8 @@ _GRAPH: Final = re.compile(
 
 
 class Endpoint(msgspec.Struct, frozen=True):
-    """A publisher, a subscription or a server of somebody. `gid` is another one after every restart;
-    `process` is the part of it that all endpoints of one process share. `logger` is the name under
-    which its node logs."""
+    """A publisher, subscription or server on a domain. `gid` changes with every restart; `process` is the part
+    of it that all endpoints of one process share. `logger` is the name under which the node logs."""
 
     gid: str
     process: str
@@ -43,14 +42,14 @@ class OverheardCommand(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LogLine(msgspec.Struct, frozen=True):
-    """A line of somebody's log."""
+    """A line of a node's log."""
 
     logger: str
     text: str
 
     @property
     def graph(self) -> str | None:
-        """The name of the graph that it is about, if it says one."""
+        """The name of the graph that the line is about, if it says one."""
         found = _GRAPH.search(self.text.strip())
         return found[found.lastgroup or 0] if found else None
 
@@ -59,7 +58,8 @@ RosValue: TypeAlias = Feedback | OverheardCommand | LogLine
 
 
 class GetResult(msgspec.Struct, frozen=True, kw_only=True):
-    """What a server answered. `graphs` and `texts` are what it runs or has run; `known_…` its index."""
+    """The answer of a server. `graphs` and `texts` (by running name) are those that it runs or has run; the
+    others are the UMRF texts of its index."""
 
     graphs: tuple[Snapshot, ...]
     texts: dict[str, str]
