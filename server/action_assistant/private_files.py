@@ -30,6 +30,24 @@ def make_folder(path: Path) -> None:
         path.mkdir(mode=0o700, exist_ok=True)
 
 
+def replace_file(
+    path: Path, content: bytes, *, part: Path | None = None, is_durable: bool = True
+) -> None:
+    """Write a private file so that others find the old content or the new one, never a part of it.
+
+    The content is written to `part` first (by default the path with `.part` appended). With `is_durable` it
+    survives a power cut; the rename does so once the folder is flushed, too (`sync`). Raises OSError.
+    """
+    part = part or path.with_name(f"{path.name}.part")
+    part.unlink(missing_ok=True)  # it may have other rights
+    with open(part, "wb", opener=opener) as out:
+        out.write(content)
+        out.flush()
+        if is_durable:
+            os.fsync(out.fileno())
+    part.replace(path)
+
+
 def sync(path: Path) -> None:
     """Flush a file or folder to disk, so that its content or a rename survives a power cut."""
     descriptor = os.open(path, os.O_RDONLY)

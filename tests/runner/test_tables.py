@@ -7,8 +7,8 @@ from msgspec.structs import replace
 from sqlalchemy import select
 
 from action_assistant.journal.journal import Journal
+from action_assistant.kit.clock import utc_us
 from action_assistant.runner import projection
-from action_assistant.runner.clock import utc_us
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots.registry import Robots

@@ -21,7 +21,6 @@ _PRELOADED: Final = (
     "action_assistant.editor.crdt.trial",
     "action_assistant.editor.interchange.action_uses",
     "action_assistant.editor.interchange.action_packages",
-    "action_assistant.editor.interchange.text_merging",
     "action_assistant.editor.interchange.subgraph_edits",
     "action_assistant.journal.sqlite",
     "action_assistant.editor.history.graph_history",

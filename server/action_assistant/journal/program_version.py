@@ -1,10 +1,10 @@
 """Which versions of this program have written to a database: its last lines say who made it what it is."""
 
-import time
 from typing import Final, NamedTuple
 
 from sqlalchemy import Connection, insert, inspect, select
 
+from action_assistant.kit.clock import utc_us
 from action_assistant.schema.editor_tables import written_by
 from action_assistant.version import VERSION, commit
 
@@ -40,5 +40,5 @@ def sign(connection: Connection, revision: str) -> None:
     mine = ProgramVersion(VERSION, commit() or "", revision)
     if row is not None and (row.version, row.build, row.revision) == mine:
         return
-    since = max(time.time_ns() // 1000, 0 if row is None else row.since + 1)
+    since = max(utc_us(), 0 if row is None else row.since + 1)
     connection.execute(insert(written_by).values(since=since, **mine._asdict()))

@@ -16,12 +16,12 @@ from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.commit_metrics import CommitMetrics
 from action_assistant.journal.database import Database, WriterSession, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
+from action_assistant.kit.clock import ClockUs, utc_us
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
-Clock: TypeAlias = Callable[[], int]
 #: What became of a job: its result, or why there is none; the events it wrote.
 Outcome: TypeAlias = tuple[Any, BaseException | None, list[Event]]
 
@@ -31,11 +31,6 @@ _HEAVY: Final = 16 << 20  # bytes in one statement, beyond which no other job jo
 _KNOWN: Final = 10_000  # streams whose ends are kept in memory
 _AGAIN: Final = 0.1  # seconds between attempts to find out about a commit
 _LAST: Final = select(func.coalesce(func.max(editor_tables.editor_event.c.position), 0))
-
-
-def now() -> int:
-    """Return the time in microseconds since 1970."""
-    return time.time_ns() // 1000
 
 
 class Job(Generic[T]):
@@ -66,7 +61,7 @@ class Transaction:
     inside a savepoint, so that what a job did wrong touches nobody else's work.
     """
 
-    def __init__(self, session: WriterSession, fold: Fold, clock: Clock) -> None:
+    def __init__(self, session: WriterSession, fold: Fold, clock: ClockUs) -> None:
         self.fold: Final = fold
         self._session = session
         self._clock = clock
@@ -206,7 +201,7 @@ class Writer:
         session: WriterSession | None,
         fold: Fold,
         tell: Callable[[JobOutcomes], None],
-        clock: Clock = now,
+        clock: ClockUs = utc_us,
     ) -> None:
         self._database = database
         self._session = session

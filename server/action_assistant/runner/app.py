@@ -17,6 +17,7 @@ from litestar.types import ASGIApp
 
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
+from action_assistant.kit.clock import utc_us
 from action_assistant.public_url import RUNNER
 from action_assistant.runner import projection
 from action_assistant.runner.api.caller import SMALL
@@ -26,7 +27,6 @@ from action_assistant.runner.api.runs import routes
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
-from action_assistant.runner.clock import utc_us
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.execution.start_pipeline import StartSources
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder

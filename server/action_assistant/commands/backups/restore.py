@@ -39,7 +39,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import ask_once, database_of
 from action_assistant.journal.foreign_schema import remove_strangers
-from action_assistant.private_files import opener, sync
+from action_assistant.private_files import opener, replace_file, sync
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import TOKEN_FILE
 
@@ -268,12 +268,7 @@ def _exchange(new: Path, old: Path, aside: Path | None) -> None:
 
 def _write(path: Path, content: msgspec.Struct) -> None:
     part = path.with_name(f".{path.name}.part")
-    descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-    with os.fdopen(descriptor, "wb") as file:
-        file.write(msgspec.json.encode(content))
-        file.flush()
-        os.fsync(descriptor)
-    part.replace(path)
+    replace_file(path, msgspec.json.encode(content), part=part)
     sync(path.parent)
 
 

@@ -3,7 +3,6 @@
 import os
 import sqlite3
 import subprocess
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
@@ -17,6 +16,7 @@ from action_assistant.commands.doctor.installation import Installation
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.journal.sqlite import unchanged
+from action_assistant.kit.clock import utc_us
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.checkup import look
 from action_assistant.runner.runs import queries
@@ -85,7 +85,7 @@ def _said(words: Sequence[str], option: str) -> str:
 
 def look_here(place: Installation) -> list[Diagnostic]:
     """Return the findings about ROS 2 and the robots, with the Python that runs this."""
-    return anyio.run(look, _registered(place.data), lambda: time.time_ns() // 1000)
+    return anyio.run(look, _registered(place.data), utc_us)
 
 
 def _asked(interpreter: Interpreter, place: Installation) -> list[Diagnostic]:

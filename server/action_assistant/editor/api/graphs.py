@@ -11,9 +11,8 @@ from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.documents import contents
 from action_assistant.editor.documents.contents import GraphAtSeq, Inside
 from action_assistant.editor.interchange import importing
-from action_assistant.editor.interchange.edited_text import TextEdit, edited_text
+from action_assistant.editor.interchange.edited_text import TextEdit, edited_text, merging
 from action_assistant.editor.interchange.importing import ImportReport, Preview
-from action_assistant.editor.interchange.text_merging import merging
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded

@@ -10,13 +10,13 @@ import msgspec
 
 from action_assistant.editor.catalogue.graph_names import GraphNames
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.catalogue.recent import Recent
 from action_assistant.editor.documents import contents, document
 from action_assistant.editor.documents.contents import Counts, GraphAtSeq, GraphInfo, Inside
 from action_assistant.editor.log.graph_events import DocumentKind, graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import NotFound, Refused
 from action_assistant.journal.journal import Journal
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.umrf.problem_kinds import ProblemCounts
 from action_assistant.umrf.semantics.matching import BUDGET
 from action_assistant.web.workers.lanes import HOPELESS, Crashed
@@ -93,12 +93,12 @@ class GraphChecks:
         self._rooms = rooms
         self._reader = reader
         self.names: Final = GraphNames(journal, self._name)
-        self._abouts = Recent[str, _About](_COUNTED, _NAMES)
-        self._hopeless = Recent[str, tuple[int, Refused]](_COUNTED)
-        self._counts = Recent[str, tuple[int, bytes, Counts, ProblemCounts]](_COUNTED)
-        self._problems = Recent[tuple[str, int, bytes], bytes](_REMEMBERED)
-        self._digests = Recent[tuple[str, int], str](_COUNTED)
-        self._uses = Recent[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
+        self._abouts = LruCache[str, _About](_COUNTED, _NAMES)
+        self._hopeless = LruCache[str, tuple[int, Refused]](_COUNTED)
+        self._counts = LruCache[str, tuple[int, bytes, Counts, ProblemCounts]](_COUNTED)
+        self._problems = LruCache[tuple[str, int, bytes], bytes](_REMEMBERED)
+        self._digests = LruCache[tuple[str, int], str](_COUNTED)
+        self._uses = LruCache[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
 
     async def problems(self, sight: GraphAtSeq) -> bytes:
         """Return the problems of a graph at a moment as JSON, with the graphs inside as they are now."""

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
-from action_assistant.editor.catalogue.recent import Recent
 from action_assistant.editor.crdt.loading import stored
 from action_assistant.editor.crdt.replica import ReplicaState
 from action_assistant.editor.documents.contents import GraphAtSeq
@@ -11,6 +10,7 @@ from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.journal.journal import Journal
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 T = TypeVar("T")
@@ -27,7 +27,7 @@ class GraphReader:
         self._journal = journal
         self._rooms = rooms
         self._run_in_worker = run_in_worker
-        self._moments = Recent[tuple[str, int], GraphAtSeq](_REMEMBERED)
+        self._moments = LruCache[tuple[str, int], GraphAtSeq](_REMEMBERED)
 
     async def now(self, graph: str) -> GraphAtSeq:
         """The graph as it is; of one whose history is damaged, what can be read of it.

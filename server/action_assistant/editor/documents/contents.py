@@ -4,7 +4,6 @@ The event loop knows a graph only as the bytes of its document; what depends on 
 a worker, which remembers the graphs that it read last.
 """
 
-from collections import OrderedDict
 from typing import Any, Final
 
 import msgspec
@@ -13,6 +12,7 @@ from pycrdt import Doc
 from action_assistant.editor.documents import document
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.fingerprint import Fingerprint, fingerprint
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.umrf.check import check_written
 from action_assistant.umrf.checks.subgraphs import Resolution
 from action_assistant.umrf.digest import digest, tree_digest
@@ -108,7 +108,7 @@ class Read:
         return self._found[1]
 
 
-_recent: "Final[OrderedDict[tuple[str, int], Read]]" = OrderedDict()
+_recent: Final = LruCache[tuple[str, int], Read](_REMEMBERED, _ACTIONS)
 
 
 def read(sight: GraphAtSeq) -> Read:
@@ -117,18 +117,9 @@ def read(sight: GraphAtSeq) -> Read:
     found = _recent.get(key)
     if found is None:
         maps = maps_of(sight.state)
-        found = _recent[key] = Read(ReadGraph(sight.seq, maps, document.read_maps(maps)))
-        _forget()
-    _recent.move_to_end(key)
+        found = Read(ReadGraph(sight.seq, maps, document.read_maps(maps)))
+        _recent.put(key, found, len(found.moment.graph.actions))
     return found
-
-
-def _forget() -> None:
-    """Keep what was read last, as far as it is not too much."""
-    actions = sum(len(each.moment.graph.actions) for each in _recent.values())
-    while len(_recent) > 1 and (len(_recent) > _REMEMBERED or actions > _ACTIONS):
-        _, oldest = _recent.popitem(last=False)
-        actions -= len(oldest.moment.graph.actions)
 
 
 def graphs_of(inside: Inside) -> dict[str, Graph]:

@@ -1,7 +1,7 @@
-"""Edits that are made on a copy of a document, as updates (rule R9). For workers."""
+"""Makes edits on a copy of a document, as updates (rule R9), and the rule of three-way merges. For workers."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 from msgspec import UNSET
 from msgspec.structs import replace
@@ -16,9 +16,20 @@ from action_assistant.editor.documents.contents import (
     info,
     maps_of,
 )
-from action_assistant.editor.documents.document import Maps
+from action_assistant.editor.documents.document import Maps, is_same
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.umrf.model import Graph
+
+#: Whose value counts: of those into whom is merged, of those who are merged, or that is to be asked.
+Side: TypeAlias = Literal["ours", "theirs"]
+
+
+def chosen(base: object, ours: object, theirs: object) -> Side | None:
+    """Return the side whose value wins; None where both sides changed it in different ways. UNSET stands for no
+    value."""
+    if is_same(ours, theirs) or is_same(theirs, base):
+        return "ours"
+    return "theirs" if is_same(ours, base) else None
 
 
 def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:

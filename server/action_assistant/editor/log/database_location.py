@@ -6,7 +6,6 @@ graphs that are elsewhere, and nobody finds an empty catalogue by leaving out an
 """
 
 import logging
-import os
 from pathlib import Path
 from typing import Final
 
@@ -17,6 +16,7 @@ from sqlalchemy.exc import ArgumentError
 from action_assistant.editor.log.epochs import MARK, EpochMark
 from action_assistant.errors import CannotStart
 from action_assistant.journal.databases import ask_once, database_of
+from action_assistant.private_files import replace_file
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
@@ -109,13 +109,8 @@ def remember(data: Path, url: str) -> None:
         if same(url, _own(data)):
             path.unlink(missing_ok=True)
             return
-        part = path.with_name(f".{FILE}.part")
-        descriptor = os.open(part, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
-        with os.fdopen(descriptor, "wb") as file:
-            file.write(msgspec.json.encode(StoredLocation(shown(url))))
-            file.flush()
-            os.fsync(descriptor)
-        part.replace(path)
+        content = msgspec.json.encode(StoredLocation(shown(url)))
+        replace_file(path, content, part=path.with_name(f".{FILE}.part"))
     except OSError as error:  # graphs can be drawn all the same; the next start tries again
         log.warning("cannot write %s: %s", path, error.strerror)
 

@@ -10,6 +10,7 @@ import logging
 import secrets
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Final, Literal, TypeAlias
 
@@ -19,7 +20,7 @@ from sqlalchemy import select
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.private_files import opener
+from action_assistant.private_files import replace_file
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
@@ -114,13 +115,6 @@ async def _remember(journal: Journal, mark: Path) -> None:
     try:
         position = await journal.position()
         text = msgspec.json.encode(EpochMark(position, await _chain(journal, position)))
-        await asyncio.to_thread(_replace, mark, text)
+        await asyncio.to_thread(partial(replace_file, mark, text, is_durable=False))
     except (OSError, Unavailable) as error:
         log.warning("cannot write %s: %s", mark, error)
-
-
-def _replace(path: Path, content: bytes) -> None:
-    part = path.with_name(f"{path.name}.part")
-    with open(part, "wb", opener=opener) as out:
-        out.write(content)
-    part.replace(path)

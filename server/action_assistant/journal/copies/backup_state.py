@@ -13,7 +13,7 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.private_files import opener
+from action_assistant.private_files import opener, replace_file
 from action_assistant.system import file_locks
 
 log: Final = logging.getLogger(__name__)
@@ -115,12 +115,8 @@ def note(data: Path, change: Callable[[BackupState], BackupState]) -> None:
         try:
             file_locks.wait_for(guard)
             state = change(backup_state(data) or BackupState())
-            part = path.with_name(f".{FILE}.part")
-            with open(part, "wb", opener=opener) as out:
-                out.write(msgspec.json.format(msgspec.json.encode(state)))
-                out.flush()
-                os.fsync(out.fileno())
-            part.replace(path)
+            content = msgspec.json.format(msgspec.json.encode(state))
+            replace_file(path, content, part=path.with_name(f".{FILE}.part"))
         finally:
             os.close(guard)
     except OSError as error:

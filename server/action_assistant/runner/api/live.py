@@ -20,8 +20,8 @@ from litestar import WebSocket
 from litestar.exceptions import WebSocketDisconnect, WebSocketException
 
 from action_assistant.errors import Refused
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.api.caller import author_of
-from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.robots.registration import Robot

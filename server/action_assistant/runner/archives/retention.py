@@ -20,11 +20,11 @@ from sqlalchemy import Row, Select, exists, literal, or_, select
 from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.removal import StreamRemoved
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.archives.archive_store import Journaled
 from action_assistant.runner.archives.raw_messages import RawArchived, stream_of_raw
-from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.recorder import stream_of

@@ -10,7 +10,7 @@ import anyio
 from msgspec.structs import replace
 
 from action_assistant.errors import Refused
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.evidence import (
     LastLook,
     SubGraphs,

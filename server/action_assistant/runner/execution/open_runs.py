@@ -5,8 +5,8 @@ from typing import Final
 
 import anyio
 
+from action_assistant.kit.clock import ClockUs
 from action_assistant.logs.context import begin
-from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.port import Link, Order
 from action_assistant.runner.links.unreachable import UnreachableLink

@@ -4,7 +4,7 @@ here, so whoever decides what an engine's answer means returns a value of this k
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.links.observations import Hazard, Seen
 from action_assistant.runner.runs.events import (
     AlarmRaised,

@@ -14,7 +14,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import OutcomeUnknown, Refused
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.monitor import Job, Monitor
 from action_assistant.runner.execution.run_changes import RunChanges
 from action_assistant.runner.links.engine_process import has_ended

@@ -12,7 +12,7 @@ import anyio
 from sqlalchemy import Row
 
 from action_assistant.errors import Conflict, NotFound
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun

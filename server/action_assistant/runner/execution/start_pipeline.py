@@ -25,10 +25,10 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
+from action_assistant.kit.clock import ClockUs
 from action_assistant.random_ids import random_id
 from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.analysis.course_checks import CheckedCourses
-from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import (

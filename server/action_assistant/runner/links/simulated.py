@@ -22,6 +22,7 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import TooMany
+from action_assistant.kit.clock import utc_us
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.behaviours.performer import (
     BehaviourPerformer,
@@ -313,7 +314,7 @@ async def _serve(wire: socket.socket, made: _Made, performer: BehaviourPerformer
     reader, writer = await asyncio.open_connection(sock=wire)
     writer.transport.set_write_buffer_limits(high=_WAITING)
     engine = engine_of(made.facts, made.script, performer)
-    link = SimulatorLink(engine, clock_us=_now, performer=performer)
+    link = SimulatorLink(engine, clock_us=utc_us, performer=performer)
     if performer is not None:
         loop = asyncio.get_running_loop()
         performer.wake = partial(_woken, loop, link)
@@ -362,7 +363,3 @@ def _parts(report: Report) -> Iterator[Report]:
         return
     for start in range(0, len(report.changes), _CHANGES):
         yield Transitions(run=report.run, changes=report.changes[start : start + _CHANGES])
-
-
-def _now() -> int:
-    return time.time_ns() // 1000

@@ -11,10 +11,10 @@ import anyio
 from sqlalchemy import Connection, func, select
 
 from action_assistant.errors import Refused, TooLarge
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.analysis.keyframes import APART
 from action_assistant.runner.archives.archive_store import ArchiveStore
-from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.review.ongoing_runs import OngoingRun, OngoingRuns
 from action_assistant.runner.runs.word_index import index_some
 from action_assistant.runner.workers import Crashed

@@ -11,6 +11,7 @@ from sqlalchemy import ColumnElement, Row, Select, select
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft, Event
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
 from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import causes
@@ -26,7 +27,6 @@ from action_assistant.runner.archives.raw_messages import (
     raw_of,
     stream_of_raw,
 )
-from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.review.background_loops import KeyframeLoop, SumUpLoop
 from action_assistant.runner.review.ongoing_runs import OngoingRuns, wait_until_stored
 from action_assistant.runner.robots.recordings import Recording, hours

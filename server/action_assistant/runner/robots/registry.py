@@ -9,8 +9,8 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft
+from action_assistant.kit.clock import ClockUs
 from action_assistant.logs.context import begin
-from action_assistant.runner.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     SIMULATOR,

@@ -13,7 +13,7 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.journal.events import Draft
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import RunnerJournal

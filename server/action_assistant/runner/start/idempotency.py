@@ -8,7 +8,7 @@ import anyio
 
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Draft
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended, Requested, encode
 from action_assistant.runner.runs.fold import begin

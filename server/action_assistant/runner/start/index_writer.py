@@ -12,7 +12,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, Unavailable
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.index_folders.comparison import (
     Differing,
     FileState,

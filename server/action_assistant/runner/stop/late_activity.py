@@ -13,7 +13,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import NotFound, Refused
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.links.engine_text import run_in
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import ForeignCommand, NoAnswer

@@ -10,7 +10,7 @@ from typing import Final, NamedTuple
 
 import anyio
 
-from action_assistant.runner.clock import ClockUs
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.runs.events import Author, StopRequested
 from action_assistant.runner.runs.run import Run
 

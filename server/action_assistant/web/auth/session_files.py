@@ -15,7 +15,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.errors import NotFound
-from action_assistant.private_files import opener
+from action_assistant.private_files import replace_file
 from action_assistant.web.auth.keys import SESSION_SECONDS, Person, Session
 from action_assistant.web.auth.revocations import Revocations
 
@@ -49,12 +49,10 @@ class SessionFiles:
         if self._noted.get(session.id) == session or len(self._noted) >= _MOST:
             return
         path = self._path(session.id)
-        part = path.with_suffix(".part")
         try:
             self._folder.mkdir(mode=0o700, exist_ok=True)
-            with open(part, "wb", opener=opener) as out:
-                out.write(msgspec.json.encode(session))
-            part.replace(path)
+            content = msgspec.json.encode(session)
+            replace_file(path, content, part=path.with_suffix(".part"), is_durable=False)
         except OSError as error:
             log.warning("a session could not be noted in %s: %s", self._folder, error.strerror)
             return

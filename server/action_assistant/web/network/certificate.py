@@ -7,7 +7,6 @@ private networks alone, so that whoever steals its key cannot stand in for the r
 
 import contextlib
 import ipaddress
-import os
 import platform
 import ssl
 from collections.abc import Iterator, Sequence
@@ -21,7 +20,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from action_assistant.errors import CannotStart
-from action_assistant.private_files import opener
+from action_assistant.private_files import opener, replace_file
 from action_assistant.system import file_locks
 
 FOLDER: Final = "tls"
@@ -235,10 +234,5 @@ def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Put it there at once, readable by those who may from its first moment."""
-    fresh = path.with_suffix(".new")
-    fresh.unlink(missing_ok=True)
-    with open(fresh, "xb", opener=opener) as out:
-        out.write(content)
-        os.fsync(out.fileno())
-    fresh.replace(path)
+    """Replace a file that only this user may read, from its first moment on."""
+    replace_file(path, content, part=path.with_suffix(".new"))

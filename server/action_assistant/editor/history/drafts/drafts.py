@@ -1,6 +1,5 @@
 """The drafts of graphs: made, told of, proposed, and answered."""
 
-from collections import OrderedDict
 from collections.abc import Sequence
 from datetime import datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias
@@ -17,6 +16,7 @@ from action_assistant.editor.history.drafts.told_merges import DraftBase, apart_
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.journal import Journal
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.schema.editor_tables import graph as graph_table
 from action_assistant.web.auth import caller
@@ -114,7 +114,7 @@ class Drafts:
         self._catalogue = catalogue
         self._people = people
         self._index = index
-        self._distances: OrderedDict[_Moments, tuple[int, int]] = OrderedDict()
+        self._distances: LruCache[_Moments, tuple[int, int]] = LruCache(_REMEMBERED)
 
     async def make(self, origin: str, author: str, new: NewDraft) -> DraftView:
         """A draft of a graph. Raises BadInput, NotFound, Conflict, Unavailable."""
@@ -280,9 +280,7 @@ class Drafts:
         if known is None:
             pair = await self.pair(row.id)
             behind, ahead = await self._index.value(apart_since, pair.base, pair.origin, pair.draft)
-            known = self._distances[moments] = ahead, behind
-            if len(self._distances) > _REMEMBERED:
-                self._distances.popitem(last=False)
+            known = self._distances.put(moments, (ahead, behind))
         return *known, newest[0]
 
     async def _row(self, draft: str) -> Row[Any]:

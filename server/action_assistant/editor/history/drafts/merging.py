@@ -21,7 +21,7 @@ from action_assistant.editor.history.places import (
     exist,
     is_place_of_card,
 )
-from action_assistant.editor.interchange.three_way import Side, chosen
+from action_assistant.editor.interchange.changes import Side, chosen
 from action_assistant.umrf.model import ENTRY, EXIT
 
 Places: TypeAlias = Mapping[Place, Any]

@@ -21,8 +21,7 @@ from action_assistant.editor.history.grafts import originals
 from action_assistant.editor.history.key_changes import LoggedChange, Place, owner_of
 from action_assistant.editor.history.places import by_owner, field_of
 from action_assistant.editor.history.told_changes import Changes, maps_of, shortened, state_of
-from action_assistant.editor.interchange.changes import setting
-from action_assistant.editor.interchange.three_way import Side
+from action_assistant.editor.interchange.changes import Side, setting
 from action_assistant.umrf.check import check_written
 from action_assistant.umrf.difference import (
     ActionChange,

@@ -1,4 +1,4 @@
-"""The values that were asked for last."""
+"""A cache that drops the least recently used values."""
 
 from collections import OrderedDict
 from typing import Generic, TypeVar
@@ -7,8 +7,8 @@ K = TypeVar("K")
 V = TypeVar("V")
 
 
-class Recent(Generic[K, V]):
-    """At most `size` of them, which together weigh at most `weight`."""
+class LruCache(Generic[K, V]):
+    """Holds up to `size` values whose weights add up to at most `weight`; the newest one always stays."""
 
     def __init__(self, size: int, weight: int | None = None) -> None:
         self._size = size
@@ -17,7 +17,7 @@ class Recent(Generic[K, V]):
         self._values: OrderedDict[K, tuple[V, int]] = OrderedDict()
 
     def get(self, key: K) -> V | None:
-        """The value, if it is still there."""
+        """Return the value of a key; None where it was never put or was dropped."""
         found = self._values.get(key)
         if found is None:
             return None
@@ -25,12 +25,12 @@ class Recent(Generic[K, V]):
         return found[0]
 
     def put(self, key: K, value: V, weight: int = 0) -> V:
-        """Remember a value, and forget others."""
+        """Store a value and return it; drop the least recently used ones beyond the limits."""
         self._weight += weight - self._values.pop(key, (None, 0))[1]
         self._values[key] = value, weight
         while len(self._values) > 1 and self._is_too_much():
-            _, (_, gone) = self._values.popitem(last=False)
-            self._weight -= gone
+            _, (_, dropped) = self._values.popitem(last=False)
+            self._weight -= dropped
         return value
 
     def _is_too_much(self) -> bool:

@@ -1,4 +1,4 @@
-"""The clock of the runner, in microseconds UTC."""
+"""The clock of the log: microseconds since 1970, UTC."""
 
 import time
 from collections.abc import Callable
