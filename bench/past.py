@@ -16,13 +16,13 @@ from table import Table, seconds
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.catalogue.people import People
-from action_assistant.editor.history import told_changes
+from action_assistant.editor.history import change_summaries
 from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.course_search import AskingSince, CourseSearch
 from action_assistant.editor.history.graph_history import GraphHistory
-from action_assistant.editor.history.since_when import AskingSince, CourseSearch
 from action_assistant.editor.log.graph_events import UPDATED, fold, graph_stream
+from action_assistant.editor.people.people import People
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.journal.events import Draft
@@ -80,11 +80,11 @@ async def _asked(past: _Past) -> list[float]:
     history, blame = GraphHistory(index), Blame(index)
 
     async def moment() -> None:
-        await index.value(told_changes.document_at, GRAPH, dice.randrange(1, changes))
+        await index.value(change_summaries.document_at, GRAPH, dice.randrange(1, changes))
 
     async def compare() -> None:
         first, last = sorted(dice.sample(range(1, changes), 2))
-        await index.text(told_changes.differing, GRAPH, first, last)
+        await index.text(change_summaries.differing, GRAPH, first, last)
 
     async def steps() -> None:
         at = dice.randrange(1, changes - 500)

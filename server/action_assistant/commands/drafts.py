@@ -19,9 +19,9 @@ from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.difference_text import lines
 
 if TYPE_CHECKING:  # slow to load, and most calls do not need them
+    from action_assistant.editor.history.change_summaries import Changes
     from action_assistant.editor.history.drafts.draft_merges import MergePreview
-    from action_assistant.editor.history.drafts.told_merges import DraftConflict
-    from action_assistant.editor.history.told_changes import Changes
+    from action_assistant.editor.history.drafts.merge_previews import DraftConflict
 
 _SIDES: Final = ("origin", "draft")
 

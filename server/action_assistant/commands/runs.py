@@ -22,7 +22,7 @@ from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.difference_text import lines, without_looks
 
 if TYPE_CHECKING:  # slow to load, and most calls do not need it
-    from action_assistant.editor.history.since_when import SinceWhen
+    from action_assistant.editor.history.course_search import SinceWhen
 
 
 def add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -58,7 +58,7 @@ def _since(options: argparse.Namespace) -> int:
             edits = server.editor("GET", f"/api/graphs/{graph}/diff", params=query)
         except RequestRefused as error:
             return refused(error)
-    from action_assistant.editor.history.since_when import SinceWhen
+    from action_assistant.editor.history.course_search import SinceWhen
 
     found = decoded(answer, SinceWhen)
     if options.json:

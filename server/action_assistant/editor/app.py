@@ -27,9 +27,9 @@ from action_assistant.editor.api import (
     subgraphs,
     versions,
 )
-from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.people.people import People
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.watched import WatchedEditor
 from action_assistant.editor.workers import EditorWorkers

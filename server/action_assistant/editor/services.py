@@ -3,18 +3,18 @@
 from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.catalogue.invitations import Invitations
-from action_assistant.editor.catalogue.library import Library
-from action_assistant.editor.catalogue.library_edits import LibraryEdits
-from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.catalogue.versions import Versions
 from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.course_search import CourseSearch
 from action_assistant.editor.history.drafts.draft_merges import DraftMerges
 from action_assistant.editor.history.drafts.drafts import Drafts
-from action_assistant.editor.history.going_back import GoingBack
 from action_assistant.editor.history.graph_history import GraphHistory
-from action_assistant.editor.history.since_when import CourseSearch
+from action_assistant.editor.history.restoring import Restoring
+from action_assistant.editor.library.library import Library
+from action_assistant.editor.library.library_edits import LibraryEdits
+from action_assistant.editor.people.invitations import Invitations
+from action_assistant.editor.people.people import People
 from action_assistant.editor.rooms.colours import PersonColours
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.rate_limits import ByteRateLimits
@@ -60,7 +60,7 @@ class EditorServices:
         self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
         self.change_index = ChangeIndex(journal, workers.graphs)
         self.history = GraphHistory(self.change_index)
-        self.going_back = GoingBack(
+        self.going_back = Restoring(
             journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
         )
         self.course_search = CourseSearch(self.change_index, people, self.graph_checks)

@@ -19,15 +19,15 @@ _PRELOADED: Final = (
     "action_assistant.editor.interchange.rehearsal",
     "action_assistant.editor.interchange.edited_text",
     "action_assistant.editor.crdt.trial",
-    "action_assistant.editor.interchange.action_uses",
+    "action_assistant.editor.library.action_uses",
     "action_assistant.editor.interchange.action_packages",
-    "action_assistant.editor.interchange.subgraph_edits",
+    "action_assistant.editor.subgraphs.subgraph_edits",
     "action_assistant.journal.sqlite",
     "action_assistant.editor.history.graph_history",
     "action_assistant.editor.history.blame",
     "action_assistant.editor.history.reverting",
-    "action_assistant.editor.history.parting",
-    "action_assistant.editor.history.drafts.told_merges",
+    "action_assistant.editor.history.course_changes",
+    "action_assistant.editor.history.drafts.merge_previews",
 )
 _NICE: Final = 5
 

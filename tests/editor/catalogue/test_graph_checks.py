@@ -19,7 +19,7 @@ from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.versions import VersionView
 from action_assistant.editor.history.drafts.drafts import NewDraft
-from action_assistant.editor.interchange import changes
+from action_assistant.editor.interchange import document_edits
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices
 from action_assistant.errors import NotFound
@@ -65,8 +65,8 @@ async def rewritten(services: EditorServices, graph: str, graph_file: bytes) -> 
     """Somebody draws something else there."""
     async with services.rooms.enter(graph_stream(graph)) as room:
         state = await room.read(lambda replica, _: replica.doc.get_update())
-        then = changes.first(codec.read(graph_file).graph)
-        await room.submit(changes.restoring(state, then), "ada")
+        then = document_edits.first(codec.read(graph_file).graph)
+        await room.submit(document_edits.restoring(state, then), "ada")
 
 
 async def codes(services: EditorServices, graph: str) -> list[str]:

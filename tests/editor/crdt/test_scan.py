@@ -12,7 +12,7 @@ from action_assistant.editor.crdt.messages import ByteReader, Malformed, number
 from action_assistant.editor.crdt.updates.update_content import DEEPEST
 from action_assistant.editor.crdt.updates.update_scan import outline
 from action_assistant.editor.documents import document
-from action_assistant.editor.interchange import changes
+from action_assistant.editor.interchange import document_edits
 from action_assistant.umrf.model import Action, Graph
 from action_assistant.umrf.model import Parameter as UmrfParameter
 
@@ -73,7 +73,7 @@ def test_a_large_graph_is_within_the_bounds() -> None:
         )
         for n in range(1000)
     )
-    read = outline(changes.first(Graph(name="large", actions=actions)))
+    read = outline(document_edits.first(Graph(name="large", actions=actions)))
     assert read.ready({})
 
 

@@ -9,7 +9,7 @@ import msgspec
 from pycrdt import Doc, Map
 
 from action_assistant.editor.documents.document import Maps, maps_of
-from action_assistant.editor.history.told_changes import graph_of
+from action_assistant.editor.history.change_summaries import graph_of
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 

@@ -14,8 +14,8 @@ from sqlalchemy import delete, select
 
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.change_summaries import maps_of, state_of
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of, unpacked
-from action_assistant.editor.history.told_changes import maps_of, state_of
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Unavailable

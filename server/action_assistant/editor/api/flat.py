@@ -9,8 +9,8 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.editor.api.graphs import Seq
 from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.documents.contents import GraphAtSeq, Inside
-from action_assistant.editor.interchange.flat_graph import FlatGraph, flat_graph, flat_text
 from action_assistant.editor.services import EditorServices, EditorState
+from action_assistant.editor.subgraphs.flat_graph import FlatGraph, flat_graph, flat_text
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict
 from action_assistant.web.auth.access import Needs, person_of

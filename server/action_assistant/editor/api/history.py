@@ -8,11 +8,11 @@ from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.catalogue.catalogue import GraphView
-from action_assistant.editor.history import told_changes
+from action_assistant.editor.history import change_summaries
 from action_assistant.editor.history.blame import DocumentStep, FieldBlame, FieldValue
-from action_assistant.editor.history.going_back import EditsOfOne, GoneBack
+from action_assistant.editor.history.course_search import AskingSince, SinceWhen
 from action_assistant.editor.history.graph_history import HistoryEntry
-from action_assistant.editor.history.since_when import AskingSince, SinceWhen
+from action_assistant.editor.history.restoring import EditsOfOne, GoneBack
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
@@ -91,7 +91,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         moment = await _moment(services, graph_id, at, "/at")
-        text = await services.change_index.value(told_changes.document_at, graph_id, moment)
+        text = await services.change_index.value(change_summaries.document_at, graph_id, moment)
         return Response(text, media_type="application/json")
 
     @get(
@@ -128,7 +128,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         then = await _moment(services, graph_id, before, "/from")
         later = await _moment(services, graph_id, after, "/to")
         found: Difference = encoded(
-            await services.change_index.text(told_changes.differing, graph_id, then, later)
+            await services.change_index.text(change_summaries.differing, graph_id, then, later)
         )
         return found
 

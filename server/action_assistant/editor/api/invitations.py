@@ -9,7 +9,7 @@ from anyio import to_thread
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.catalogue.invitations import Invitation
+from action_assistant.editor.people.invitations import Invitation
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput, Conflict
 from action_assistant.web.auth.access import Needs, person_of

@@ -11,11 +11,11 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.graphs import MadeGraph, Seq
 from action_assistant.editor.catalogue.catalogue import GraphView
-from action_assistant.editor.catalogue.library_edits import GraphMoment, UpdatedGraph
-from action_assistant.editor.interchange import library_updates
-from action_assistant.editor.interchange.action_uses import GraphAsAction, LibraryAction
 from action_assistant.editor.interchange.importing import Preview
-from action_assistant.editor.interchange.library_updates import ActionUse
+from action_assistant.editor.library import library_updates
+from action_assistant.editor.library.action_uses import GraphAsAction, LibraryAction
+from action_assistant.editor.library.library_edits import GraphMoment, UpdatedGraph
+from action_assistant.editor.library.library_updates import ActionUse
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded

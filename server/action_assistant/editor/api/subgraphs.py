@@ -10,7 +10,8 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.editor.catalogue.catalogue import GraphView, fit
 from action_assistant.editor.documents.contents import GraphAtSeq
 from action_assistant.editor.interchange.edited_text import KeyChange
-from action_assistant.editor.interchange.subgraph_edits import (
+from action_assistant.editor.services import EditorServices, EditorState
+from action_assistant.editor.subgraphs.subgraph_edits import (
     ChosenActions,
     ExtractionLook,
     UnpackingLook,
@@ -19,7 +20,6 @@ from action_assistant.editor.interchange.subgraph_edits import (
     subgraph_file,
     unpacking_look,
 )
-from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import NotFound
 from action_assistant.umrf.model import Key, Position

@@ -8,8 +8,8 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.graphs import Seq
 from action_assistant.editor.catalogue.versions import InsideView, VersionView
-from action_assistant.editor.interchange.subgraph_files import packed
 from action_assistant.editor.services import EditorState
+from action_assistant.editor.subgraphs.subgraph_files import packed
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.openapi import FileBytes, answer
 

@@ -11,8 +11,8 @@ from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.contents import Counts, GraphInfo, info_of
-from action_assistant.editor.interchange import changes, importing
-from action_assistant.editor.interchange.changes import drafted
+from action_assistant.editor.interchange import document_edits, importing
+from action_assistant.editor.interchange.document_edits import drafted
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput, NotFound
@@ -133,7 +133,7 @@ class Catalogue:
         graph = Graph(name=name, description=description, direction="right")
         made = h.draft(h.CREATED, author, h.GraphCreated(name, description))
         about = info_of(graph, check(graph))
-        return await self._add(changes.first(graph), about, [made], author), None
+        return await self._add(document_edits.first(graph), about, [made], author), None
 
     async def bring(
         self,
@@ -219,7 +219,7 @@ class Catalogue:
         created = h.draft(h.CREATED, author, about)
         came = None if file is None else Draft(h.IMPORTED, author, file)
         info = info_of(graph, check(graph))
-        return await self._add(changes.first(graph), info, [created], author, came)
+        return await self._add(document_edits.first(graph), info, [created], author, came)
 
     async def add_draft(self, origin: str, seq: int, name: str, author: str) -> GraphView:
         """A graph that begins as another one was after its change `seq`, with the same keys. What people

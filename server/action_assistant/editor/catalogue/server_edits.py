@@ -1,6 +1,6 @@
 """Edits that the server makes itself: on a copy, entering the room as the difference (rule R9)."""
 
-from action_assistant.editor.interchange.changes import calling_actions, renaming, restoring
+from action_assistant.editor.interchange.document_edits import calling_actions, renaming, restoring
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.room import Room
 from action_assistant.web.workers.lanes import RunInWorker, run_here

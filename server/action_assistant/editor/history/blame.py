@@ -7,20 +7,20 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Connection
 
-from action_assistant.editor.catalogue.people import stored_people
 from action_assistant.editor.documents.values import Root
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.grafts import (
+from action_assistant.editor.history.document_places import field_of
+from action_assistant.editor.history.key_changes import LoggedChange, unpacked
+from action_assistant.editor.history.merge_origins import (
     MergedBy,
     bring_up,
     grafts_of,
     merged_by,
     originals,
 )
-from action_assistant.editor.history.key_changes import LoggedChange, unpacked
-from action_assistant.editor.history.places import field_of
 from action_assistant.editor.log.document_events import when
+from action_assistant.editor.people.people import stored_people
 from action_assistant.errors import NotFound
 from action_assistant.web.auth.keys import PersonRef
 

@@ -1,4 +1,4 @@
-"""The history of a graph: events of its two streams by sitting, with what each sitting changed."""
+"""The history of a graph: events of its two streams by session, with what each session changed."""
 
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
@@ -7,15 +7,15 @@ from typing import Any, Final, TypeAlias
 import msgspec
 from sqlalchemy import Connection, Row, select
 
-from action_assistant.editor.catalogue.people import stored_people
 from action_assistant.editor.catalogue.versions import VersionView, versions_by_event
 from action_assistant.editor.documents.values import ends_of
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.change_summaries import Changes, Stretch, told
+from action_assistant.editor.history.edit_sessions import EditSession, Kind, Step, edit_sessions
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
-from action_assistant.editor.history.sittings import Kind, Sitting, Step, sittings
-from action_assistant.editor.history.told_changes import Changes, Stretch, told
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.people.people import stored_people
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.keys import PersonRef
 
@@ -113,8 +113,8 @@ def history_of(
     shown = _shown(connection, graph, special, limit, before)
     changes = _changes(connection, graph, shown)
     return [
-        _entry(sitting, special, versions, changes.get((sitting.author, sitting.seq)), person)
-        for sitting in shown
+        _entry(session, special, versions, changes.get((session.author, session.seq)), person)
+        for session in shown
     ]
 
 
@@ -131,51 +131,51 @@ def _shown(
     special: Mapping[int, _Special],
     limit: int,
     before: int | None,
-) -> list[Sitting]:
-    return _sittings(connection, graph, special, limit, before)[::-1][:limit]
+) -> list[EditSession]:
+    return _edit_sessions(connection, graph, special, limit, before)[::-1][:limit]
 
 
-def _edits(shown: Sequence[Sitting]) -> list[Stretch]:
+def _edits(shown: Sequence[EditSession]) -> list[Stretch]:
     """Return the stretches of those sessions that changed the document."""
     return [
-        Stretch(sitting.author, sitting.from_seq, sitting.seq)
-        for sitting in shown
-        if sitting.from_seq is not None and sitting.seq > 1
+        Stretch(session.author, session.from_seq, session.seq)
+        for session in shown
+        if session.from_seq is not None and session.seq > 1
     ]
 
 
-def _sittings(
+def _edit_sessions(
     connection: Connection,
     graph: str,
     special: Mapping[int, _Special],
     limit: int,
     before: int | None,
-) -> list[Sitting]:
+) -> list[EditSession]:
     """More than `limit`, or all that the last events make: the first of them may be a part of one."""
     for most in _EVENTS:
         rows = _rows(connection, graph, before, most)
-        found = sittings(step for row in reversed(rows) if (step := _step(row, special)))
+        found = edit_sessions(step for row in reversed(rows) if (step := _step(row, special)))
         if len(found) > limit or len(rows) < most:
             break
     return found
 
 
 def _entry(
-    sitting: Sitting,
+    session: EditSession,
     special: Mapping[int, _Special],
     versions: Mapping[int, VersionView],
     changes: Changes | None,
     person: Callable[[str], PersonRef],
 ) -> HistoryEntry:
-    how = special.get(sitting.seq) if sitting.from_seq is not None else None
-    version = versions[sitting.told] if sitting.kind == "published" else None
+    how = special.get(session.seq) if session.from_seq is not None else None
+    version = versions[session.told] if session.kind == "published" else None
     return HistoryEntry(
-        kind=sitting.kind,
-        author=person(sitting.author),
-        at=sitting.at,
-        until=sitting.until,
-        seq=sitting.seq if version is None else version.seq,
-        from_seq=sitting.from_seq,
+        kind=session.kind,
+        author=person(session.author),
+        at=session.at,
+        until=session.until,
+        seq=session.seq if version is None else version.seq,
+        from_seq=session.from_seq,
         restored=how if isinstance(how, int) else None,
         adapted=how if isinstance(how, TakenFrom) else None,
         reverted=how if isinstance(how, Reverted) else None,
@@ -186,7 +186,7 @@ def _entry(
 
 
 def _changes(
-    connection: Connection, graph: str, shown: Sequence[Sitting]
+    connection: Connection, graph: str, shown: Sequence[EditSession]
 ) -> dict[tuple[str, int], Changes]:
     """Return the changes of each session, by its author and its last change."""
     edits = _edits(shown)

@@ -1,4 +1,4 @@
-"""Edits that take something back: what one person did in a sitting, or one action as it was. For workers."""
+"""Edits that take something back: what one person did in a session, or one action as it was. For workers."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,6 +9,13 @@ from sqlalchemy import Connection
 
 from action_assistant.editor.documents.values import ends_of
 from action_assistant.editor.history import index_queries
+from action_assistant.editor.history.document_places import (
+    arrows_of,
+    by_owner,
+    is_place_of_card,
+    places_of,
+    proves,
+)
 from action_assistant.editor.history.key_changes import (
     LoggedChange,
     Packed,
@@ -16,19 +23,12 @@ from action_assistant.editor.history.key_changes import (
     owner_of,
     unpacked,
 )
-from action_assistant.editor.history.places import (
-    arrows_of,
-    by_owner,
-    is_place_of_card,
-    places_of,
-    proves,
-)
-from action_assistant.editor.interchange.changes import setting
+from action_assistant.editor.interchange.document_edits import setting
 from action_assistant.errors import NotFound, TooLarge
 from action_assistant.umrf.model import ENTRY, EXIT
 
 
-class TakenBack(msgspec.Struct, frozen=True):
+class RevertedEdits(msgspec.Struct, frozen=True):
     """The update that takes something back. `left`: of what not all was taken back, since others have
     changed it or built on it: actions, arrows and notes as `owner_of` names them."""
 
@@ -38,7 +38,7 @@ class TakenBack(msgspec.Struct, frozen=True):
 
 def reverting_edits(
     connection: Connection, graph: str, state: bytes, author: str, first: int, last: int, limit: int
-) -> TakenBack | None:
+) -> RevertedEdits | None:
     """Revert what a person changed from the change `first` to `last`, as `reverting` does; None where that is
     nothing. Raises TooLarge."""
     changes = index_queries.between(connection, graph, first - 1, last, limit + 1, author)
@@ -60,16 +60,16 @@ def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, ow
 
 def reverting(
     state: bytes, changes: Sequence[LoggedChange], latest: Mapping[Place, int]
-) -> TakenBack:
-    """Take back the changes of one person in a sitting, given in order of time. `latest`: the last change
+) -> RevertedEdits:
+    """Take back the changes of one person in a session, given in order of time. `latest`: the last change
     of each key that anybody has changed since it began.
 
     A field that somebody has set since stays as it is; one that somebody else set in between becomes what
-    they made of it. What was made in that sitting goes only if nobody has changed it or led an arrow to
+    they made of it. What was made in that session goes only if nobody has changed it or led an arrow to
     it since; where it stands does not matter.
     """
-    sitting = _Sitting(changes, places_of(state), latest)
-    return TakenBack(_setting(state, sitting.targets()), sitting.left())
+    session = _EditSession(changes, places_of(state), latest)
+    return RevertedEdits(_setting(state, session.targets()), session.left())
 
 
 def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
@@ -89,7 +89,7 @@ def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
     return _setting(state, targets)
 
 
-class _Sitting:
+class _EditSession:
     """The changes of one person by key, compared with the document now."""
 
     def __init__(

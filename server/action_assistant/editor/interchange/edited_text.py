@@ -27,7 +27,7 @@ from action_assistant.editor.documents.contents import (
 from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.values import ends_of, is_aid, number
 from action_assistant.editor.interchange import importing
-from action_assistant.editor.interchange.changes import chosen, setting
+from action_assistant.editor.interchange.document_edits import chosen, setting
 from action_assistant.errors import NotUmrf
 from action_assistant.umrf.check import check
 from action_assistant.umrf.files import codec

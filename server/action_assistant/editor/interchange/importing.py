@@ -19,7 +19,7 @@ from action_assistant.editor.documents.contents import (
     info_of,
     uses_of,
 )
-from action_assistant.editor.interchange import changes
+from action_assistant.editor.interchange import document_edits
 from action_assistant.errors import BadInput, NotUmrf, TooLarge
 from action_assistant.umrf.check import check
 from action_assistant.umrf.files import codec
@@ -80,7 +80,7 @@ def imported(body: bytes, keys: tuple[Key, ...] = ()) -> ImportedFile:
     they get fresh ones. Raises BadInput, NotUmrf, TooLarge with the place."""
     found = fitting(read_graph(body))
     named = dict(zip((action.key for action in found.graph.actions), keys, strict=False))
-    update = changes.first(under_keys(_directed(found.graph), named))
+    update = document_edits.first(under_keys(_directed(found.graph), named))
     refuse_too_long(update)
     told = ImportReport(found.dialect, found.notes, found.problems, found.remarks)
     about = info_of(found.graph, check(found.graph))

@@ -12,10 +12,10 @@ import pytest
 from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.documents.document import Maps, maps_of
 from action_assistant.editor.history.blame import Blame, FieldBlame, keys_of
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.document_places import exist
 from action_assistant.editor.history.drafts.draft_merges import (
     AskedMerge,
     DraftMerges,
@@ -24,13 +24,13 @@ from action_assistant.editor.history.drafts.draft_merges import (
     WantedMerge,
 )
 from action_assistant.editor.history.drafts.drafts import Drafts, DraftView, NewDraft
-from action_assistant.editor.history.drafts.told_merges import DraftSide
-from action_assistant.editor.history.going_back import EditsOfOne, GoingBack
+from action_assistant.editor.history.drafts.merge_previews import DraftSide
 from action_assistant.editor.history.graph_history import GraphHistory, HistoryEntry
 from action_assistant.editor.history.key_changes import owner_of
-from action_assistant.editor.history.places import exist
-from action_assistant.editor.interchange.changes import difference
+from action_assistant.editor.history.restoring import EditsOfOne, Restoring
+from action_assistant.editor.interchange.document_edits import difference
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.people.people import People
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.journal import Journal
@@ -54,7 +54,7 @@ class Editor:
         self.drafts = Drafts(journal, reader, self.catalogue, people, index)
         self.merges = DraftMerges(journal, rooms, self.drafts, index, people, checks)
         self.blame = Blame(index)
-        self.going_back = GoingBack(journal, rooms, reader, index)
+        self.going_back = Restoring(journal, rooms, reader, index)
         self.history = GraphHistory(index)
         self.origin = ""
         self.wrote: dict[tuple[str, str, bytes], set[str]] = defaultdict(set)

@@ -3,20 +3,20 @@
 import msgspec
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
-from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.documents.contents import Inside
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.change_summaries import Changes
 from action_assistant.editor.history.drafts.drafts import DraftPair, Drafts
-from action_assistant.editor.history.drafts.told_merges import (
+from action_assistant.editor.history.drafts.merge_previews import (
     DraftConflict,
     DraftSide,
     UnmadeChoices,
     made_merge,
     previewed,
 )
-from action_assistant.editor.history.grafts import bring_up, grafts_of
-from action_assistant.editor.history.told_changes import Changes
+from action_assistant.editor.history.merge_origins import bring_up, grafts_of
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.people.people import People
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict

@@ -9,11 +9,11 @@ from sqlalchemy import Row, select
 
 from action_assistant.editor.catalogue.catalogue import NAME_LIMIT, Catalogue, GraphView
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.documents.contents import GraphAtSeq
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.drafts.told_merges import DraftBase, apart_since
+from action_assistant.editor.history.drafts.merge_previews import DraftBase, apart_since
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.people.people import People
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.kit.lru_cache import LruCache

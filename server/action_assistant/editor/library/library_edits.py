@@ -10,11 +10,11 @@ from sqlalchemy import select
 
 from action_assistant.editor.catalogue.catalogue import Catalogue, GraphView, fit
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.catalogue.library import Library
 from action_assistant.editor.documents.contents import GraphAtSeq
 from action_assistant.editor.documents.document import new_aid
-from action_assistant.editor.interchange import library_updates
-from action_assistant.editor.interchange.action_uses import LibraryAction
+from action_assistant.editor.library import library_updates
+from action_assistant.editor.library.action_uses import LibraryAction
+from action_assistant.editor.library.library import Library
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.open_rooms import Rooms

@@ -7,8 +7,8 @@ from msgspec.structs import replace
 
 from action_assistant.editor.documents.contents import GraphAtSeq, first_action, read
 from action_assistant.editor.interchange import importing
-from action_assistant.editor.interchange.action_uses import together
-from action_assistant.editor.interchange.changes import editing
+from action_assistant.editor.interchange.document_edits import editing
+from action_assistant.editor.library.action_uses import together
 from action_assistant.errors import Conflict, NotFound, NotUmrf
 from action_assistant.umrf.action_updates import (
     NO_RENAMES,

@@ -10,8 +10,7 @@ from sqlalchemy import Connection
 
 from action_assistant.editor.documents.contents import NOTHING_INSIDE, Inside, graphs_of
 from action_assistant.editor.history import index_queries
-from action_assistant.editor.history.key_changes import LoggedChange, owner_of
-from action_assistant.editor.history.told_changes import (
+from action_assistant.editor.history.change_summaries import (
     Changes,
     State,
     graph_of,
@@ -19,6 +18,7 @@ from action_assistant.editor.history.told_changes import (
     state_of,
     stretch_of,
 )
+from action_assistant.editor.history.key_changes import LoggedChange, owner_of
 from action_assistant.umrf.courses.expected import keyed, scripted_by_key, scripted_by_name
 from action_assistant.umrf.difference import difference
 from action_assistant.umrf.model import Graph, Key

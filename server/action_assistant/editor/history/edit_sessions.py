@@ -1,4 +1,4 @@
-"""Groups what was done to a document: the edits of one person in one go are one sitting. Pure."""
+"""Groups what was done to a document: the edits of one person in one go are one session. Pure."""
 
 from collections.abc import Iterable
 from datetime import datetime
@@ -7,7 +7,7 @@ from typing import Final, Literal, NamedTuple, TypeAlias
 import msgspec
 from msgspec.structs import replace
 
-_ONE_GO: Final = 5 * 60  # seconds between two edits of one sitting
+_ONE_GO: Final = 5 * 60  # seconds between two edits of one session
 
 Kind: TypeAlias = Literal[
     "created",
@@ -34,7 +34,7 @@ class Step(NamedTuple):
     told: int = 0
 
 
-class Sitting(msgspec.Struct, frozen=True):
+class EditSession(msgspec.Struct, frozen=True):
     """The edits of one person between `at` and `until`, from the change `from_seq` to `seq`; others may have
     edited meanwhile. For an entry that is no edit, `from_seq` is None and `seq` the change before it."""
 
@@ -47,10 +47,10 @@ class Sitting(msgspec.Struct, frozen=True):
     told: int = 0
 
 
-def sittings(steps: Iterable[Step]) -> list[Sitting]:
-    """From steps in order of time, the sittings in the order of their ends. What is no mere edit ends the
-    sittings of everybody: it may speak of what was there just then."""
-    done: dict[int, Sitting] = {}
+def edit_sessions(steps: Iterable[Step]) -> list[EditSession]:
+    """Group steps, which are in order of time, into sessions, which are in the order of their ends. A step that
+    is no edit ends the sessions of everybody, since it may be about the document at that moment."""
+    done: dict[int, EditSession] = {}
     open_of: dict[str, int] = {}
     seq = 1
     for number, step in enumerate(steps):
@@ -67,13 +67,13 @@ def sittings(steps: Iterable[Step]) -> list[Sitting]:
             if mine is not None and (step.at - mine.until).total_seconds() >= _ONE_GO:
                 done[open_of[step.author]] = mine
                 mine = None
-            begun = Sitting("edited", step.author, step.at, step.at, seq, seq)
+            begun = EditSession("edited", step.author, step.at, step.at, seq, seq)
             done[number] = begun if mine is None else replace(mine, until=step.at, seq=seq)
             open_of[step.author] = number
         else:
             open_of.clear()
             changed = seq if step.seq is not None and step.kind != "created" else None
-            done[number] = Sitting(
+            done[number] = EditSession(
                 step.kind, step.author, step.at, step.at, seq, changed, step.told
             )
     return [done[number] for number in sorted(done)]

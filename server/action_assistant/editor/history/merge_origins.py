@@ -19,7 +19,7 @@ from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import PersonRef
 
 
-class Graft(msgspec.Struct, frozen=True):
+class MergeOrigin(msgspec.Struct, frozen=True):
     """A record that the change `seq` of a graph merged what `source` was after its change `upto`. `name`: the
     name of the draft; None where the graph itself was made as a draft."""
 
@@ -34,7 +34,7 @@ class Original(msgspec.Struct, frozen=True):
     was asked about, and the number that it has in the log that was merged."""
 
     change: LoggedChange
-    via: Graft | None = None
+    via: MergeOrigin | None = None
     seq: int = 0
 
 
@@ -69,7 +69,7 @@ def sources(connection: Connection, graph: str) -> list[tuple[str, int]]:
     return sorted({(graft.source, graft.upto) for graft in grafts_of(connection, graph).values()})
 
 
-def grafts_of(connection: Connection, graph: str) -> dict[int, Graft]:
+def grafts_of(connection: Connection, graph: str) -> dict[int, MergeOrigin]:
     """Return what came into a graph, by the change with which it came."""
     event = editor_event.c
     rows = connection.execute(
@@ -77,15 +77,15 @@ def grafts_of(connection: Connection, graph: str) -> dict[int, Graft]:
             event.stream == h.about_stream(graph), event.kind.in_([h.DRAFTED, h.MERGED])
         )
     )
-    found: dict[int, Graft] = {}
+    found: dict[int, MergeOrigin] = {}
     for row in rows:
         if row.kind == h.DRAFTED:
             made = msgspec.json.decode(row.body, type=h.GraphDrafted)
-            found[1] = Graft(1, made.origin, made.seq)
+            found[1] = MergeOrigin(1, made.origin, made.seq)
         else:
             merged = msgspec.json.decode(row.body, type=h.GraphMerged)
             if merged.seq:
-                found[merged.seq] = Graft(merged.seq, merged.source, merged.upto, merged.name)
+                found[merged.seq] = MergeOrigin(merged.seq, merged.source, merged.upto, merged.name)
     return found
 
 
@@ -112,7 +112,7 @@ def originals(
 
 
 def _there(
-    connection: Connection, graft: Graft, changes: Iterable[LoggedChange]
+    connection: Connection, graft: MergeOrigin, changes: Iterable[LoggedChange]
 ) -> dict[Place, LoggedChange]:
     """The changes that made the same of the same keys in the other graph, as it was then."""
     wanted = {change.place: change.after for change in changes}

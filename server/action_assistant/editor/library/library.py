@@ -7,7 +7,7 @@ from anyio import CapacityLimiter, Lock, create_task_group
 from sqlalchemy import select
 
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.interchange.action_uses import (
+from action_assistant.editor.library.action_uses import (
     NOTHING,
     ActionSource,
     as_actions,

@@ -8,8 +8,8 @@ from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.document import Maps, maps_of, new_aid
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.going_back import EditsOfOne, GoingBack
-from action_assistant.editor.interchange.changes import difference
+from action_assistant.editor.history.restoring import EditsOfOne, Restoring
+from action_assistant.editor.interchange.document_edits import difference
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput, Conflict, NotFound
@@ -19,9 +19,9 @@ from support.doses import examples
 
 
 @pytest.fixture
-async def going_back(journal: Journal, rooms: Rooms) -> GoingBack:
+async def going_back(journal: Journal, rooms: Rooms) -> Restoring:
     """On a real journal."""
-    return GoingBack(journal, rooms, GraphReader(journal, rooms), ChangeIndex(journal))
+    return Restoring(journal, rooms, GraphReader(journal, rooms), ChangeIndex(journal))
 
 
 async def _now(rooms: Rooms) -> Maps:
@@ -35,7 +35,7 @@ def _without_comments(maps: Maps) -> bytes:
 
 @pytest.mark.parametrize("seed", range(examples(12) // 2))
 async def test_a_graph_goes_back_and_taking_that_back_leaves_no_trace(
-    going_back: GoingBack, rooms: Rooms, seed: int
+    going_back: Restoring, rooms: Rooms, seed: int
 ) -> None:
     held = await edited(rooms, seed, 40)
     then = random.Random(seed).randrange(1, len(held))
@@ -49,7 +49,7 @@ async def test_a_graph_goes_back_and_taking_that_back_leaves_no_trace(
 
 @pytest.mark.parametrize("seed", range(examples(12) // 2))
 async def test_what_the_last_one_did_goes_as_if_it_had_never_been(
-    going_back: GoingBack, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
+    going_back: Restoring, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("editor.history.random_edits.PEOPLE", PEOPLE[:1])
     held = await edited(rooms, seed, 40)
@@ -63,7 +63,7 @@ async def test_what_the_last_one_did_goes_as_if_it_had_never_been(
 
 @pytest.mark.parametrize("seed", range(examples(20) // 2))
 async def test_taking_back_touches_nothing_that_others_set_last(
-    going_back: GoingBack, rooms: Rooms, journal: Journal, seed: int
+    going_back: Restoring, rooms: Rooms, journal: Journal, seed: int
 ) -> None:
     held = await edited(rooms, seed, 40)
     index = ChangeIndex(journal)
@@ -97,7 +97,7 @@ async def _edit(rooms: Rooms, who: str, root: str, **values: object) -> int:
         return await room.submit(difference(state, edit), who)
 
 
-async def test_what_others_built_on_stays_and_is_named(going_back: GoingBack, rooms: Rooms) -> None:
+async def test_what_others_built_on_stays_and_is_named(going_back: Restoring, rooms: Rooms) -> None:
     dock, charge, lift = "Dock" * 3, "Char" * 3, "Lift" * 3
     await _edit(rooms, "ada", "meta", name="g")
     first = await _edit(rooms, "mari", "actions", **{dock: "Dock", charge: "Charge", lift: "Lift"})
@@ -109,7 +109,7 @@ async def test_what_others_built_on_stays_and_is_named(going_back: GoingBack, ro
     assert now["actions"] == {dock: "Dock", f"{dock}|in/speed": '{"pvf_value":2}'}
 
 
-async def test_what_an_arrow_of_others_leads_to_stays(going_back: GoingBack, rooms: Rooms) -> None:
+async def test_what_an_arrow_of_others_leads_to_stays(going_back: Restoring, rooms: Rooms) -> None:
     dock, charge = "Dock" * 3, "Char" * 3
     await _edit(rooms, "ada", "actions", **{dock: "Dock"})
     seq = await _edit(rooms, "mari", "actions", **{charge: "Charge"})
@@ -120,7 +120,7 @@ async def test_what_an_arrow_of_others_leads_to_stays(going_back: GoingBack, roo
 
 
 async def test_an_action_that_was_deleted_comes_back_with_its_arrows(
-    going_back: GoingBack, rooms: Rooms, journal: Journal
+    going_back: Restoring, rooms: Rooms, journal: Journal
 ) -> None:
     dice = random.Random(5)
     ada = Person("ada", dice)
@@ -143,7 +143,7 @@ async def test_an_action_that_was_deleted_comes_back_with_its_arrows(
 
 
 async def test_nothing_that_was_not_there_is_gone_back_to(
-    going_back: GoingBack, rooms: Rooms
+    going_back: Restoring, rooms: Rooms
 ) -> None:
     held = await edited(rooms, 1, 20)
     with pytest.raises(NotFound, match="nothing 'nobody'"):

@@ -1,4 +1,4 @@
-"""What a sitting changed is told as whoever compares the graph before and after it finds it."""
+"""What a session changed is told as whoever compares the graph before and after it finds it."""
 
 import random
 
@@ -9,8 +9,14 @@ from action_assistant.editor.documents.document import read_maps
 from action_assistant.editor.documents.values import ROOTS, ends_of
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.history.change_summaries import (
+    Changes,
+    Stretch,
+    differing,
+    names,
+    told,
+)
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
-from action_assistant.editor.history.told_changes import Changes, Stretch, differing, names, told
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.journal import Journal
 from action_assistant.umrf.difference import difference
@@ -31,7 +37,7 @@ async def test_what_one_person_did_alone_is_the_difference_of_the_whole_graphs(
     journal: Journal, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("editor.history.random_edits.PEOPLE", PEOPLE[:1])
-    monkeypatch.setattr("action_assistant.editor.history.told_changes._SHOWN", 1000)
+    monkeypatch.setattr("action_assistant.editor.history.change_summaries._SHOWN", 1000)
     held = await edited(rooms, seed, 40)
     index = ChangeIndex(journal)
     await index.upto(GRAPH)

@@ -7,7 +7,7 @@ import msgspec
 import pytest
 
 from action_assistant.editor.app import open_services
-from action_assistant.editor.interchange.action_uses import LibraryAction
+from action_assistant.editor.library.action_uses import LibraryAction
 from action_assistant.editor.services import EditorServices
 from action_assistant.settings import EditorSettings
 

@@ -34,7 +34,7 @@ class GoneBack(msgspec.Struct, frozen=True):
     left: tuple[str, ...] = ()
 
 
-class GoingBack:
+class Restoring:
     """Makes the edits, and says in the log what they are."""
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What sittings changed, as differences that people know: of actions, arrows, notes. For workers."""
+"""What sessions changed, as differences that people know: of actions, arrows, notes. For workers."""
 
 from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, Final, TypeAlias
@@ -29,7 +29,7 @@ from action_assistant.umrf.model import ENTRY, EXIT, Graph
 
 State: TypeAlias = dict[Place, Packed]
 
-_SHOWN: Final = 30  # things of one kind in one sitting
+_SHOWN: Final = 30  # things of one kind in one session
 _ENDS: Final = {ENTRY, EXIT}
 
 

@@ -6,11 +6,11 @@ from typing import Annotated, Any, Final
 import msgspec
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
-from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.parting import followed_between
-from action_assistant.editor.history.told_changes import Changes, names_between
+from action_assistant.editor.history.change_summaries import Changes, names_between
+from action_assistant.editor.history.course_changes import followed_between
 from action_assistant.editor.log.document_events import when
+from action_assistant.editor.people.people import People
 from action_assistant.errors import BadInput
 from action_assistant.umrf.semantics import SCRIPT, script_from
 from action_assistant.web.auth.keys import PersonRef

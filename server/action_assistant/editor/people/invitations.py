@@ -17,8 +17,8 @@ import msgspec
 from msgspec.structs import replace
 from sqlalchemy import select
 
-from action_assistant.editor.catalogue.people import People
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.people.people import People
 from action_assistant.errors import (
     BadInput,
     Conflict,

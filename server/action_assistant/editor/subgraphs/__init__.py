@@ -1,0 +1,1 @@
+"""Sub-graphs: made of actions, unpacked, downloaded and flattened."""
