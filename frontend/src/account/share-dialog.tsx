@@ -211,7 +211,7 @@ export function ShareDialog({ opened, onClose }: { opened: boolean; onClose: () 
 
 const MOST_GUESTS = 6;
 
-/** Who came in by a link, in a sentence. */
+/** Return one sentence about the people who came in by a link. */
 export function guestWords(guests: Invitation["guests"]): string {
   if (guests.length === 0) return "Nobody came in by it yet";
   const names = guests.slice(0, MOST_GUESTS).map(({ person }) => person.name || "Guest");
@@ -247,7 +247,7 @@ function Code({ src, label }: { src: string; label: string }) {
 interface ShareLinkProps {
   invitation: Invitation;
   origin: string;
-  /** Of the dialog, which also shows what went wrong: a link that was revoked is gone from here. */
+  /** The mutation of the dialog, which also shows its errors: a revoked link leaves the list. */
   revoke: ReturnType<typeof useRevoke>;
 }
 

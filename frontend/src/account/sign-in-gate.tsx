@@ -70,10 +70,13 @@ async function knock(): Promise<Gate> {
 
 const PATIENCE = 5_000; // ms until a device shows what it keeps
 
-/** Who is signed in. Where it is known who was here last, a silent server is not waited for. */
+/**
+ * Return who is signed in. If this browser remembers a person, wait for a silent server for
+ * `PATIENCE` only.
+ */
 const known = (before: Person | null) => currentPerson(before === null ? undefined : PATIENCE);
 
-/** Who has given a name in this browser before goes straight in; else that is asked first. */
+/** Let a person in who has given a name in this browser before; ask others for a name first. */
 async function knockInvited(key: Credential): Promise<Gate> {
   const invited = await readInvitation(key.text);
   const known = rememberedName() !== "" || (await currentPerson().catch(() => null))?.name;
@@ -109,7 +112,7 @@ interface SessionLooks {
   putOut(): void;
 }
 
-/** SessionLooks now and then who is signed in: another tab of this browser may sign in or out at any time. */
+/** Asks now and then who is signed in: another tab of this browser may sign in or out at any time. */
 function useLooks({ on, wanting, onFound, putOut }: SessionLooks): void {
   useEffect(() => {
     if (!on) return;

@@ -16,12 +16,12 @@ import { isolated } from "../words/isolated";
 import style from "./sign-in.module.css";
 
 interface Props {
-  /** Why nobody is signed in, when a link was tried. */
+  /** The reason why nobody is signed in, if a link was tried. */
   why: string;
   onOpen: (person: Person) => void;
 }
 
-/** What has no fragment is taken for the token itself. */
+/** Return the credential in a pasted text; a text without a fragment is taken for the token. */
 export function pastedCredential(pasted: string): Credential {
   return credentialIn(pasted) ?? { kind: "token", text: pasted.trim() };
 }

@@ -1,4 +1,4 @@
-/** What `action-assistant doctor` finds here, when somebody asks for it. */
+/** Findings of `action-assistant doctor` on this computer, when a person asks for them. */
 import { Button, Loader } from "@mantine/core";
 import { IconStethoscope } from "@tabler/icons-react";
 import { errorText } from "../api/http";
@@ -33,7 +33,7 @@ function Found({ code, severity, where, message, remedy }: Finding) {
   );
 }
 
-/** What there is of it, in a few words. */
+/** Return a summary of the findings in a few words. */
 function summary(found: readonly Finding[]): string {
   const wrong = found.filter(({ severity }) => severity === "error").length;
   const notes = found.filter(({ severity }) => severity === "warning").length;

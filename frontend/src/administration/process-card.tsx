@@ -1,4 +1,4 @@
-/** One of the two processes: whether it can do its work, and what it takes. */
+/** State of one of the two processes, and the resources that it uses. */
 
 import type { ReactNode } from "react";
 import { errorText } from "../api/http";

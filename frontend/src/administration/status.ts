@@ -1,4 +1,4 @@
-/** How both processes are, and what `doctor` finds: for owners. */
+/** State of both processes, and findings of `doctor`: for owners. */
 
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { fetchJson } from "../api/http";
@@ -34,8 +34,10 @@ async function examined(look: boolean, signal?: AbortSignal) {
   return { last: await fetchJson<LastExamination>(path, options), heardAt: tick() };
 }
 
-/** What the last look found, at once; while another look goes on, how long it has been. A look takes seconds and
- * starts programs, so it is begun only when somebody asks. */
+/**
+ * Query the last examination, and how long a new one has been running. An examination takes seconds
+ * and starts programs, so it runs only when a person asks.
+ */
 export function useExamination() {
   const client = useQueryClient();
   const query = useQuery({

@@ -35,7 +35,7 @@ function checkCourses(
   return fetchJson(url, { method: "POST", body, signal, timeoutMs: LONG });
 }
 
-/** The same for a text that is no moment of the graph yet; `of` tells it from others. */
+/** Query the results for a text that is no moment of the graph yet; `of` is its cache key. */
 export function useCoursesOfText(graph: string, umrf: string, of: readonly unknown[]) {
   const { runner } = useLive();
   return useQuery({
@@ -67,7 +67,7 @@ export function refreshCourses(client: QueryClient): Promise<void> {
   return client.invalidateQueries({ queryKey: [COURSES] });
 }
 
-/** What actions would have to do for the arrow to be taken, if anything makes it so. */
+/** Ask how actions would have to end for the arrow to be taken, if that is possible. */
 export async function proposeCourse(
   runner: string,
   graph: string,

@@ -17,7 +17,7 @@ const PERIOD = 8_000; // ms; what others do to the other side is no news of this
 const below = (id: string) => `/api/drafts/${encodeURIComponent(id)}`;
 const under = (graph: string) => `/api/graphs/${encodeURIComponent(graph)}/drafts`;
 
-/** Of what a graph is a draft; null of one that is none. */
+/** Query the origin of a draft; null for a graph that is no draft. */
 export function useDraftOf(id: string) {
   return useQuery({
     queryKey: ["drafts", "of", id],
@@ -50,7 +50,7 @@ export function useDrafts(graph: string) {
   });
 }
 
-/** What a merge would do now, with these choices. */
+/** Query what a merge with these choices would do now. */
 export function useMergePreview(id: string, into: DraftSide, choices: DraftChoices) {
   return useQuery({
     queryKey: ["drafts", "merge", id, into, choices],

@@ -13,7 +13,7 @@ export type ProblemPlace = EditorApi["Where"];
 /** `also`: the other places of the same thing, which is told once. */
 export type Problem = EditorApi["Problem"];
 export type Problems = EditorApi["Problems"];
-/** What one moment of a document has otherwise than another. */
+/** Differences between two moments of a document. */
 export type GraphDifference = EditorApi["Difference"];
 
 export const queryKeys = {
@@ -79,8 +79,10 @@ export function createGraph(name: string): Promise<GraphSummary> {
   return fetchJson("/api/graphs", { method: "POST", body: { name } });
 }
 
-/** What importing a file would make: nothing is stored. Places are those of the file. `notes`: what was
- * translated, and what has no place; `remarks` are the same with their places. */
+/**
+ * Result that importing a file would have; nothing is stored. Places are those of the file.
+ * `notes`: translations, and members without a place; `remarks` are the same with their places.
+ */
 export type Preview = EditorApi["Preview"];
 
 /** Imports a file's text as it is. */
@@ -93,7 +95,7 @@ export function renameGraph(id: string, name: string): Promise<GraphSummary> {
   return fetchJson(`/api/graphs/${encodeURIComponent(id)}`, { method: "PATCH", body: { name } });
 }
 
-/** The same graph once more under another name; edits of one do not touch the other. */
+/** Copy a graph under another name; edits of one do not touch the other. */
 export async function duplicateGraph(id: string, name: string): Promise<GraphSummary> {
   const made = await importGraph(await graphText(id));
   try {
@@ -129,7 +131,7 @@ export function authorName(author: VersionAuthor | null | undefined): string {
   return author?.name || "somebody";
 }
 
-/** What people call a version: its label, else its number among those of its graph. */
+/** Return the name of a version: its label, else its number among those of its graph. */
 export function versionName(versions: readonly Version[] | undefined, id: string | null): string {
   const at = versions?.findIndex((version) => version.id === id) ?? -1;
   const version = versions?.[at];
@@ -190,10 +192,13 @@ export function graphMoment(id: string): Promise<{ text: string; seq: number }> 
 
 /** One key of the document; a value that is not there is `undefined`. */
 export type KeyChange = EditorApi["KeyChange"];
-/** What an edited text would change, and the errors that would come with it. */
+/** Changes that an edited text would make, and the errors that would come with them. */
 export type TextChanges = EditorApi["TextEdit"];
 
-/** What the text, edited from that of the moment `seq`, would change. Nothing is stored. */
+/**
+ * Return the changes that a text, edited from that of the moment `seq`, would make. Nothing is
+ * stored.
+ */
 export function textChangesOf(id: string, seq: number, text: string): Promise<TextChanges> {
   const route = `/api/graphs/${encodeURIComponent(id)}/rewriting?seq=${seq}`;
   return fetchJson(route, { method: "POST", body: text });

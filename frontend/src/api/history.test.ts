@@ -1,4 +1,4 @@
-/** What was done is read again after an edit of ours, also while it is read for the first time. */
+/** The history is read again after an own edit, also while it is read for the first time. */
 import { QueryClient, QueryObserver } from "@tanstack/react-query";
 import { expect, test } from "vitest";
 import { refreshHistory } from "./history";

@@ -1,4 +1,6 @@
-/** What was done to a document, what that changed, what it was, and the ways back to it. */
+/**
+ * Requests about the history of a document: entries, differences, earlier moments, restoring them.
+ */
 import { type QueryClient, useQuery } from "@tanstack/react-query";
 import type { GraphDifference, GraphSummary, Version } from "./graphs";
 import { fetchJson } from "./http";
@@ -49,7 +51,7 @@ export function fetchChanges(
   return fetchJson(`${below(id)}/changes?after=${after}&upto=${upto}`, { signal });
 }
 
-/** What differs from the change `from` to the change `to`; null as `from`: nothing is asked. */
+/** Query the differences from change `from` to change `to`; null as `from` disables the query. */
 export function useDifference(id: string, from: number | null, to: number) {
   return useQuery({
     enabled: from !== null,
@@ -63,8 +65,10 @@ export function useDifference(id: string, from: number | null, to: number) {
 export type FieldBlame = EditorApi["FieldBlame"];
 export type FieldValue = EditorApi["FieldValue"];
 
-/** Who gave each field of an action, arrow or note, or of the graph (""), the value that it had then;
- * without `at` now, which is asked each time. */
+/**
+ * Query who gave each field of an action, arrow or note, or of the graph (""), its value at a
+ * moment; without `at`, now, and each time anew.
+ */
 export function useBlame(id: string, of: string, at?: number) {
   const query = new URLSearchParams({ of, ...(at === undefined ? {} : { at: `${at}` }) });
   return useQuery({
@@ -109,7 +113,10 @@ export async function refreshHistory(client: QueryClient, id: string): Promise<v
 
 export type SinceWhen = EditorApi["SinceWhen"];
 
-/** What was asked, and the answer; `good` null: no run before went well, so there is nothing to ask. */
+/**
+ * A question and its answer; `good` is null if no earlier run went well, so that there is nothing
+ * to ask.
+ */
 export interface SinceAnswer {
   readonly good: Run | null;
   readonly found: SinceWhen | null;
@@ -117,7 +124,7 @@ export interface SinceAnswer {
 
 type Ended = Pick<Run, "number" | "version" | "state" | "result">;
 
-/** Whether a run of a version did what it was for. */
+/** Return whether a run of a version ended as wanted. */
 export function wentWell({ version, state, result }: Ended): boolean {
   return version !== null && state === "finished" && (result === "on_true" || result === null);
 }

@@ -24,7 +24,7 @@ class Unreachable extends Error {
   }
 }
 
-/** Whether an error leaves open what became of a request: nobody said no to it. */
+/** Return whether the outcome of a failed request is unknown: no server refused it. */
 export function isOutcomeUnknown(error: unknown): boolean {
   if (!(error instanceof Refusal)) return true;
   const { status, type } = error.details;
@@ -34,7 +34,7 @@ export function isOutcomeUnknown(error: unknown): boolean {
 /** The `type` of an answer that none of ours gave, as a proxy's. */
 const UNKNOWN_TYPE = "refused";
 
-/** Whether one of ours said no: nothing will come of this request, however often it is sent. */
+/** Return whether one of our servers refused a request: sending it again will not help. */
 export function isFinal(error: unknown): boolean {
   if (!(error instanceof Refusal)) return false;
   return error.details.status < 500 && error.details.type !== UNKNOWN_TYPE;
@@ -54,7 +54,7 @@ export interface RequestOptions {
 const PATIENCE = 20_000; // ms
 const SESSION = "/api/session";
 
-/** Whether the editor knows who we are; "unsure" when it does not answer. */
+/** Return whether the editor knows this session; "unsure" if it does not answer. */
 export async function isSignedIn(): Promise<"yes" | "no" | "unsure"> {
   const init: RequestInit = { credentials: "include", signal: AbortSignal.timeout(5_000) };
   const answer = await fetch(serverPath(SESSION), init).catch(() => null);
@@ -79,7 +79,7 @@ function isIdle(url: string, ask: RequestOptions): boolean {
   return sessionEnd.now() && (ask.method ?? "GET") === "GET" && !url.startsWith(SESSION);
 }
 
-/** What only a proxy answers without a word of ours. */
+/** HTTP status codes that only a proxy answers. */
 const BY_PROXIES: ReadonlyMap<number, string> = new Map([
   [413, "Too large for the proxy in front of the server (nginx: client_max_body_size 10m)."],
   [502, "The proxy in front of the server does not reach it (502)."],
@@ -129,21 +129,21 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
   }
 }
 
-/** What a route answers when it does not refuse. Throws `Refusal` or `Unreachable`. */
+/** Return the response of a route. Throws `Refusal` or `Unreachable`. */
 export async function fetchAnswer(url: string, request: RequestOptions = {}): Promise<Response> {
   const response = await send(url, request);
   if (!response.ok) throw new Refusal(await problemOf(response));
   return response;
 }
 
-/** What a route answers, as JSON. Throws `Refusal` or `Unreachable`. */
+/** Return the JSON that a route answers. Throws `Refusal` or `Unreachable`. */
 export async function fetchJson<T>(url: string, request: RequestOptions = {}): Promise<T> {
   const response = await fetchAnswer(url, request);
   if (response.status === 204) return undefined as T;
   return (await response.json()) as T;
 }
 
-/** What a route answers, as the text it sent, so that `5` and `5.0` stay what they are. */
+/** Return the text that a route answers, unparsed, so that `5` and `5.0` stay different. */
 export async function fetchText(url: string, request: RequestOptions = {}): Promise<string> {
   return (await fetchAnswer(url, request)).text();
 }
@@ -153,7 +153,10 @@ export function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
 }
 
-/** Where in a file a refusal points, in words; empty when that is nowhere, or said already. */
+/**
+ * Return the place in a file that a refusal points at, in words; empty if it points nowhere or its
+ * message says it.
+ */
 export function errorPlace(error: unknown): string {
   if (!(error instanceof Refusal)) return "";
   const words = placeInFile(error);
@@ -192,7 +195,7 @@ export const sessionEnd = {
   clear: (): void => put(false),
 };
 
-/** It, as `code` or `graph`; empty where it says nothing. */
+/** Return one detail of a refusal, `code` or `graph`; empty if it has none. */
 export function refusedAt(error: unknown, name: "code" | "graph"): string {
   if (!(error instanceof Refusal)) return "";
   const where: Readonly<Record<string, unknown>> = { ...error.details.where };

@@ -10,13 +10,13 @@ interface Pinned {
   tree_digest?: string | null | undefined;
 }
 
-/** What a version, a run or a moment has inside, as it is sent. */
+/** Return the sub-graphs of a version, a run or a moment, in the form of a request. */
 export function insideOf({ subgraphs, tree_digest }: Pinned): Inside {
   if (!subgraphs?.length || !tree_digest) return {};
   return { subgraphs, tree_digest };
 }
 
-/** What is inside of a moment, as it is now. */
+/** Fetch the sub-graphs of a moment as they are now. */
 export async function fetchInside(
   graph: string,
   seq: number,
@@ -39,10 +39,10 @@ const flatRoute = (graph: string): string => `/api/graphs/${encodeURIComponent(g
 
 /** A graph and those inside of it as one graph that does the same, or why there is none. */
 export type FlatGraph = EditorApi["FlatGraph"];
-/** Why not, and about which action of which level. */
+/** Reason why a graph cannot be flattened, with the action and level that it is about. */
 export type FlatteningReason = EditorApi["FlatteningReason"];
 
-/** It is asked for anew each time: what is inside may have changed. */
+/** Query the flattened graph, each time anew: sub-graphs may have changed. */
 export function useFlatGraph(graph: string) {
   return useQuery({
     queryKey: ["graphs", graph, "flat"],
@@ -59,7 +59,7 @@ export function makeFlatGraph(graph: string, body: EditorApi["FlatCopy"]): Promi
 const routeOf = (graph: string, route: string): string =>
   `/api/graphs/${encodeURIComponent(graph)}/${route}`;
 
-/** What a sub-graph of chosen actions would be, or why there is none. */
+/** The sub-graph that chosen actions would become, or the reason why they cannot. */
 export type ExtractionLook = EditorApi["ExtractionLook"];
 type ExtractionWish = EditorApi["Extracting"];
 
@@ -75,7 +75,7 @@ export function makeSubGraph(
   return fetchJson(routeOf(graph, "subgraphs"), { method: "POST", body });
 }
 
-/** What a graph would have instead of an action that stands for another. */
+/** The graph after an action is replaced by the actions of its sub-graph. */
 export type UnpackingLook = EditorApi["UnpackingLook"];
 
 export function lookAtUnpacking(

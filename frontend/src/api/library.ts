@@ -45,7 +45,7 @@ export function useGraphsAsActions() {
   });
 }
 
-/** How the package's last build went, as somebody has told it; null before that. */
+/** Result of the last build of the package, as reported by a person or tool; null if none was. */
 export type ActionBuild = EditorApi["ActionBuilt"];
 
 export function useLastBuild(id: string) {
@@ -86,12 +86,12 @@ export function replaceAction(id: string, text: string, seq?: number): Promise<G
   return fetchJson(`${below(id)}/umrf${query}`, { method: "PUT", body: text });
 }
 
-/** What that would change. */
+/** Return the changes that a file would make to an action. */
 export function compareWithFile(id: string, text: string): Promise<GraphDifference> {
   return fetchJson(`${below(id)}/umrf`, { method: "POST", body: text });
 }
 
-/** Where the browser gets the file of the action alone from. */
+/** Return the address from which the browser downloads the file of an action. */
 export function actionDownload(id: string): string {
   return serverPath(`${below(id)}/umrf`);
 }
@@ -106,7 +106,7 @@ function renamesQuery({ inputs, outputs }: Renames): string {
   return text === "" ? "" : `?${text}`;
 }
 
-/** What updating each graph to the parameters of the document would change. */
+/** Query what updating each graph to the parameters of the document would change. */
 export function useActionUses(id: string, renames: Renames) {
   const query = renamesQuery(renames);
   return useQuery({

@@ -348,7 +348,7 @@ test("a beat says when each robot last answered, without another render of every
   live.close();
 });
 
-/** What the runner and the editor answer when they are asked over HTTP. */
+/** Serve these answers of the runner and the editor over HTTP. */
 function answering(answers: Record<string, number | [number, object]>) {
   vi.stubGlobal("fetch", async (url: string, init: RequestInit) => {
     posted(init.method ?? "GET", url);

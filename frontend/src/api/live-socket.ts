@@ -17,8 +17,10 @@ export interface StopRequest {
   run: string | "all";
   /** The tick at which it was asked. */
   at: number;
-  /** Which runs "all" is about: those that went on when it was asked, as far as this page knew, and those
-   * that the runner stops since. */
+  /**
+   * The runs that "all" is about: those that this page knew to go on when it was asked, and those
+   * that the runner has stopped since.
+   */
   runs: readonly string[];
   /**
    * `asked`: nobody has answered yet; `unheard`: it could not be sent, and is sent again;
@@ -36,7 +38,7 @@ export interface LiveState {
   link: LiveLink;
   /** The tick at which the link became what it is. */
   since: number;
-  /** Why the link is not there, as far as that was found out. */
+  /** The reason why the connection is down, as far as known. */
   unreached?: UnreachableReason | null;
   engines: readonly Robot[];
   runs: ReadonlyMap<string, Run>;
@@ -65,9 +67,12 @@ export class LiveSocket {
     runs: new Map(),
     stops: [],
   };
-  /** When each open run was last shown by its engine, by the server's clock. Apart from `now`: it changes each second. */
+  /**
+   * Time at which its engine last showed each open run, by the server's clock. Apart from `now`,
+   * since it changes each second.
+   */
   runSeenAt: ReadonlyMap<string, number> = new Map();
-  /** When each robot last answered, by the server's clock. */
+  /** Time at which each robot last answered, by the server's clock. */
   robotAnsweredAt: ReadonlyMap<string, number> = new Map();
   readonly #seers = new Set<() => void>();
   readonly #runner: string;
@@ -80,7 +85,7 @@ export class LiveSocket {
   /** News of runs that listeners are told of soon. */
   #untold: ReturnType<typeof setTimeout> | undefined;
   #toldAt = 0; // tick
-  /** What was found out about the last socket that did not open. */
+  /** Reason why the last socket did not open. */
   #unreached: UnreachableReason | null = null;
 
   constructor(runner: string) {
@@ -141,7 +146,9 @@ export class LiveSocket {
     void this.#keepStopping(stop, this.#isWhole(runs));
   }
 
-  /** Whether these are all that could be seen to move when somebody asked to stop all. */
+  /**
+   * Return whether these are all runs that could be seen to move when a person asked to stop all.
+   */
   #isWhole(runs: readonly string[]): boolean {
     return runs.length > 0 && foreignGraphs(this.state).length === 0;
   }
@@ -328,7 +335,7 @@ export class LiveSocket {
     this.#set({ stops });
   }
 
-  /** What the runner stops, and this page had not known when it asked to stop all. */
+  /** Add runs that the runner stops and that this page did not know when it asked to stop all. */
   #joinStops(told: readonly Run[]): void {
     const stopping = told.filter((run) => run.ended_at === null && run.desired === "stopped");
     if (stopping.length === 0) return;
@@ -346,7 +353,7 @@ export class LiveSocket {
     this.#tell();
   }
 
-  /** What is proven is noted at once: later the runner may be silent, and other runs may begin. */
+  /** Note proven Stops at once: later the runner may be silent, and other runs may begin. */
   #noteProven(): void {
     const isNew = (stop: StopRequest) => stop.provenAt === undefined && isProven(stop, this.state);
     if (!this.state.stops.some(isNew)) return;
@@ -396,7 +403,7 @@ export function withKeptParts(before: Run | undefined, now: Run): Run {
   return isEqual(before, kept) ? before : kept;
 }
 
-/** What nobody shall see later than it can be drawn: how the run itself stands, and what is alarming. */
+/** Fields that must be shown without delay: the state of the run itself, and alarms. */
 const URGENT = [
   "state",
   "desired",
@@ -431,7 +438,9 @@ export function newestRun(now: LiveState, graph: string): Run | null {
   return newest;
 }
 
-/** What robots run that nobody started from here, as `robot: graph`. Sub-graphs belong to theirs. */
+/**
+ * Return the graphs that robots run and that were not started from here. Sub-graphs are left out.
+ */
 export function foreignGraphs(now: LiveState): { robot: Robot; held: HeldGraph }[] {
   return now.engines.flatMap((robot) => {
     const moving = robot.holds.filter((held) => held.active);
@@ -466,7 +475,7 @@ export function stopTargets(stop: StopRequest, now: LiveState): Run[] {
   );
 }
 
-/** Whether the runner says, and says it now, that all rests that a Stop is about. */
+/** Return whether the runner says now that everything that a Stop is about has come to rest. */
 function isProven(stop: StopRequest, now: LiveState): boolean {
   if (now.link !== "live" || stop.state !== "heard") return false;
   const runs = stopTargets(stop, now);
@@ -486,7 +495,10 @@ export interface UnreachableReason {
 
 const PATIENCE = 3_000; // ms
 
-/** What can be said without asking: browsers keep an encrypted page from what is not. */
+/**
+ * Return the reason if browsers block the address: an encrypted page may not load unencrypted
+ * content; else null.
+ */
 function blockedByBrowser(runner: string): UnreachableReason | null {
   const encrypted = globalThis.location?.protocol === "https:";
   if (!encrypted || !runner.startsWith("http:")) return null;

@@ -24,7 +24,7 @@ export function usePackages(graph: string) {
   });
 }
 
-/** The same as the document is edited: `seq` is the moment on screen, from 1 on. */
+/** Query the packages while the document is edited: `seq` is the moment on screen, from 1 on. */
 export function usePackagesAt(graph: string, seq: number) {
   return useQuery({
     enabled: seq > 0,
@@ -48,7 +48,7 @@ export function usePackage(graph: string, seq: number, name: string) {
   });
 }
 
-/** Where the browser gets one package from, or all of them. */
+/** Return the address from which the browser downloads one package, or all of them. */
 export function packageDownload(graph: string, seq: number, name?: string): string {
   const one = name === undefined ? "" : `&package=${encodeURIComponent(name)}`;
   return serverPath(`${below(graph)}.zip?at=${seq}${one}`);

@@ -13,9 +13,12 @@ export interface PageLinkState {
   live: LiveSocket | null;
   /** The runner's address, once the editor has told it. */
   runner: string | undefined;
-  /** Why the page does not know where the runner is; "" when it does, or has not asked yet. */
+  /**
+   * The reason why the page does not know the runner's address; "" if it does, or has not asked
+   * yet.
+   */
   lost: string;
-  /** Whether somebody is signed in, as far as this page knows: only then STOP is there. */
+  /** Set if a person is signed in, as far as this page knows: only then STOP is shown. */
   signedIn: boolean;
 }
 
@@ -24,7 +27,7 @@ const AGAIN = 5_000; // ms between two questions for the runner's address, at mo
 class PageLink {
   #state: PageLinkState = { live: null, runner: undefined, lost: "", signedIn: false };
   readonly #listeners = new Set<() => void>();
-  /** Who speaks on the open socket: the runner knows it by the session it was opened with. */
+  /** Identity of the open socket: the runner knows it by the session it was opened with. */
   #who = "";
   #visit = 0;
   #asking = false;
@@ -117,13 +120,19 @@ export function useLive(): PageLinkState & { now: LiveState } {
   return { ...hold, now };
 }
 
-/** When the engine itself last showed a run, by the server's clock; only who asks is rendered again each second. */
+/**
+ * Return when the engine last showed a run, by the server's clock; only callers are rendered again
+ * each second.
+ */
 export function useRunSeenAt(run: string): number | undefined {
   const { live } = useSyncExternalStore(pageLink.subscribe, pageLink.now);
   return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.runSeenAt.get(run));
 }
 
-/** When a robot last answered, by the server's clock; an answer that changes nothing is told by a beat alone. */
+/**
+ * Return when a robot last answered, by the server's clock; answers without a change are counted
+ * too.
+ */
 export function useRobotAnsweredAt(robot: string): number | undefined {
   const { live } = useSyncExternalStore(pageLink.subscribe, pageLink.now);
   return useSyncExternalStore(live?.subscribeSeen ?? never, () => live?.robotAnsweredAt.get(robot));

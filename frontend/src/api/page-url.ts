@@ -1,6 +1,9 @@
-/** Where the page lies on its server: at the root, or below a path that a proxy gave it. */
+/** Address of the page on its server: the root, or below a path of a proxy. */
 
-/** What the server wrote into the page. Without one (in tests, under `npm run dev`) it is the root. */
+/**
+ * Return the address that the server wrote into the page. Without one (in tests, under `npm run
+ * dev`) it is the root.
+ */
 function written(): string {
   const found = globalThis.document?.querySelector<HTMLMetaElement>('meta[name="root"]')?.content;
   return found?.startsWith("/") ? found.replace(/\/$/, "") : "";
@@ -14,12 +17,15 @@ export function serverPath(path: string): string {
   return basePath + path;
 }
 
-/** Of the page, without a slash at its end: what links to it begin with. */
+/** Return the address of the page without a slash at its end. */
 export function pageUrl(): string {
   return globalThis.location.origin + basePath;
 }
 
-/** Of a place of the documentation that comes with the server, as "robots.html#registering-one". */
+/**
+ * Return the address of a place of the documentation that comes with the server, as
+ * "robots.html#registering-one".
+ */
 export function helpUrl(place: string): string {
   return serverPath(`/help/${place}`);
 }

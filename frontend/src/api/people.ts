@@ -7,7 +7,7 @@ import { may, type Permission, type Person } from "./session";
 
 type KnownPerson = EditorApi["Participant"];
 
-/** Of who has not been here for long: no colour that somebody could have. */
+/** Color of people who have not been here for long: no other person can have it. */
 export const NOBODYS_COLOR = "#757575";
 
 /** `color` where it is one, since it comes over the wire and goes into styles. */
@@ -21,8 +21,8 @@ export interface Colored {
 }
 
 /**
- * What colour a person has, by id. Those who are here come first: what the server said of others a
- * while ago may meanwhile be the colour of somebody who came.
+ * Return the colors of people by id. People who are here come first: an older answer of the server
+ * may give others a color that has been taken since.
  */
 export function colorsOf(
   here: readonly Colored[],
@@ -65,7 +65,10 @@ interface Named {
   readonly name: string;
 }
 
-/** What somebody is called now: what was stored of them, a run for one, has the name of then beside their id. */
+/**
+ * Return the present name of a person: stored records, such as runs, have the name of their time
+ * beside the id.
+ */
 export function currentName(
   author: Named | null | undefined,
   me: Named,
@@ -76,7 +79,7 @@ export function currentName(
   return now?.name || author.name || "somebody";
 }
 
-/** What the author of a run is called now. */
+/** Return the present name of the author of a run. */
 export function useCurrentName(author: Named | null | undefined): string {
   const { person } = usePerson();
   return currentName(author, person, useKnownPeople(author ? [author.id] : NO_IDS));
@@ -84,7 +87,7 @@ export function useCurrentName(author: Named | null | undefined): string {
 
 export interface SignedIn {
   person: Person;
-  /** How often somebody has signed in since the page was opened: sockets begin anew with each. */
+  /** Number of sign-ins since the page was opened: sockets reconnect with each. */
   visit: number;
   rename: (name: string) => Promise<void>;
 }
@@ -97,7 +100,7 @@ export function usePerson(): SignedIn {
   return hold;
 }
 
-/** Whether the one who is signed in may do this. */
+/** Return whether the signed-in person may do this. */
 export function useMay(permission: Permission): boolean {
   return may(usePerson().person.role, permission);
 }

@@ -4,11 +4,11 @@ import { fetchJson } from "./http";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
-/** What became of an action. From the visit number `first` on, its visits are now `visits`. */
+/** Changes of an action. From the visit number `first` on, its visits are now `visits`. */
 export type ActionFrame = RunnerApi["ActionFrame"];
 /** One event: the fields of the run and the actions that it changed. */
 export type Frame = Omit<RunnerApi["ReplayFrame"], "head"> & { head?: Partial<Run> };
-/** Something that happened around the actions: a wish, a message sent, a silence, a proof. */
+/** Event around the actions: a request of a person, a message sent, a silence, a proof. */
 export type ReplayMark = RunnerApi["MarkShown"];
 /** A page of a run's replay: `base` after `after` events, then the frames of the next ones. */
 export type Replay = Omit<RunnerApi["RunReplay"], "frames"> & { frames: Frame[] };

@@ -1,4 +1,4 @@
-/** What the runner tells of past runs: marks, comparisons, statistics, files. */
+/** Requests about past runs: marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
 import { fetchAnswer, fetchJson, type RequestOptions } from "./http";
 import { getRun } from "./run-stop";
@@ -8,7 +8,7 @@ import type { RunnerApi } from "./schema/runner";
 export type RunMarks = RunnerApi["RunMarks"];
 /** A run of the list, with what people noted about it and why it did not end well. */
 export type ListedRun = RunnerApi["Listed"];
-/** What is proven to be behind the end of a run, and where that shows. */
+/** Proven cause of the end of a run, with the place that shows it. */
 export type Cause = RunnerApi["CauseShown"];
 export type ComparedField = RunnerApi["Field"];
 export type ComparedStep = RunnerApi["ComparedVisit"];
@@ -16,7 +16,7 @@ export type Comparison = RunnerApi["RunComparison"];
 export type ActionStatistics = RunnerApi["ActionStatistics"];
 export type Statistics = RunnerApi["Statistics"];
 
-/** Which runs a list shows; what is empty asks for all. */
+/** Filter of a list of runs; empty fields match all. */
 export interface RunFilter {
   text: string;
   graph: string;
@@ -97,7 +97,7 @@ export function useCauses(runner: string | undefined, run: Run) {
   });
 }
 
-/** Whether there is something to explain. */
+/** Return whether the end of a run needs an explanation. */
 export function needsExplanation(run: Run): boolean {
   if (run.state === "finished") return run.result !== "on_true";
   return run.ended_at !== null || run.state === "unknown" || run.alarms.length > 0;
@@ -156,7 +156,10 @@ export function useStatistics(runner: string | undefined, graph: string) {
 
 export type InjectedFault = NonNullable<RunnerApi["ScriptRequest"]["fault"]>;
 
-/** What a run did, as a script for the simulator; with `fault` one action fails at its last visit. */
+/**
+ * Return a script for the simulator that repeats a run; with `fault` one action fails at its last
+ * visit.
+ */
 export function recordedScriptOf(
   runner: string,
   run: string,
@@ -166,7 +169,7 @@ export function recordedScriptOf(
   return fetchJson(`${runner}${path(run)}/script${query}`);
 }
 
-/** The same for another version of the graph; `umrf` is JSON text. */
+/** Return such a script for another version of the graph; `umrf` is JSON text. */
 export function recordedScriptFor(
   runner: string,
   run: string,
@@ -191,7 +194,9 @@ export function useRunsOfSameStart(runner: string | undefined, run: Run) {
   });
 }
 
-/** Where the raw messages from the time of a run are. `text` is empty when all of them are here. */
+/**
+ * Query where the raw messages from the time of a run are. `text` is empty if all of them are here.
+ */
 export function useRaw(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "raw", run.id],
@@ -201,7 +206,7 @@ export function useRaw(runner: string | undefined, run: Run) {
   });
 }
 
-/** Where a run can be fetched as a file. */
+/** Return the address from which a run can be downloaded as a file. */
 export function exportUrl(runner: string, run: string, format: "jsonl" | "csv" | "mcap"): string {
   return `${runner}${path(run)}/export?format=${format}`;
 }
@@ -236,7 +241,7 @@ export function useRawEvents(runner: string | undefined, run: Run, most: number)
   });
 }
 
-/** Where the graph of a run is, as it was sent. */
+/** Return the address of the graph of a run, as it was sent. */
 export function umrfUrl(runner: string, run: string): string {
   return `${runner}${path(run)}/umrf`;
 }

@@ -27,7 +27,7 @@ export type Preflight = RunnerApi["Preflight"];
 const path = (runner: string | undefined, name: string) =>
   `${runner ?? ""}/api/robots/${encodeURIComponent(name)}`;
 
-/** Whether robots can be reached over ROS 2 from the runner, and the reason where not. */
+/** Query whether the runner can reach robots over ROS 2, and the reason if not. */
 export function useRosReach(runner: string | undefined) {
   return useQuery({
     queryKey: ["robots", "reach"],
@@ -56,7 +56,7 @@ export function useIndexedByRobot(runner: string | undefined, robot: string, on:
   });
 }
 
-/** The same of several at once; null of those that have not answered. */
+/** Query the indexes of several robots at once; null for robots that have not answered. */
 export function useIndexedByRobots(
   runner: string | undefined,
   robots: readonly string[],

@@ -1,4 +1,7 @@
-/** What Stop needs of runs: whether one goes on, its newest state, and the request. STOP loads this and no list. */
+/**
+ * The part of runs that Stop needs: whether one goes on, its newest state, and the request. STOP
+ * loads this and no list.
+ */
 import { fetchJson } from "./http";
 import type { Run } from "./runs";
 
@@ -15,7 +18,7 @@ export const MOVES: ReadonlySet<string> = new Set([
   "PAUSED",
 ]);
 
-/** Whether a person's word can end the run, since no answer of its engine can. */
+/** Return whether a person's word can end the run, since no answer of its engine can. */
 export function needsRestConfirmation(run: Run): boolean {
   if (hasEnded(run) || run.simulated || run.started_at === null) return false;
   if (run.state === "lost" || run.unknown_since !== null) return true;

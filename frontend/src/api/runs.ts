@@ -6,7 +6,10 @@ import { fetchJson } from "./http";
 import { getRun } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
 
-/** Who asked for something, and from where: `address` is missing for the runner's own computer. */
+/**
+ * Person who asked for something, and the address; `address` is missing for the runner's own
+ * computer.
+ */
 export type Requester = RunnerApi["Author"];
 /** Seconds: at least `least`, at most `most`; null: nothing bounds it from above. */
 export type DurationBounds = RunnerApi["DurationBounds"];
@@ -22,13 +25,13 @@ export type Run = RunnerApi["RunSummary"] & {
     | undefined;
 };
 
-/** Where somebody asked from, as words that follow the name; "" where it was not recorded. */
+/** Return the address of a person as words that follow the name; "" if none was recorded. */
 export function requesterPlace(asker: Requester | null): string {
   if (asker?.by === undefined) return "";
   return ` · by ${isolated(asker.by)}, from ${asker.address ?? "this computer"}`;
 }
 
-/** Where it ran, in a few words. */
+/** Return in a few words on which engine a run ran. */
 export function runPlace(run: Run): string {
   if (!run.simulated) return run.engine;
   return run.engine === "simulator" ? "simulator" : `${isolated(run.engine)} (simulated)`;
@@ -68,9 +71,9 @@ export interface StartOrder {
   /** One engine, or several robots that start together. */
   engines: readonly string[];
   request: string;
-  /** What actions do; only the simulator follows one. */
+  /** Outcomes of actions; only the simulator follows them. */
   script?: RunnerApi["Script"];
-  /** Whether actions do what their Python behaviours say; only in the simulator. */
+  /** Set if actions follow their Python behaviours; only in the simulator. */
   behaviours?: boolean;
   override?: RunnerApi["Override"];
   inside?: Inside;
@@ -103,7 +106,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
   return { runs: [run], failed: {} };
 }
 
-/** What the runner knows of a start. Without runs and not `under_way`: nothing so far. */
+/** The runner's knowledge of a start. Without runs and not `under_way`: it has none so far. */
 export type StartFound = RunnerApi["StartShown"];
 
 export function findStart(

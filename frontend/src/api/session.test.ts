@@ -5,7 +5,7 @@ const RUNNER = "http://lab:8001";
 const answer = (status: number) => () => Promise.resolve(new Response(null, { status }));
 const away = () => Promise.reject(new TypeError("Failed to fetch"));
 
-/** What was asked for, with an editor and a runner that answer so. */
+/** Return the list of requests, with an editor and a runner that answer in this way. */
 function servers(editor: () => Promise<Response>, runner: () => Promise<Response>): string[] {
   const asked: string[] = [];
   vi.stubGlobal("fetch", (url: string, init: RequestInit) => {

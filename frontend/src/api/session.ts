@@ -1,4 +1,4 @@
-/** Who this browser is: trades the token of the link for a cookie. */
+/** Session of this browser: trades the token of the link for a cookie. */
 import { errorText, fetchJson, Refusal } from "./http";
 import type { EditorApi } from "./schema/editor";
 
@@ -6,7 +6,7 @@ export type Person = EditorApi["Person"];
 
 const NAME_KEY = "aa.name";
 
-/** What signs somebody in: the server's token, or an invitation (`ID.SECRET`). */
+/** Credential for signing in: the server's token, or an invitation (`ID.SECRET`). */
 export type Credential =
   | { readonly kind: "token"; readonly text: string }
   | { readonly kind: "invitation"; readonly text: string };
@@ -66,7 +66,7 @@ export function rememberPerson(person: Person | null): void {
 }
 
 type SessionAnswer = EditorApi["SignedIn"];
-/** What a link invites to, and by whom. */
+/** Role that an invitation gives, and who made it. */
 export type InvitationPreview = EditorApi["Invited"];
 
 /** Throws `Refusal` when the link is none of this server, or was revoked. */
@@ -80,7 +80,7 @@ export async function openSession(key: Credential, name = rememberedName()): Pro
   return (await fetchJson<SessionAnswer>("/api/session", { method: "POST", body })).person;
 }
 
-/** Who the cookie says we are. Throws a `Refusal` with status 401 without one. */
+/** Return the person of the cookie. Throws a `Refusal` with status 401 without one. */
 export async function currentPerson(timeoutMs = 20_000): Promise<Person> {
   return (await fetchJson<SessionAnswer>("/api/session", { timeoutMs })).person;
 }
@@ -101,7 +101,7 @@ export async function signOut(runner: string | undefined): Promise<void> {
   if (failed !== undefined) sessionStorage.setItem(FAREWELL_KEY, errorText(failed.reason));
 }
 
-/** Of a session that has ended already, as by the other one, nothing is left to do. */
+/** End the session on one server; a session that has ended already is no error. */
 async function endSession(who: string, place: string): Promise<void> {
   try {
     await fetchJson(`${place}/api/session`, { method: "DELETE" });
@@ -118,14 +118,14 @@ function lostRunner(): Promise<never> {
 const OWN_FOLDER =
   "If it has a data folder of its own, it goes on to take a copy of this session’s cookie for valid.";
 
-/** What could not be done when this browser signed out last; told once. */
+/** Return, only once, what could not be done when this browser signed out last. */
 export function takeFarewell(): string {
   const said = sessionStorage.getItem(FAREWELL_KEY) ?? "";
   sessionStorage.removeItem(FAREWELL_KEY);
   return said;
 }
 
-/** The same session under another name. */
+/** Continue the session under another name. */
 export async function renamePerson(name: string): Promise<Person> {
   const answer = await fetchJson<SessionAnswer>("/api/session", { method: "POST", body: { name } });
   rememberName(name);
@@ -155,7 +155,7 @@ export function may(role: Role, permission: Permission): boolean {
   return ROLES.indexOf(role) >= ROLES.indexOf(FROM[permission]);
 }
 
-/** What a role may do, to follow "may". */
+/** Permissions of each role in words that follow "may". */
 export const ROLE_WORDS: Readonly<Record<Role, string>> = {
   viewer: "look at everything and stop runs",
   editor: "edit graphs, run them in the simulator, and stop runs",

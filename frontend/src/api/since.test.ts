@@ -1,4 +1,4 @@
-/** Which run counts as the last one that went well. */
+/** Choice of the last run that went well. */
 import { expect, test } from "vitest";
 import { lastGoodRun } from "./history";
 import type { Run } from "./runs";

@@ -6,7 +6,7 @@ import type { RunnerApi } from "./schema/runner";
 
 export type Approval = RunnerApi["Approval"];
 
-/** Who has said yes to exactly the graph with this digest. */
+/** Fetch the people who approved exactly the graph with this digest. */
 export function fetchApprovals(
   runner: string,
   digest: string,
@@ -19,7 +19,7 @@ export function approve(runner: string, body: RunnerApi["ApprovalRequest"]): Pro
   return fetchJson(`${runner}/api/approvals`, { method: "POST", body });
 }
 
-/** What stands between a graph and its start, engine by engine. Sends nothing but a get. */
+/** Check what prevents a start, for each engine. Nothing is sent to a robot but a get. */
 export function runPreflight(
   runner: string,
   what: { graph: string; umrf: string } & Inside,
@@ -31,7 +31,7 @@ export function runPreflight(
   return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
 }
 
-/** As the runner has it, and what could be written there. */
+/** State of the index folder as the runner sees it, and the files that could be written there. */
 export type IndexFolderLook = RunnerApi["IndexFolderState"];
 
 /** Has graphs inside of a task written there. */

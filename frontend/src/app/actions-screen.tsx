@@ -8,7 +8,7 @@ import { PageBar, PageFrame, useTitle } from "./page-frame";
 
 const HERE = { display: "contents" };
 
-/** What the open action is called. */
+/** Return the name of the open action; null if none is open. */
 function useName(id: string | null): string | null {
   const known = useLibrary().data;
   if (id === null) return null;

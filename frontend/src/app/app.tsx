@@ -31,8 +31,11 @@ import {
   StatisticsScreen,
 } from "./screens";
 
-/** What a browser says of its network says nothing of a server on this computer or in this room, and what
- * a person asks for happens now or not at all: nothing waits for a network and is sent by itself later. */
+/**
+ * Network mode of all requests: the browser's word about its network tells nothing of a server on
+ * this computer or in this room. Requests are sent now or fail; none waits for a network to be sent
+ * later.
+ */
 const NOW = "always";
 const client = new QueryClient({
   defaultOptions: {

@@ -33,7 +33,7 @@ const RecordDryRun = lazyPart(() =>
   import("../runs/start/record-dry-run").then((part) => part.RecordDryRun),
 );
 
-/** How long a start waits for the name of the moment on screen, ms. */
+/** Longest wait of a start for the name of the moment on screen, ms. */
 const NAMED_MS = 3_000;
 
 function unnamed(): never {
@@ -45,7 +45,7 @@ interface RunHere {
   going: readonly Run[];
   /** Shows another one of them, until a newer one begins. */
   choose: (run: string) => void;
-  /** What goes on, or has ended while this page was open: shown on the canvas. */
+  /** The run that is shown on the canvas: it goes on, or ended while this page was open. */
   live: Run | null;
   /** The newest run, also of last week: shown in the strip. Undefined until that is known. */
   run: Run | null | undefined;

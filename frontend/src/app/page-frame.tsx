@@ -1,4 +1,4 @@
-/** What every screen has: the bar on top, with room for STOP, and the screen below. */
+/** Frame of every screen: the bar on top, with room for STOP, and the screen below. */
 import { Button } from "@mantine/core";
 import { IconBolt, IconHistory, IconMapOff, IconRobot, IconShare } from "@tabler/icons-react";
 import { memo, type ReactNode, useEffect, useLayoutEffect, useState } from "react";
@@ -34,7 +34,7 @@ interface WayProps {
   to: string;
   icon: typeof IconHistory;
   name: string;
-  /** Something else needs the room on a narrow screen. */
+  /** Set if another element needs the room on a narrow screen. */
   tight: boolean;
   /** Beside a graph, whose name and state need the room of a phone. */
   beside: boolean;
@@ -126,13 +126,13 @@ export function PageFrame({ children }: { children: ReactNode }) {
 }
 
 interface NowhereProps {
-  /** Where one is, in the bar. */
+  /** Name of this place in the bar. */
   crumb: string;
   title: string;
   children?: ReactNode;
 }
 
-/** What stands in the place of a page, and the way to all graphs. */
+/** Shows a notice in place of a page, with a link to all graphs. */
 export function Nowhere({ crumb, title, children }: NowhereProps) {
   return (
     <>

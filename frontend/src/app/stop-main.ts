@@ -16,7 +16,10 @@ mountStop(place);
 const person = rememberedPerson();
 if (person !== null && credentialIn(location.hash) === null) pageLink.enter(identityOf(person), 1);
 
-/** Whether the page has drawn anything: it takes away what index.html has in its place. */
+/**
+ * Return whether the page has rendered anything: its first rendering removes the text of
+ * index.html.
+ */
 const isDrawn = () => document.querySelector("#root > .unloaded") === null;
 
 document.getElementById("page-script")?.addEventListener("error", () => {

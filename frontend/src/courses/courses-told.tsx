@@ -51,7 +51,7 @@ function Told({ found, error }: ToldProps) {
   );
 }
 
-/** Of a moment of the graph. */
+/** Results of expected courses at a moment of the graph. */
 export function CoursesAt({ graph, seq }: { graph: string; seq: number }) {
   const { data, error } = useCheckedCourses(graph, seq);
   return (
@@ -61,7 +61,7 @@ export function CoursesAt({ graph, seq }: { graph: string; seq: number }) {
   );
 }
 
-/** Of a text that the graph may become; `of` tells it from others. */
+/** Results of expected courses for a text that the graph may become; `of` is its cache key. */
 export function CoursesOfText(props: { graph: string; umrf: string; of: readonly unknown[] }) {
   const { data, error } = useCoursesOfText(props.graph, props.umrf, props.of);
   return (

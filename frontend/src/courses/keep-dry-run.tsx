@@ -14,7 +14,7 @@ import { useThrottledLink } from "../sync/use-room";
 import { isolated } from "../words/isolated";
 import style from "./courses.module.css";
 
-/** Why a dry-run cannot be expected; null where it can. */
+/** Return why a dry-run cannot become an expected course; null if it can. */
 function obstacleOf(run: DryRun): string | null {
   if (run.moments.length === 0) return "nothing happens in it";
   return commandsOf(run.decided).length === 0 ? null : "somebody presses Stop in it";

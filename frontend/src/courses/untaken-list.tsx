@@ -33,7 +33,7 @@ interface Props {
   onKept: () => Promise<unknown>;
 }
 
-/** What the search came to, and what can be done with it. */
+/** Result of the search for a course through an arrow, with buttons. */
 function Verdict({ runner, found, arrow, onKept }: VerdictProps) {
   const { id, graph, mayGoBack, beginDryRun } = useEditorContext();
   const [naming, setNaming] = useState(false);
@@ -185,7 +185,7 @@ export function arrowWords(graph: Graph, { parent, child }: OutcomeArrow): strin
   return `${isolated(endName(graph, parent))} → ${isolated(endName(graph, child))}`;
 }
 
-/** Whether the arrow is on screen still: the answer may be older than the last edit. */
+/** Return whether the arrow is still in the graph: the answer may be older than the last edit. */
 export function isThere(graph: Graph, { parent, child }: OutcomeArrow): boolean {
   return graph.relations.some((each) => each.parent === parent && each.child === child);
 }

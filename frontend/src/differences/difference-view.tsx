@@ -1,4 +1,7 @@
-/** What differs between two moments: actions and arrows that came, went or changed, field by field. */
+/**
+ * Shows differences between two moments: actions and arrows that were added, removed or changed,
+ * field by field.
+ */
 import type { GraphDifference } from "../api/graphs";
 import { isolated } from "../words/isolated";
 import style from "./difference-view.module.css";
@@ -32,7 +35,7 @@ function Fields({ fields }: { fields: readonly FieldChange[] }) {
 /** Places of cards mean nothing; who looks for what was moved looks at the canvas. */
 const isMeant = ({ field }: FieldChange): boolean => field !== "position";
 
-/** Whether there is anything in it that means something. */
+/** Return whether a difference has any change of meaning. */
 export function meansSomething({ actions, relations, fields = [] }: Changes): boolean {
   const action = actions.some((each) => each.change !== "changed" || each.fields.some(isMeant));
   return action || relations.length > 0 || fields.length > 0;

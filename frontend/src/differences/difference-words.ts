@@ -1,4 +1,4 @@
-/** What differs between two moments of a document, in words. Pure. */
+/** Describes differences between two moments of a document in words. Pure. */
 import { memberNames, memberText } from "../graph/json-members";
 import { pathWords } from "../graph/value-text";
 import { isolated } from "../words/isolated";
@@ -65,7 +65,10 @@ function parameterWords(text: string): string {
   ].join(", ");
 }
 
-/** Which members of a parameter differ; of one that came or went, what it is as a whole. */
+/**
+ * Return the members in which a parameter differs; for an added or removed one the parameter as a
+ * whole.
+ */
 export function changedLines({ field, before, after }: FieldChange): ChangedLine[] {
   const name = fieldWords(field);
   const parameter = /^(in|out)\//.test(field);

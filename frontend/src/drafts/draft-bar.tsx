@@ -22,7 +22,7 @@ import style from "./drafts.module.css";
 const MergeDialog = lazyPart(() => import("./merge-dialog").then((part) => part.MergeDialog));
 const CompareDialog = lazyPart(() => import("./merge-dialog").then((part) => part.CompareDialog));
 
-/** How far both are apart is asked for when the hands rest. */
+/** Delay after the last edit before the differences are asked for, ms. */
 const SETTLED_MS = 800;
 
 type Dialog = "compare" | "merge" | "take-over" | "propose";
@@ -135,7 +135,7 @@ function Bar({ id }: { id: string }) {
   );
 }
 
-/** Nothing where the graph is no draft. */
+/** Bar above the canvas of a draft; renders nothing for other graphs. */
 export function DraftBar({ id }: { id: string }) {
   const of = useDraftOf(id).data;
   return of ? <Bar id={id} /> : null;

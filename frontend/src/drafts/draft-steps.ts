@@ -1,4 +1,4 @@
-/** Something that is done with a draft: while it goes on, and what is said where it is refused. */
+/** Requests about a draft, with their progress and errors; words about drafts and proposals. */
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { type DraftProposal, type GraphDraft, refreshDrafts } from "../api/drafts";
@@ -25,7 +25,7 @@ export function useDraftStep() {
 
 const things = (count: number) => (count === 1 ? "1 change" : `${count} changes`);
 
-/** How far both are apart; empty while that is not known. */
+/** Return how far a draft and its origin are apart, in words; empty while that is unknown. */
 export function apartWords({ ahead, behind }: Pick<GraphDraft, "ahead" | "behind">): string {
   if (ahead === null || behind === null) return "";
   if (ahead === 0 && behind === 0) return "nothing to merge";
@@ -33,7 +33,7 @@ export function apartWords({ ahead, behind }: Pick<GraphDraft, "ahead" | "behind
   return parts.filter(Boolean).join(", ");
 }
 
-/** What was said to a proposal. */
+/** Return the answers to a proposal in words. */
 export function answersWords({ answers = [], seq }: DraftProposal, now: number): string {
   const yes = answers.filter((each) => each.yes).length;
   const no = answers.length - yes;

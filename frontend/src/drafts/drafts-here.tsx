@@ -125,7 +125,7 @@ function Row(props: DraftRowProps) {
   );
 }
 
-/** What waits for an answer comes first, what is merged last. */
+/** Sort drafts: those that wait for an answer first, merged ones last. */
 const rank = ({ state }: GraphDraft) => ({ proposed: 0, open: 1, merged: 2 })[state];
 
 export function DraftsHere() {

@@ -220,7 +220,7 @@ export const isNothing = ({ fields, actions, relations, notes }: ToldMerge): boo
 
 interface ToldChangesProps {
   changes: ToldMerge;
-  /** Where nothing is told. */
+  /** Text for no changes. */
   nothing: string;
 }
 

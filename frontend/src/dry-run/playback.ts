@@ -97,7 +97,7 @@ function wordOf({ state, result }: PlayedVisit, over: boolean): { tone: Tone; wo
   }
 }
 
-/** What happened to each action by then, and the state of the graph. */
+/** Return the visits of each action and the state of the graph after the first `to` events. */
 function played(trace: readonly TraceEvent[], to: number, graph: Pick<Graph, "name">) {
   const visits = new Map<string, PlayedVisit>();
   let state = "";
@@ -125,7 +125,7 @@ function played(trace: readonly TraceEvent[], to: number, graph: Pick<Graph, "na
   return { visits, state };
 }
 
-/** What there is to see after the first `to` events. */
+/** Return the state of the playback after the first `to` events. */
 export function playbackStateAt(
   trace: readonly TraceEvent[],
   to: number,
@@ -157,7 +157,7 @@ const WAITING: PlayedVisit = {
   message: null,
 };
 
-/** What happens at one moment, in short sentences; what matters most comes first. */
+/** Describe the events of one moment in short sentences, the most important first. */
 export function momentWords(
   trace: readonly TraceEvent[],
   moment: PlaybackMoment,

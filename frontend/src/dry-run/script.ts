@@ -1,4 +1,4 @@
-/** What a person has decided in a dry-run, as the script that the simulator plays. Pure. */
+/** Decisions of a person in a dry-run, as the script that the simulator plays. Pure. */
 import type { Behaviour, Command, Script } from "../api/dry-runs";
 import type { RunningAction } from "./playback";
 import type { DryRunSeed } from "./seed";
@@ -6,17 +6,17 @@ import type { DryRunSeed } from "./seed";
 export type DecidedOutcome = "on_true" | "on_false" | "on_error";
 export type DecidedFaultKind = "error" | "never" | "exception" | "deaf" | "stop";
 
-/** How one visit of an action ends. */
+/** Decision about how one visit of an action ends. */
 interface Decision {
   readonly node: string;
   readonly call: number;
-  /** When the visit began, and when it was decided; ms since the start. */
+  /** Begin of the visit, and time of the decision; ms since the start. */
   readonly since: number;
   readonly at: number;
   readonly outcome: DecidedOutcome;
 }
 
-/** What goes wrong: an action that does not do as it should, or somebody who presses Stop. */
+/** Fault in a dry-run: an action that misbehaves, or a person who presses Stop. */
 export type DecidedFault =
   | { readonly kind: Exclude<DecidedFaultKind, "stop">; readonly node: string }
   | { readonly kind: "stop"; readonly at: number };
@@ -24,18 +24,18 @@ export type DecidedFault =
 export interface Decisions {
   readonly decisions: readonly Decision[];
   readonly fault: DecidedFault | null;
-  /** What actions did before anybody decided, one behaviour for each call. */
+  /** Outcomes of actions before the first decision, one behaviour for each call. */
   readonly before?: DryRunSeed["behaviours"];
 }
 
 export const NOTHING_DECIDED: Decisions = { decisions: [], fault: null };
 
-/** Nothing decided yet, at a moment of a run. */
+/** Return decisions without any entry, at a moment of a run if `seed` is given. */
 export function decidedBy(seed: DryRunSeed | null): Decisions {
   return seed === null ? NOTHING_DECIDED : { ...NOTHING_DECIDED, before: seed.behaviours };
 }
 
-/** Whether anything that had ended by the moment of a run was decided otherwise since. */
+/** Return whether a visit that had ended by the moment of a run was decided differently since. */
 export function rewritesRun({ decisions }: Decisions, { actions }: DryRunSeed): boolean {
   const ended = new Map(actions.map(({ node, ended }) => [node, ended]));
   return decisions.some(({ node, call }) => call < (ended.get(node) ?? 0));

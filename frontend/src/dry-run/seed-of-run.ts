@@ -1,4 +1,4 @@
-/** What the record of a run tells of one of its moments, for a dry-run that goes on from there. Pure. */
+/** Reads one moment of a recorded run, for a dry-run that continues from there. Pure. */
 import type { Behaviour } from "../api/dry-runs";
 import type { ActionRun, Run, Visit } from "../api/runs";
 import { fullName, type Graph, type Key } from "../graph/model";
@@ -10,7 +10,7 @@ type VisitState = "ended" | "goes on" | "not begun";
 
 const time = (text: string | null): number | null => (text === null ? null : Date.parse(text));
 
-/** How a visit stood at a moment; `sure`: whatever of its bounds is true. */
+/** Return the state of a visit at a moment; `sure`: it holds for all times within its bounds. */
 export function visitAt(visit: Visit, at: number): { state: VisitState; sure: boolean } {
   const [earliest, seen] = [time(visit.not_before), visitBegin(visit)];
   if (seen === null || seen > at) {
@@ -46,7 +46,7 @@ function endedBehaviour(node: string, visit: Visit, doubts: SeedDoubt[]): Behavi
   return { after_s, result: `on_${result}` };
 }
 
-/** What went on is played as never ending by itself: how it ends is to be decided. */
+/** Behaviour of visits that were going on: they never end by themselves, since a person decides. */
 const OPEN: Behaviour = { never: true };
 
 interface Found extends SeededAction {

@@ -4,7 +4,7 @@ import type { Visit } from "../api/runs";
 import type { Key } from "../graph/model";
 import type { PlaybackState } from "./playback";
 
-/** Something that the record does not tell, so that the dry-run had to choose. */
+/** Fact that the record does not contain, so that the dry-run had to choose. */
 export interface SeedDoubt {
   /** The action's full name; empty: it is about the whole. */
   readonly node: string;
@@ -30,18 +30,23 @@ export interface DryRunSeed {
   readonly number: number;
   /** ms after the run's start. */
   readonly at: number;
-  /** What actions did by then, one behaviour for each call. */
+  /** Outcomes of actions until then, one behaviour for each call. */
   readonly behaviours: Readonly<Record<string, readonly Behaviour[]>>;
   readonly actions: readonly SeededAction[];
   /** The values of each visit that had begun by then, as engines report them; null: not seen. */
   readonly inputs: Readonly<Record<string, readonly Visit["inputs"][]>>;
-  /** How the visits that went on then ended in the run, by node; told, not played. */
+  /**
+   * Ends that the visits going on at the moment had later in the run, by node; shown, not played.
+   */
   readonly ends: ReadonlyMap<string, string>;
   readonly values: readonly SeedValue[];
   readonly doubts: readonly SeedDoubt[];
 }
 
-/** What is played, with the values that the run had in the visits that are played again. */
+/**
+ * Return the graph to play, with the parameter values that the run had in the visits that are
+ * played again.
+ */
 export function withRecordedValues(
   state: PlaybackState,
   { inputs }: DryRunSeed,
@@ -57,7 +62,7 @@ export function withRecordedValues(
   return { ...state, progress };
 }
 
-/** Where the rules have led an action elsewhere than the run, in words; null where they have not. */
+/** Return in words where the rules led an action elsewhere than the run; null if they did not. */
 function strayed(seeded: SeededAction, state: PlaybackState, keys: ReadonlyMap<string, Key>) {
   const key = keys.get(seeded.node);
   const visits = key === undefined ? 0 : (state.progress.get(key)?.visits ?? 0);

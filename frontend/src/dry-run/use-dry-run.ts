@@ -38,9 +38,9 @@ export interface DryRun {
   /** The moment that is shown. */
   readonly index: number;
   readonly sighting: PlaybackState;
-  /** What is seen then of a graph that runs inside: its name is as engines call it. */
+  /** Return the progress of a graph that runs inside; its name is the one that engines use. */
   inside(graph: Pick<Graph, "name" | "actions">): PlaybackState["progress"];
-  /** What happens at this moment. */
+  /** Events of this moment in words. */
   readonly words: readonly string[];
   readonly playing: boolean;
   readonly speed: number;
@@ -51,12 +51,12 @@ export interface DryRun {
   readonly cut: boolean;
   /** The moment of a run from which it starts; null: from its own start. */
   readonly seed: DryRunSeed | null;
-  /** What of that moment is not known, or not reached by the rules. */
+  /** Facts of that moment that are unknown, or that the rules do not reach. */
   readonly doubts: readonly SeedDoubt[];
   go(index: number): void;
   play(on: boolean): void;
   setSpeed(speed: number): void;
-  /** How the running action ends: the one given, else the first. */
+  /** Decide how the running action ends: that with the given key, else the first. */
   choose(outcome: DecidedOutcome, key?: Key): void;
   inject(fault: DecidedFault | null): void;
   /** From the start, as if nothing had been decided. */
@@ -154,7 +154,7 @@ function useDeciding(
   return useMemo(() => ({ choose, inject }), [choose, inject]);
 }
 
-/** What comes of the decisions, asked of the editor while a dry-run is open. */
+/** Ask the editor for the result of the decisions while a dry-run is open. */
 function useResult(id: string, open: boolean, seq: number, decided: Decisions) {
   const wanted = useMemo(
     () => (open ? { seq, script: scriptOf(decided), commands: commandsOf(decided) } : null),

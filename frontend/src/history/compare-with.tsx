@@ -10,7 +10,7 @@ import { momentWords, type RunningGraph, runningOf } from "./compared";
 import type { Timeline } from "./timeline";
 import { goodBefore } from "./timeline";
 
-/** What robots run now of this graph. */
+/** Return the graphs that robots run now, of the graph with this id. */
 export function useRunning(id: string, { versions }: Timeline): readonly RunningGraph[] {
   const { now } = useLive();
   return useMemo(() => runningOf(openRuns(now), id, versions), [now, id, versions]);
@@ -55,7 +55,9 @@ function choicesOf({ place, timeline, running }: Props, now: number): Choice[] {
 const distinct = (choices: readonly Choice[]): Choice[] =>
   choices.filter(({ value }, i) => choices.findIndex((each) => each.value === value) === i);
 
-/** Where nothing went well before, a sitting is told by itself. */
+/**
+ * Return the value of the chosen option: a sitting by itself (`own`) if no run went well before.
+ */
 const chosenOf = ({ with: other }: PastPlace, good: boolean): string =>
   other === "good" && !good ? "own" : `${other}`;
 

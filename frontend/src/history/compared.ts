@@ -27,7 +27,7 @@ import { changesBetween } from "./graph-difference";
 import { entryAt, type GoodRun, goodBefore, type Timeline } from "./timeline";
 import { type PastGraph, usePastGraph } from "./walk";
 
-/** What differs, with the names of who did it as far as the steps are there. */
+/** Return the differences, with the names of their authors as far as the steps are loaded. */
 function useChanges(
   before: Graph | null,
   { graph: after, walk, here }: PastGraph,
@@ -161,7 +161,10 @@ export interface RunningGraph {
   readonly seq: number | null;
 }
 
-/** What runs, of the runs that go on; a version of another digest is not what it says it is. */
+/**
+ * Return the running graphs among open runs; a version with another digest is not taken for the one
+ * that runs.
+ */
 export function runningOf(
   runs: readonly GoingRun[],
   graph: string,
@@ -196,7 +199,10 @@ function parameters(mine: readonly Parameter[], theirs: readonly Parameter[]): P
   });
 }
 
-/** What stands in a file and a document in different places is not compared. */
+/**
+ * Take the members that a file and a document hold in different places from the other action, so
+ * that they are not compared.
+ */
 function action(mine: Action, other: Action): Action {
   const { missing, twin, extra } = other;
   const inputs = parameters(mine.inputs, other.inputs);

@@ -1,4 +1,7 @@
-/** Everything that differs between the two moments, field by field; each leads to its place. */
+/**
+ * List of all differences between two moments, field by field; each entry shows its place on the
+ * canvas.
+ */
 import { memo, useMemo } from "react";
 import { CHANGE_SIGNS } from "../canvas/marks/change-marks";
 import { useEditorContext } from "../edit-actions/editor-context";
@@ -15,7 +18,7 @@ interface ThingProps {
   onShow: (thing: ChangedThing) => void;
 }
 
-/** What the row of a thing says. */
+/** Return whether two changes are about the same thing with the same words. */
 const isSameThing = (one: ChangedThing, other: ChangedThing): boolean =>
   one.key === other.key &&
   one.thing === other.thing &&

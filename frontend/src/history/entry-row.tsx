@@ -66,7 +66,7 @@ interface Props {
   entry: HistoryEntry;
   color: string;
   chosen: boolean;
-  /** What is said where it is no edit by hand: that something was made so again. */
+  /** Words for an entry that is no edit by hand, such as restoring a moment; null for edits. */
   did: string | null;
   /** The moment on screen: what leads there is no way back. */
   now: number;
@@ -77,7 +77,7 @@ interface Props {
   onRestore: () => void;
 }
 
-/** Whether what somebody did can be taken back alone. */
+/** Return whether an entry can be reverted alone. */
 const mayRevert = ({ from_seq, changes }: HistoryEntry): boolean =>
   from_seq !== undefined && from_seq >= 2 && changes !== undefined;
 

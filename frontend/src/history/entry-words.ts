@@ -1,4 +1,6 @@
-/** What an entry of the history changed, in words about actions, arrows and notes. Pure. */
+/**
+ * Describes what an entry of the history changed, in words about actions, arrows and notes. Pure.
+ */
 import type { HistoryEntry } from "../api/history";
 import { type FieldChange, linesOf } from "../differences/difference-words";
 import { isolated } from "../words/isolated";
@@ -156,7 +158,7 @@ function graphLines(fields: readonly FieldChange[]): EntryLine[] {
 const counted = (count: number, what: string): string =>
   `${count} ${what}${count === 1 ? "" : "s"}`;
 
-/** What only looks otherwise, as one line. */
+/** Return one line for changes of looks only, such as positions. */
 function looksLine(
   actions: readonly ChangedAction[],
   arrows: readonly ChangedArrow[],
@@ -182,7 +184,9 @@ function looksLine(
 
 const ORDER: readonly LineSign[] = ["added", "removed", "changed", "said", "looks"];
 
-/** Everything that somebody changed: what came and went first, what only looks otherwise last. */
+/**
+ * Return lines for all changes of a sitting: added and removed things first, changes of looks last.
+ */
 export function entryLines(changes: SittingChanges): EntryLine[] {
   const { fields = [], actions = [], relations = [], notes = [], comments = 0 } = changes;
   const gone = new Set(actions.flatMap((each) => (each.change === "removed" ? [each.aid] : [])));

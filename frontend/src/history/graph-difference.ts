@@ -1,4 +1,6 @@
-/** What differs between two moments of a graph, as things to mark, to list and to walk through. Pure. */
+/**
+ * Differences between two moments of a graph, as things to mark, to list and to step through. Pure.
+ */
 import type { ChangeMark, ChangeMarks } from "../canvas/marks/change-marks";
 import { type FieldChange, linesOf } from "../differences/difference-words";
 import { relationId } from "../graph/document-keys";
@@ -62,7 +64,7 @@ const relationFields = (relation: Relation): Fields =>
     ...relation.remap.map(({ source, target }) => [`remap/${source}`, target] as const),
   ]);
 
-/** Where a note lies and how large it is stands beside what it says. */
+/** Return the fields of a note; position and size are apart from its text. */
 function noteFields([id, json]: readonly [string, string]): Fields {
   const note = readNote(`g/${id}`, json);
   return new Map([["text", note?.text ?? json]]);
@@ -75,7 +77,7 @@ const graphFields = (graph: Graph): Fields =>
     ...graph.extra,
   ]);
 
-/** What stood on the card in the rows that say something else now. */
+/** Return the old values of the rows of a card whose values changed, by row. */
 function oldValues(before: Action, after: Action): ReadonlyMap<string, string> {
   const rows = new Map(cardRows(before.inputs).map(({ name, text }) => [name, text]));
   const found = cardRows(after.inputs).flatMap(({ name, text }) => {
@@ -108,7 +110,10 @@ interface BeforeAfter<T> {
   readonly after: T | undefined;
 }
 
-/** Those of both sides, the later ones in their order first; what is the same object is left out. */
+/**
+ * Return pairs of both sides, in the order of the later one; pairs of identical objects are left
+ * out.
+ */
 function pairs<T>(
   before: readonly T[],
   after: readonly T[],
@@ -143,7 +148,9 @@ function thingOf<T>(
   return { key, thing, change: changeOf(pair), looks: both && lines.length === 0, name, lines };
 }
 
-/** What two states of an action differ in; null where that is nothing, or only looks. */
+/**
+ * Return the fields in which two states of an action differ; null if none do, or only its looks.
+ */
 export function changedAction(before: Action, after: Action): FieldChange[] | null {
   const fields = isEqual(before, after)
     ? []
@@ -151,7 +158,7 @@ export function changedAction(before: Action, after: Action): FieldChange[] | nu
   return fields.length === 0 ? null : fields;
 }
 
-/** The same of an arrow. */
+/** Return the fields in which two states of an arrow differ; null if none do, or only its looks. */
 export function changedRelation(before: Relation, after: Relation): FieldChange[] | null {
   const fields = isEqual(before, after)
     ? []

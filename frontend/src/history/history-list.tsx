@@ -1,4 +1,7 @@
-/** What was done to a document, newest first: who, when, what it changed, and the way back to it. */
+/**
+ * History of a document, newest first: who changed what and when, and a button to restore each
+ * moment.
+ */
 import { Button, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconRestore } from "@tabler/icons-react";

@@ -43,7 +43,7 @@ function onArrowKeys(event: KeyboardEvent<HTMLElement>): void {
   all[at + step]?.focus();
 }
 
-/** What is said of an entry besides what it changed. */
+/** Return words for an entry beside its changes, such as restoring a moment. */
 function didWords(entry: HistoryEntry, entries: readonly HistoryEntry[], now: number) {
   if (entry.kind === "edited") return entry.changes === undefined ? "changed it" : null;
   if (entry.reverted) return `undid what ${isolated(entry.reverted.author.name || "somebody")} did`;
@@ -212,7 +212,7 @@ const timeOf = (text: string | null): string => {
 
 interface VersionProps {
   entry: HistoryEntry;
-  /** What the version is called: its label, or its number. */
+  /** Name of the version: its label, or its number. */
   name: string;
   chosen: boolean;
   onChoose: () => void;

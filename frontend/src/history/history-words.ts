@@ -1,4 +1,4 @@
-/** What was done to a document, in a few words. Pure. */
+/** Describes entries of the history of a document in a few words. Pure. */
 
 import { authorName, type VersionAuthor } from "../api/graphs";
 import type { HistoryEntry } from "../api/history";
@@ -58,7 +58,10 @@ export function momentBefore({ kind, seq, from_seq }: HistoryEntry): number | nu
   return before >= 1 ? before : null;
 }
 
-/** Those that lead to another moment than the one after which they come: only they can be gone back to. */
+/**
+ * Return whether an entry leads to another moment than the one before it: only then it can be
+ * restored.
+ */
 export function isWayBack(entry: HistoryEntry, now: number): boolean {
   return entry.seq >= 1 && entry.seq < now;
 }

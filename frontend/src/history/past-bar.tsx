@@ -23,14 +23,14 @@ import { EarlierCanvas, type SideBySide, sideBySide } from "./side-by-side";
 import { useTimeline } from "./timeline";
 
 export interface SeenPast {
-  /** As it was; without what is drawn of another moment. */
+  /** The graph at that moment, without parts that are drawn from another moment. */
   readonly graph: Graph;
-  /** What differs from the moment with which it is compared. */
+  /** Differences from the moment that it is compared with; null if it is compared with none. */
   readonly changes: GraphChanges | null;
-  /** What the canvas shows: what is gone since then, too, unless the canvas beside it shows that. */
+  /** The graph on the canvas; also removed parts, unless a second canvas beside it shows them. */
   readonly drawn: Graph;
   readonly marks: ChangeMarks | null;
-  /** What is beside it; null where one canvas shows all. */
+  /** The second canvas beside it; null if one canvas shows all. */
   readonly side: SideBySide | null;
 }
 
@@ -46,7 +46,7 @@ function seenPast(
   return { graph, changes, drawn: shown, marks, side };
 }
 
-/** Nothing that was begun on the graph as it is now goes on over the past. */
+/** Close overlays and the dry-run of the present graph while the past is shown. */
 function useNothingOpen({ openOverlay, dryRun }: EditorContext): void {
   // biome-ignore lint/correctness/useExhaustiveDependencies: once, when one begins to look back
   useEffect(() => {
@@ -61,9 +61,11 @@ const VIEWS = [
 ] as const;
 
 interface Props {
-  /** What the canvas shows now. */
+  /** The moment that the canvas shows now. */
   drawn: PastPlace;
-  /** What was asked for last: a step costs this bar alone until its graph is there. */
+  /**
+   * The moment that was asked for last: until its graph is loaded, a step renders this bar only.
+   */
   wanted: { subscribe: (listener: () => void) => () => void; now: () => PastPlace | null };
   show: (seen: SeenPast, place: PastPlace) => void;
   /** The two moments stand beside each other. */
@@ -145,7 +147,7 @@ export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
   );
 }
 
-/** That what runs is nothing that was ever published here. */
+/** Says that a run executes a graph that was never published here. */
 function Foreign({ run, running }: { run: string; running: ReturnType<typeof useRunning> }) {
   const words = running.find((each) => each.run === run)?.words ?? "a run that is over";
   return (

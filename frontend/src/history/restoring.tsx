@@ -1,4 +1,4 @@
-/** What can be made of the moment that is looked at: the graph again, or another one. */
+/** Offers to restore the moment on screen, or to make a new graph of it. */
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCopyPlus, IconRestore } from "@tabler/icons-react";
@@ -65,7 +65,7 @@ export function PastWays({ versions }: { versions: readonly Version[] }) {
   );
 }
 
-/** What a key of the document is called: an action, an arrow, a note. */
+/** Return the name of the action, arrow or note with a key of the document. */
 function thingName(graph: Graph, key: string): string {
   const ends = endsOf(key);
   if (ends !== null)
@@ -77,7 +77,7 @@ function thingName(graph: Graph, key: string): string {
 
 const MOST = 4; // things that are named
 
-/** What was left as it is, since others have set it since. */
+/** Return words for the parts that stayed as they are because other people changed them since. */
 export function leftWords(graph: Graph, left: readonly string[]): string {
   if (left.length === 0) return "";
   const names = left.slice(0, MOST).map((key) => thingName(graph, key));

@@ -11,7 +11,7 @@ interface ScrubberMark {
   readonly at: number;
   readonly kind: "sitting" | "version" | "run";
   readonly words: string;
-  /** Of a sitting: whose. */
+  /** Author of a sitting. */
   readonly author: string | null;
 }
 

@@ -100,9 +100,9 @@ export interface SideBySide {
   readonly Canvas: ComponentType<EarlierCanvasProps>;
   /** On the earlier one, and on the later one. */
   readonly marks: readonly [earlier: ChangeMarks, later: ChangeMarks];
-  /** Where everything stands that is seen on one of them. */
+  /** Return the positions of all things that are seen on one of the two canvases. */
   placesWith(later: Positions): Positions;
-  /** Which moments these are. */
+  /** Words for the two moments. */
   readonly words: readonly [earlier: string, later: string];
 }
 
@@ -127,7 +127,10 @@ export function sideBySide(
 
 const NO_VALUES: ReadonlyMap<string, string> = new Map();
 
-/** What came is on the later one only, what went on the earlier one, what changed on both. */
+/**
+ * Return the marks of one canvas: added things on the later one, removed ones on the earlier one,
+ * changed ones on both.
+ */
 export function sideMarks(marks: ChangeMarks, side: "earlier" | "later"): ChangeMarks {
   const other: ChangeMark["change"] = side === "earlier" ? "added" : "removed";
   const found = [...marks].flatMap(([key, mark]): [string, ChangeMark][] => {

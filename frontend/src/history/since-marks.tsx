@@ -116,7 +116,10 @@ function MarksOfNow() {
   return good === null ? null : <Marks {...good} />;
 }
 
-/** Nothing is marked while something else than the graph as it is is shown. */
+/**
+ * Marks changes since the last good run, while the present graph is on screen and no dry-run goes
+ * on.
+ */
 export function SinceMarks() {
   const { past, dryRun } = useEditorContext();
   const [on] = useSinceOn();
@@ -162,7 +165,7 @@ const MOST = 2; // fields that are told
 
 const ADDED: SinceMark = { change: "added", words: "", fields: [] };
 
-/** As the history calls them. */
+/** Names of fields as the history has them. */
 const FIELDS: ReadonlyMap<string, string> = new Map([
   ["name", ""],
   ["robot", "actor"],

@@ -26,7 +26,7 @@ export function entryKey({ kind, author, at }: HistoryEntry): string {
   return `${kind} ${author.id} ${at}`;
 }
 
-/** Whether two pages tell of the same: an entry may be cut where a page ends. */
+/** Return whether an entry is a part of a known one: an entry may be cut where a page ends. */
 function isPartOf(entry: HistoryEntry, known: HistoryEntry): boolean {
   if (entryKey(entry) === entryKey(known)) return true;
   if (entry.from_seq === undefined || known.from_seq === undefined) return false;
@@ -117,7 +117,7 @@ export interface Timeline {
   readonly runs: readonly ListedRun[];
   /** There are more of them. */
   readonly moreRuns: boolean;
-  /** Those that went well, the last one last. */
+  /** Runs that went well, the last one at the end. */
   readonly goods: readonly GoodRun[];
   readonly lastGood: GoodRun | null;
   readonly isPending: boolean;
@@ -195,7 +195,9 @@ export interface GoodRun {
 
 type EndedRun = Pick<Run, "number" | "version" | "state" | "result">;
 
-/** Those that were started with a version that is known, the last one last. */
+/**
+ * Return the runs that went well and were started with a known version, the last one at the end.
+ */
 export function goodRuns(
   runs: readonly EndedRun[],
   versions: readonly Pick<Version, "id" | "seq">[],

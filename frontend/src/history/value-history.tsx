@@ -24,7 +24,7 @@ interface ByProps {
   color: string;
 }
 
-/** Who set a value, and when; of one that came by a merge, who merged it. */
+/** Names who set a value and when; for a value from a merge also who merged it. */
 export function By({ value, color }: ByProps) {
   const now = useNow(60_000);
   const at = instant(value.at);
@@ -88,7 +88,10 @@ function ValueTable({ field, spans, colorOf, at }: TableProps) {
   );
 }
 
-/** What it can be set back to: what it was at the moment that is looked at, else the value before. */
+/**
+ * Return the value that a field can be set back to: that of the moment on screen, else the one
+ * before.
+ */
 function earlierValue(field: string, spans: readonly ValueSpan[], at: number): ValueSpan | null {
   const now = spans.at(-1);
   if (now === undefined) return null;
@@ -232,7 +235,7 @@ function ValueChart({ spans: all, colorOf, at }: ValueChartProps) {
 
 const FIELDS = ["type", "actor", "description"] as const;
 
-/** Whether this is something that people set by itself: a value, a text, what follows an outcome. */
+/** Return whether a field can be set back alone: a value, a text, or a response to an outcome. */
 export function canSetBack(field: string, value: unknown): boolean {
   if (value === null || value === undefined) return false;
   return /^in\/|^(type|actor|description|required|on_(true|false|error|stopped))$/.test(field);
@@ -251,7 +254,7 @@ function setInput(doc: Y.Doc, key: string, path: string, then: string): boolean 
   );
 }
 
-/** Whether it was done: what it belongs to may be gone. */
+/** Set a field back to an earlier value. Return false if the thing that it belongs to is gone. */
 export function setBack(doc: Y.Doc, of: string, field: string, value: unknown): boolean {
   if (field === "required") return setRequired(doc, of, value !== false);
   if (typeof value !== "string") return false;

@@ -8,11 +8,11 @@ import { runLabel } from "../status/progress";
 
 export interface ValueSpan {
   readonly value: FieldValue;
-  /** As it is told. */
+  /** The value as text. */
   readonly text: string;
   /** Null: it is no number. */
   readonly number: number | null;
-  /** What was started while the field had it, the oldest first. */
+  /** Runs that were started while the field had the value, the oldest first. */
   readonly runs: readonly ListedRun[];
 }
 
@@ -80,7 +80,10 @@ export interface ValueFact {
   readonly words: string;
 }
 
-/** Of each value that something ran with: `5 runs, 4 true, 1 error; 22–25 s`. The newest value first. */
+/**
+ * Return facts about each value that was run with, such as `5 runs, 4 true, 1 error; 22–25 s`,
+ * newest value first.
+ */
 export function factsOf(spans: readonly ValueSpan[]): ValueFact[] {
   const of = new Map<string, ListedRun[]>();
   for (const { text, runs } of [...spans].reverse()) {
@@ -142,7 +145,7 @@ export function blamedValue(field: string, value: unknown): string {
   return text.length > 80 ? `${text.slice(0, 80)}…` : text;
 }
 
-/** What is told: names and values first, what only looks otherwise last. */
+/** Return the fields to show: names and values first, those of looks only last. */
 export function toldFields(fields: readonly FieldBlame[]): FieldBlame[] {
   const rank = ({ field }: FieldBlame) => (field === "" ? 0 : LOOKS.test(field) ? 2 : 1);
   return fields

@@ -64,7 +64,7 @@ interface Props {
   listed: ListedVersion;
   now: number;
   chosen: boolean;
-  /** It is what the graph is now: there is nothing to compare, and no way back. */
+  /** Set for the present graph, which cannot be compared with itself or restored. */
   isNow: boolean;
   link: string;
   mayEdit: boolean;
@@ -160,7 +160,7 @@ export function VersionItem(props: Props) {
 
 const NONE: readonly PinnedGraph[] = [];
 
-/** Whether a name stands for the same thing still. */
+/** Return whether the name of a pinned sub-graph still stands for the same graph. */
 function stateOf({ digest, current_digest }: PinnedGraph): "same" | "changed" | "gone" {
   if (current_digest === null) return "gone";
   return current_digest === digest ? "same" : "changed";
@@ -232,7 +232,7 @@ interface ResultCount {
   readonly count: number;
 }
 
-/** How often its runs ended in which way, the most frequent first. */
+/** Return how often the runs of a version ended in each way, the most frequent first. */
 function resultCounts(runs: readonly ListedRun[], heard: Heard): ResultCount[] {
   const found = new Map<string, ResultCount>();
   for (const run of runs) {

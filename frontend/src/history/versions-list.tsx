@@ -19,7 +19,7 @@ import style from "./versions.module.css";
 
 const PAGE = 50; // versions that are drawn at first
 
-/** Which one is looked at: of two of the same moment the one that was chosen. */
+/** Return the version that is on screen: of two of the same moment, the one that was chosen. */
 function useChosen({ past }: EditorContext, all: readonly ListedVersion[]) {
   const [chosen, setChosen] = useState("");
   const here = all.filter(({ version }) => version.seq === past?.at);
@@ -86,7 +86,7 @@ export function VersionsList({ timeline }: { timeline: Timeline }) {
 const LABEL_LIMIT = 200; // letters
 const NOTE_LIMIT = 4_000;
 
-/** Why what is shown cannot be published now; null when it can. */
+/** Return why the graph on screen cannot be published now; null when it can. */
 function useObstacle(): string | null {
   const { past } = useEditorContext();
   const { state, unsaved, seq } = useThrottledLink();

@@ -34,16 +34,18 @@ async function loadPiece(
   if (steps.length < MOST_STEPS) walk.add(steps, after, upto);
 }
 
-/** Which change is to be loaded next, so that steps from here on need not wait; null: none. */
+/** Return the change to load next, so that steps from here need not wait; null if there is none. */
 function wanted(walk: PastWalk, at: number, newest: number): number | null {
   if (walk.upto < newest && at > walk.upto - NEAR) return walk.upto + 1;
   return walk.from > 0 && at < walk.from + NEAR ? walk.from : null;
 }
 
 export interface PastGraph {
-  /** As it was, or meanwhile what was shown before; null while there is nothing. */
+  /**
+   * The graph at the moment, or the one that was shown before until it is loaded; null at first.
+   */
   readonly graph: Graph | null;
-  /** Whether it is the graph of the moment that was asked for. */
+  /** Set if it is the graph of the moment that was asked for. */
   readonly here: boolean;
   readonly walk: PastWalk | null;
   readonly error: Error | null;
@@ -105,7 +107,7 @@ const told = (value: unknown): unknown => value ?? undefined;
 
 export class PastWalk {
   readonly #kept: SteppedGraph;
-  /** Of all changes with `from < seq <= upto`, in order of time. */
+  /** Changes with `from < seq <= upto`, in order of time. */
   #steps: readonly DocumentStep[] = [];
   #from: number;
   #upto: number;
@@ -171,7 +173,7 @@ export class PastWalk {
     return before?.seq ?? (this.#from < here.seq ? Math.max(1, here.seq - 1) : null);
   }
 
-  /** Who set something last in each action, arrow and note, by id of the person. */
+  /** Return who last changed each action, arrow and note, as ids of people by key. */
   authors(after: number, upto: number): ReadonlyMap<string, string> {
     const found = new Map<string, string>();
     for (const { seq, root, key, author } of this.#steps) {

@@ -1,4 +1,4 @@
-/** Who gave each field of what is selected its value, when, what it was before, and all its values. */
+/** Shows for each field of the selection who set its value, when, and its earlier values. */
 import { Button, Skeleton } from "@mantine/core";
 import { IconRestore } from "@tabler/icons-react";
 import { useState } from "react";

@@ -1,4 +1,4 @@
-/** What an action of the library takes and gives, and the graphs that use it. */
+/** Inputs and outputs of an action of the library, and the graphs that use it. */
 import { Menu } from "@mantine/core";
 import type { ReactElement } from "react";
 import { Link } from "wouter";

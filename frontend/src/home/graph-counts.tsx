@@ -1,10 +1,10 @@
-/** How much of a listed graph is wrong and to fill in: the two numbers that its editor tells. */
+/** Counts of problems and of parts to fill in, for a graph in a list. */
 import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
 import type { GraphSummary } from "../api/graphs";
 import { countWords, type ProblemCounts } from "../graph/problems/problem-kinds";
 import style from "./graph-counts.module.css";
 
-/** As the server counts them; nothing where it does not know. */
+/** Return the counts by the server; zeros if it has none. */
 function countsOfListed({ wrong = 0, to_fill_in = 0 }: GraphSummary): ProblemCounts {
   return { wrong, fillIn: to_fill_in, warnings: 0 };
 }

@@ -1,4 +1,4 @@
-/** What can be done to a graph as a whole: rename, duplicate, export, delete and bring back. */
+/** Menu of a graph: rename, duplicate, export, delete and restore. */
 import { Button, Menu } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconCopy, IconDots, IconPencil, IconShare3, IconTrash } from "@tabler/icons-react";

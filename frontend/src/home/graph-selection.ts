@@ -1,4 +1,4 @@
-/** Which graphs a list shows, and in which order. Pure. */
+/** Filters and sorts lists of graphs. Pure. */
 import type { GraphSummary } from "../api/graphs";
 import { hasEnded } from "../api/run-stop";
 import type { Run } from "../api/runs";

@@ -15,7 +15,7 @@ const DeletedGraphs = lazyPart(() => import("./deleted-graphs").then((part) => p
 interface Props {
   onNew: () => void;
   onImport: () => void;
-  /** What the device has while the list cannot be read. */
+  /** Copies on this device, shown while the list cannot be read. */
   kept: ReactNode;
   /** Before the graphs: what is asked of who comes for the first time. */
   greeting?: ReactNode;

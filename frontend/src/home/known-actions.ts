@@ -1,4 +1,7 @@
-/** What can be added: the actions of the library and what graphs use besides, and graphs; each once. */
+/**
+ * Actions and graphs that can be placed: those of the library, those used in graphs, and graphs,
+ * each once.
+ */
 import { useMemo } from "react";
 import {
   type GraphAsAction,
@@ -87,7 +90,7 @@ export function placeable(
   return { actions: actions.filter((action) => !isGraph(action)), graphs: others };
 }
 
-/** What can be placed in a graph: not the graph itself. */
+/** Return all that can be placed in a graph, without the graph itself. */
 export function usePlaceable(current: string | undefined): Placeable & { ready: boolean } {
   const { actions, ready } = useKnownActions();
   const { data = NO_GRAPHS } = useGraphsAsActions();
@@ -106,7 +109,10 @@ export function usePlaceable(current: string | undefined): Placeable & { ready: 
   }, [actions, data, current, ready]);
 }
 
-/** All of it for a search by name: of an action and a graph of one name the action. */
+/**
+ * Return all placeable things for a search by name; of an action and a graph with one name, only
+ * the action.
+ */
 export function templatesOf({ actions, graphs }: Placeable): NewAction[] {
   const all = [...actions, ...graphs].map(({ template }) => template);
   return [

@@ -1,4 +1,7 @@
-/** What can be placed on the canvas: actions of the library, of graphs and of robots, and graphs. */
+/**
+ * List of things to place on the canvas: actions of the library, of graphs and of robots, and
+ * graphs.
+ */
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconInfoCircle } from "@tabler/icons-react";
@@ -66,7 +69,7 @@ function RobotRow({ has, onPlace }: { has: RobotAction; onPlace: Place }) {
   );
 }
 
-/** What robots have and neither the library nor a graph knows. */
+/** Lists actions that robots have and that neither the library nor a graph knows. */
 function OnRobots({ search, known, onPlace }: RobotsProps) {
   const { byName } = useRobotsKnowledge();
   const found = [...byName.values()].flatMap(([has]) =>
@@ -186,7 +189,7 @@ function About({ known }: { known: KnownAction }) {
 
 interface ActionRowProps {
   known: KnownAction;
-  /** What is said after its parameters. */
+  /** Text after its parameters. */
   note?: string;
   onPlace: (template: NewAction) => void;
 }

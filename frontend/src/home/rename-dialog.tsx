@@ -8,7 +8,7 @@ interface Props {
   graph: GraphSummary;
   opened: boolean;
   onClose: () => void;
-  /** Whether that was done. */
+  /** Renames the graph; returns whether that was done. */
   onRename: (name: string) => Promise<boolean>;
 }
 

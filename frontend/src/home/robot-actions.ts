@@ -11,13 +11,13 @@ import { isolated } from "../words/isolated";
 
 export type IndexedAction = IndexedByRobot["actions"][number];
 
-/** What one robot has under a name. */
+/** Action that one robot has under a name. */
 export interface RobotAction {
   readonly robot: string;
   readonly action: IndexedAction;
 }
 
-/** What each robot knows, where robots can be asked. `unknown`: those that have not told it. */
+/** Actions that each robot has indexed. `unknown`: robots that have not told theirs. */
 export interface RobotsKnowledge {
   readonly robots: readonly string[];
   readonly unknown: readonly string[];
@@ -26,7 +26,7 @@ export interface RobotsKnowledge {
   readonly graphs: ReadonlyMap<string, readonly string[]>;
 }
 
-/** What each robot has told; null: nothing. */
+/** The index of each robot; null if it has told none. */
 type ToldByRobots = readonly { readonly robot: string; readonly indexed: IndexedByRobot | null }[];
 
 export function knowledgeOf(told: ToldByRobots): RobotsKnowledge {
@@ -65,7 +65,7 @@ const parameters = (types: Types) =>
     text: JSON.stringify({ pvf_type: type }),
   }));
 
-/** What a new use of it begins with. */
+/** Return the values with which a new use of the action begins. */
 export function robotTemplate({ name, inputs, outputs }: IndexedAction): NewAction {
   return { name, type: "sync", inputs: parameters(inputs), outputs: parameters(outputs) };
 }
@@ -90,7 +90,7 @@ function sideDifferences(own: readonly TypedParameter[], theirs: Types, what: st
   return [...missing, ...others];
 }
 
-/** How what a robot has differs from what the library says; nothing where it does not. */
+/** Return how the action of a robot differs from that of the library; nothing if it does not. */
 export function robotDifferences(
   own: { readonly inputs: readonly TypedParameter[]; readonly outputs: readonly TypedParameter[] },
   theirs: IndexedAction,

@@ -1,4 +1,4 @@
-/** Why a run did not end well, at the top of its page: each cause with a way to where it shows. */
+/** Causes of a run that did not end well, each with a link to the event that proves it. */
 
 import { Button, Loader, Modal } from "@mantine/core";
 import { IconAlertTriangle, IconHandStop, IconHistory } from "@tabler/icons-react";

@@ -66,7 +66,7 @@ function Said({ found }: { found: Comparison }) {
   );
 }
 
-/** What came of it in one sentence, with what most likely made them part. */
+/** Result of the comparison in one sentence, with the most likely cause of the difference. */
 function Verdict({ found }: { found: Comparison }) {
   const cause = causeSentence(found);
   return (
@@ -285,7 +285,7 @@ function GraphChanges({ found }: { found: Comparison }) {
   );
 }
 
-/** How it ended; that nobody knows how is something else than that nobody saw an end. */
+/** Return how a visit ended; "ended, but nobody knows how" differs from "no end was seen". */
 function outcome(visit: Visit): string {
   return visit.result ?? (visit.until === null ? "went on" : "result unknown");
 }

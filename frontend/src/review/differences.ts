@@ -1,4 +1,7 @@
-/** Where two runs part and why that is likely: differences in words, never between overlapping ranges. Pure. */
+/**
+ * Finds where two runs differ first and the likely cause, in words. Durations differ only if their
+ * ranges do not overlap. Pure.
+ */
 
 import type { ComparedField, ComparedStep, Comparison } from "../api/review";
 import type { Visit } from "../api/runs";
@@ -8,13 +11,13 @@ import { INTO, spaced, wayWords } from "../status/level-places";
 import { visitDuration } from "../status/progress";
 import { isolated } from "../words/isolated";
 
-/** How long something took, ms; `most` is Infinity where nothing bounds it. */
+/** Duration as a range, ms; `most` is Infinity if nothing bounds it. */
 export interface DurationRange {
   readonly least: number;
   readonly most: number;
 }
 
-/** What an action did in one run. */
+/** Summary of an action in one run. */
 export interface ActionSummary {
   /** `true`, `false`, `error`, `stopped`, or `unknown`, in the order of its visits. */
   readonly results: readonly string[];
@@ -24,11 +27,11 @@ export interface ActionSummary {
 
 export interface ComparedAction extends LevelPlaceInWords {
   readonly aid: string | null;
-  /** As the engine told it. */
+  /** Name by which the engine reports the action. */
   readonly name: string;
   /** The action that it is right inside of, as the engine told that. */
   readonly around: string | null;
-  /** Whether others are inside of it. */
+  /** Set if other actions ran inside of it. */
   readonly holds: boolean;
   /** Null: it did not run. */
   readonly a: ActionSummary | null;
@@ -153,7 +156,7 @@ function differenceOf(
 
 const DIFFERS: ReadonlySet<string> = new Set(["result", "only_a", "only_b"]);
 
-/** What is proven to differ, from the parting on. */
+/** Return the proven differences, from the first one on. */
 export function differencesOf(found: Comparison): NumberedDifference[] {
   return found.steps
     .filter(({ relation }) => DIFFERS.has(relation))
@@ -178,7 +181,10 @@ function changedWords({ field, before, after }: ComparedField): string {
   return `its ${isolated(name)} was ${plainValue(after)} instead of ${plainValue(before)}`;
 }
 
-/** What the visit ran with in one run and not in the other, as far as engines told it. */
+/**
+ * Return the parameter values that differ between the two visits, as far as engines reported them;
+ * null if none do.
+ */
 function ranWithOther({ a, b }: ComparedStep): string | null {
   const [before, after] = [a?.inputs, b?.inputs];
   if (!before || !after) return null;
@@ -188,11 +194,16 @@ function ranWithOther({ a, b }: ComparedStep): string | null {
   return `it ran with ${name.replaceAll("::", " / ")} ${is} instead of ${was}`;
 }
 
-/** What decides whether an arrow runs its child: neither its waypoints nor its place in a list. */
+/**
+ * Fields of a relation that decide whether it runs the next action; waypoints and its position in a
+ * list do not.
+ */
 const ARROW_DECIDES = /^(on_|required$|remap\/)/;
 
-/** What most likely made the runs part: what happened on the way (what a person did first), else the
- *  nearest thing that differed before. Null: nothing known did. */
+/**
+ * Return the most likely cause of the difference: an event on the way (a person's first), else the
+ * nearest earlier difference; null if none is known.
+ */
 export function likelyCause(found: Comparison): string | null {
   if (found.because) return found.because.text;
   const { parting } = found;

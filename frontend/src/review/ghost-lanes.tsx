@@ -15,7 +15,10 @@ import style from "./ghost-lanes.module.css";
 
 type Alignment = "start" | "parting";
 
-/** When each run counts as begun: at its start, or so that both reach their first difference together. */
+/**
+ * Return the zero point of each run: its start, or the time that puts the first difference of both
+ * at the same place.
+ */
 function beginnings(a: Run, b: Run, parting: ComparedStep | null, by: Alignment) {
   const [startA, startB] = [instant(a.started_at) ?? 0, instant(b.started_at) ?? 0];
   const [from, to] = [parting?.a, parting?.b];
@@ -25,7 +28,10 @@ function beginnings(a: Run, b: Run, parting: ComparedStep | null, by: Alignment)
   return { a: at - lead, b: bt - lead };
 }
 
-/** When the runs part, ms: where the second run, or else the first one, ended that step or began it. */
+/**
+ * Return when the runs differ first, ms: the end or begin of that step in the second run, else in
+ * the first.
+ */
 function partingAt(step: ComparedStep | null, begun: { a: number; b: number }): number | null {
   const visit = step?.b ?? step?.a;
   if (!step || !visit) return null;
@@ -140,7 +146,7 @@ function spanOf(steps: readonly ComparedStep[], begun: { a: number; b: number })
   return wholeSpan(Math.max(0, ...ends) * 1.04);
 }
 
-/** Whether a step is of this action, or of one inside of it. */
+/** Return whether a step belongs to this action or to one inside of it. */
 function leadsTo({ levels, label }: ComparedAction, step: ComparedStep): boolean {
   const way = [...step.levels, step.name];
   return [...levels, label].every((each, depth) => way[depth] === each);

@@ -85,7 +85,7 @@ export interface LevelCursor {
   graphs: readonly SentLevel[];
   /** The graph that is shown. */
   graph: Graph;
-  /** Where it is in the run; null: it is the outermost one. */
+  /** Position of the graph in the run; null for the outermost graph. */
   inside: GraphInRun | null;
   /** The chosen action of that graph; and as the run calls it. */
   key: Key | null;
@@ -140,7 +140,7 @@ export function useLevel(run: Run, search: string): LevelCursor {
 
 export interface SentLevel {
   readonly graph: Graph;
-  /** Of the graph that it is a version of. */
+  /** Id of the graph that this is a version of. */
   readonly id: string | null;
 }
 
@@ -151,7 +151,7 @@ export interface SentLevels {
   readonly inside: (name: string) => SentLevel | null;
 }
 
-/** What was sent is read when it is asked for, each graph once. */
+/** Return the graphs that were sent with a run; each one is parsed once, when it is asked for. */
 export function sentLevels({ umrf, graph: id, subgraphs = [] }: Run): SentLevels {
   const sent = new Map(subgraphs.map((each) => [each.name, each]));
   const known = new Map<string, SentLevel>();

@@ -21,7 +21,7 @@ import style from "./replay-controls.module.css";
 interface Props {
   replay: ReplayCursor;
   goes: boolean;
-  /** What can be done at the moment where it stands. */
+  /** Controls for the moment at which the replay stands. */
   children?: ReactNode;
 }
 

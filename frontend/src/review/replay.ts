@@ -54,7 +54,7 @@ function useAskedAgain(newest: Run | null, asked: boolean): void {
   }, [goes, asked, client, id]);
 }
 
-/** What plays the replay, with the run as it was when its replay began. */
+/** Return the player of the replay, with the run as it was when the replay began. */
 function usePlayer(
   data: ReturnType<typeof useReplayData>["data"],
   newest: Run | null,
@@ -232,7 +232,7 @@ export function framesBy(frames: readonly Frame[], at: number): number {
   return low;
 }
 
-/** Whether a person would see anything change. */
+/** Return whether a frame changes anything that a person can see. */
 export function shows(frame: Frame): boolean {
   return (
     Object.keys(frame.head ?? {}).length > 0 ||
@@ -265,7 +265,7 @@ export class ReplayPlayer {
     return this.after(framesBy(this.replay.frames, time));
   }
 
-  /** When the next change that can be seen happens; null when none is in this page. */
+  /** Return the time of the next visible change; null if this page has none. */
   next(time: number): number | null {
     const { frames } = this.replay;
     for (let i = framesBy(frames, time); i < frames.length; i += 1) {
@@ -275,7 +275,7 @@ export class ReplayPlayer {
     return null;
   }
 
-  /** When the last visible change before `time` happened; null when none is in this page. */
+  /** Return the time of the last visible change before `time`; null if this page has none. */
   previous(time: number): number | null {
     const { frames } = this.replay;
     for (let i = framesBy(frames, time - 1) - 1; i >= 0; i -= 1) {

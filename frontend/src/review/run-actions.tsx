@@ -1,4 +1,4 @@
-/** What can be done with a run, each as a button of its own: compare, export, run again, dry-run. */
+/** Buttons for a run: compare, export, run again, dry-run. */
 import { Button, Menu } from "@mantine/core";
 import {
   IconArrowsDiff,

@@ -1,4 +1,4 @@
-/** What a run tells is told in the order in which it can have happened. */
+/** Events of a run are listed in an order in which they can have happened. */
 import { expect, test } from "vitest";
 import type { Run } from "../api/runs";
 import { eventLines } from "./run-events";

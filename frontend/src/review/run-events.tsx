@@ -1,4 +1,4 @@
-/** What happened in a run, in order, in sentences. */
+/** Events of a run, in order, in sentences. */
 import { Button, TextInput } from "@mantine/core";
 import { IconDownload, IconRefresh } from "@tabler/icons-react";
 import { useMemo, useState } from "react";
@@ -29,7 +29,10 @@ interface Happening {
   /** The action as the run calls it. */
   fact: string | null;
   text: string;
-  /** Of what happens at one moment: what is inside ends before what it is inside of, and begins after. */
+  /**
+   * Order among events of one moment: an inner action ends before its outer one, and begins after
+   * it.
+   */
   order?: number;
 }
 
@@ -50,7 +53,7 @@ const TOLD: ReadonlySet<string> = new Set([
   "run.answered.v1",
 ]);
 
-/** Everything that the run tells, oldest first; nothing comes before its start. */
+/** Return all events of a run as lines, oldest first; none stands before the start of the run. */
 export function eventLines(
   run: Run,
   version: string,
@@ -133,7 +136,7 @@ interface Props {
   selected: string | null;
   onPick: (fact: string | null) => void;
   marks: readonly ReplayMark[];
-  /** Where the replay stands, ms; null at the end. */
+  /** The moment at which the replay stands, ms; null at the end. */
   at: number | null;
   onSeek: (at: number) => void;
 }

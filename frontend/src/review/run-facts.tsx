@@ -1,4 +1,4 @@
-/** What a run was, in a table. */
+/** Facts, notes and labels of a run. */
 
 import { ActionIcon, Button, TagsInput, Textarea } from "@mantine/core";
 import { notifications } from "@mantine/notifications";

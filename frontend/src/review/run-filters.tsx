@@ -1,4 +1,4 @@
-/** Which runs the list shows: search, choices, and filters that somebody saved on this device. */
+/** Filters of the list of runs: search, choices, and filters that a person saved on this device. */
 import { ActionIcon, Button, Menu, Popover, Select, Stack, TextInput } from "@mantine/core";
 import { useDebouncedCallback, useLocalStorage } from "@mantine/hooks";
 import {
@@ -18,7 +18,7 @@ import style from "./runs-page.module.css";
 
 type Ending = Pick<RunFilter, "state" | "failed">;
 
-/** How runs stand, by what people ask for. */
+/** Choices of run states, in the order in which people ask for them. */
 const ENDINGS: { value: string; label: string; asks: Ending }[] = [
   { value: "all", label: "All", asks: { state: "", failed: "" } },
   {
@@ -50,7 +50,7 @@ interface Props {
   engines: readonly string[];
 }
 
-/** What a filter asks for, in words; the name under which it is saved unless another is given. */
+/** Return a filter in words; its default name when it is saved. */
 function filterWords(filter: RunFilter): string {
   const ending = ENDINGS.find((each) => each.value === endingOf(filter))?.label ?? filter.state;
   const words = [

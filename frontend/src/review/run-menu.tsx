@@ -294,7 +294,7 @@ interface Injected {
 
 export interface Repeated {
   run: string;
-  /** What the run did not tell, so that the script had to choose. */
+  /** Facts that the run did not tell, for which the script had to choose. */
   doubts: readonly { action: string; text: string }[];
 }
 

@@ -99,7 +99,7 @@ function crumbsOf(run: Run): Crumb[] {
   ];
 }
 
-/** How the run goes, or went at the moment that is shown. */
+/** State of the run, now or at the moment that is shown. */
 function RunStatus({ newest, run, past }: RunStatusProps) {
   const now = useRunStatus(run);
   const { tone, word } = runLabel(run);
@@ -115,7 +115,7 @@ function RunStatus({ newest, run, past }: RunStatusProps) {
 
 interface RunStatusProps {
   newest: Run;
-  /** As it was at the moment that is shown. */
+  /** The run at the moment that is shown. */
   run: Run;
   past: boolean;
 }
@@ -131,7 +131,7 @@ interface AboutRunProps {
   onSelect: (fact: string | null) => void;
 }
 
-/** What was said, with which values, by whom: beside the canvas. */
+/** Parameters, events, notes and raw messages of a run, beside the canvas. */
 function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: AboutRunProps) {
   const by = useCurrentName(newest.author);
   return (

@@ -12,7 +12,7 @@ import style from "./run-print.module.css";
 
 const exact = (at: number) => `${clock(at)}.${Math.floor((at % 1000) / 100)}`;
 
-/** When something was: between two proofs, or later than one of them. */
+/** Return when an event happened: between two proofs, or after one of them. */
 export function rangeText(from: string | null, to: string | null): string {
   const [least, most] = [instant(from), instant(to)];
   if (least === null) return most === null ? "not known" : `by ${exact(most)}`;

@@ -1,4 +1,4 @@
-/** What ran: newest first, with who, when, how long and how it ended. */
+/** List of runs, newest first: who started them, when, how long they took and how they ended. */
 
 import { ActionIcon, Button, Checkbox, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
@@ -223,7 +223,7 @@ interface NoRunsProps {
   onChanged: () => void;
 }
 
-/** Why the list is empty. */
+/** Explains why the list is empty. */
 function NoRuns({ runner, failed, isKnown, filtered, isNew, onChanged }: NoRunsProps) {
   if (failed !== null) {
     return (

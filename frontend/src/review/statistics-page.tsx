@@ -63,8 +63,10 @@ function ResultBar({ action }: { action: ActionStatistics }) {
   );
 }
 
-/** Where the median may lie as a bar, from its upper bound on to that of the 90th percentile as a line,
- * the upper bound of the longest as a tick. */
+/**
+ * Shows the range of the median as a bar, up to the 90th percentile as a line, and the longest as a
+ * tick.
+ */
 function SpreadBar({ action, most }: { action: ActionStatistics; most: number }) {
   const { p50, p90, longest } = action.spans;
   const share = (s: number) => `${Math.min(100, (s / most) * 100)}%`;
@@ -84,7 +86,7 @@ function SpreadBar({ action, most }: { action: ActionStatistics; most: number })
   );
 }
 
-/** What ran inside stands behind the actions that it was inside of. */
+/** Names the actions around an action, outermost first, and then the action. */
 function ActionWay({ action: { levels, name } }: { action: ActionStatistics }) {
   return (
     <bdi>

@@ -24,7 +24,7 @@ interface Props {
 
 type Sign = { good: boolean; text: string };
 
-/** What a person should know before trusting an answer or starting something. */
+/** Return the warnings that a person should know before trusting a robot or starting a run. */
 function robotSigns(robot: Robot): Sign[] {
   if (robot.state === "no_link") return [];
   const signs: Sign[] = [];

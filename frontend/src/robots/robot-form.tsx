@@ -87,7 +87,7 @@ interface ReachProps {
   onChange: (robot: Registration) => void;
 }
 
-/** Where its engine is found, and what is known of it. */
+/** Fields for the domain and topics of the engine of a robot, with what is known of them. */
 function Reach({ robot, errorOf, onChange }: ReachProps) {
   return (
     <Stack gap="md">

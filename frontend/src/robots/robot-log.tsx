@@ -31,7 +31,7 @@ const BECAME: Readonly<Record<string, string>> = {
   restarted: "The engine was restarted",
 };
 
-/** Which files somebody wrote for it, and what became of others. */
+/** Return words about the files that were written for a robot, or about the reason why not. */
 function writtenText({ sender, files, why }: RobotLogLine): string {
   const each = files.map(
     ({ graph, path, kept }) => `${isolated(graph)} (${path}${kept ? `; before: ${kept}` : ""})`,
@@ -63,7 +63,7 @@ function robotLogText(told: RobotLogLine): string {
   }
 }
 
-/** What a command of somebody else did to a run from here. */
+/** Shows the effect of a foreign command on a run from here. */
 function Effect({ told }: { told: RobotLogLine }) {
   if (told.run === null) return null;
   const stopped = told.command === "start" || told.command === "stop";

@@ -1,4 +1,4 @@
-/** What runs on a robot: runs from here, and graphs that somebody else started. */
+/** Lists what a robot runs: runs from here, and graphs that other programs started. */
 
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";

@@ -1,4 +1,4 @@
-/** Whether the page hears the runner, and how old what it shows of a run is, in words. */
+/** Words for the connection to the runner, and for the age of what the page shows of a run. */
 
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
 import { useLive, useRunSeenAt } from "../api/page-link";

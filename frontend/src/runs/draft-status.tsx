@@ -1,4 +1,4 @@
-/** Whether what runs is what is on screen, in words; where it is not, the way to send it. */
+/** Says whether the graph on screen is the one that runs, and offers to send it if it is not. */
 
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
@@ -22,11 +22,11 @@ interface Props {
   seq: number;
   /** The name of the moment on screen. */
   settle: () => Promise<number>;
-  /** Why this moment cannot be sent; null when it can. */
+  /** The reason why this moment cannot be sent; null when it can. */
   obstacle: string | null;
 }
 
-/** What was sent is certain also while nobody knows whether it runs. */
+/** Return the words; the graph that was sent is certain even if the state of the run is unknown. */
 function words(differs: boolean, known: boolean): string {
   if (differs) return known ? "Graph differs from running" : "Graph differs from sent";
   return known ? "Running" : "Sent";

@@ -27,10 +27,10 @@ interface Props {
   obstacle: string | null;
 }
 
-/** What somebody looks at before it is sent: exactly that goes, whatever others do meanwhile. */
+/** The graph that a person looked at: exactly this is sent, whatever others change meanwhile. */
 interface LookedAt {
   readonly seq: number;
-  /** Of the run, then: from which the differences are. */
+  /** The version that the run had then; differences are counted from it. */
   readonly version: string | null;
   readonly label: string;
   readonly found: readonly MeaningDifference[];
@@ -40,7 +40,7 @@ const SIGNS = { added: IconPlus, removed: IconMinus, changed: IconPencil } as co
 const MOST = 40; // differences that are listed
 const PATIENCE = 10_000; // ms for the graph as it was at the moment that is sent
 
-/** Why a running graph cannot be changed; null when it can. */
+/** Return why a running graph cannot be changed; null when it can. */
 function modifyObstacle(run: Run, engine: Robot | undefined, obstacle: string | null) {
   const where = run.simulated ? "the simulator" : run.engine;
   if (run.state !== "running" && run.state !== "paused") return `Run ${run.number} is ${run.state}`;
@@ -104,7 +104,7 @@ async function sent(runner: string, run: Run, seq: number, onVersion: () => void
 interface DialogProps {
   run: Run;
   asking: LookedAt;
-  /** Why it cannot be sent now; null when it can. */
+  /** The reason why it cannot be sent now; null when it can. */
   obstacle: string | null;
   onClose: () => void;
 }

@@ -1,4 +1,4 @@
-/** How long something took is told no more exactly than it was seen. */
+/** Durations are shown no more exactly than they were observed. */
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import { boundsText, durationText } from "./durations";

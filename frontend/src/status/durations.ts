@@ -1,4 +1,4 @@
-/** How long something took, in words: exactly, or between two bounds, which are never told closer. */
+/** Durations in words: exact, or between two bounds. */
 
 import type { DurationBounds } from "../api/runs";
 import { duration } from "../ui/times";
@@ -42,7 +42,7 @@ export function durationText(progress: Pick<Progress, "took" | "atMost">): strin
   });
 }
 
-/** The same beside a word of state. */
+/** Return the duration as a second part of a state label. */
 export function durationLabel(progress: Pick<Progress, "took" | "atMost">): { more?: string } {
   const words = durationText(progress);
   return words === null ? {} : { more: words };

@@ -1,8 +1,8 @@
-/** Where each fact of a run belongs: an engine tells what runs inside as `OUTER__NAME__ID/ACTION`. Pure.
+/** Assigns the facts of a run to its levels: an engine names actions of sub-graphs `OUTER__NAME__ID/ACTION`. Pure.
  * The runner places by the same rule (docs/decisions/073-a-run-by-its-levels.md). */
 import type { Run } from "../api/runs";
 
-/** Of an action in a run. */
+/** Position of an action in the hierarchy of a run. */
 export interface LevelPlace {
   /** The actions that it is inside of, outermost first, by their full names. */
   readonly levels: readonly string[];
@@ -12,7 +12,7 @@ export interface LevelPlace {
   readonly known: boolean;
 }
 
-/** How an engine calls the graph that an action of `graph` stands for. */
+/** Return the engine's name of the sub-graph that an action of `graph` stands for. */
 function partOf(graph: string, action: string): string {
   const at = action.lastIndexOf("_");
   return `${graph}__${action.slice(0, Math.max(0, at))}__${action.slice(at + 1)}`;
@@ -71,7 +71,7 @@ interface PlacesOfGraph {
 }
 const lastPlaces = new WeakMap<object, PlacesOfGraph>();
 
-/** Those of all actions of a run; the same object again for the same actions. */
+/** Return the positions of all actions of a run; the same object again for the same actions. */
 export function placesOf(run: Run): ReadonlyMap<string, LevelPlace> {
   const actions = run.actions ?? {};
   const before = lastPlaces.get(actions);
@@ -85,7 +85,10 @@ export function placesOf(run: Run): ReadonlyMap<string, LevelPlace> {
 /** Between the levels, as people read them. */
 export const INTO = " › ";
 
-/** How a run calls the last of a way of actions, each inside of the one before. */
+/**
+ * Return the name by which a run reports the last action of a way, each action inside of the one
+ * before.
+ */
 export function factOf(graph: string, way: readonly string[]): string {
   const [last = "", ...above] = [...way].reverse();
   if (above.length === 0) return last;

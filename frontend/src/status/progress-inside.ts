@@ -1,4 +1,7 @@
-/** What is said of a graph that runs inside of another: its actions are told by the names of all levels. Pure. */
+/**
+ * Progress of a graph that runs inside of another: a run reports its actions by the names of all
+ * levels. Pure.
+ */
 
 import { useRef } from "react";
 import type { Run } from "../api/runs";
@@ -58,7 +61,7 @@ export function progressInside(
   return found;
 }
 
-/** Whether a run has anything of it. */
+/** Return whether a run reports any action of the level. */
 export function isInRun(run: Run, names: readonly string[]): boolean {
   return [...placesOf(run).values()].some(({ levels }) => isThere(levels, { names }));
 }

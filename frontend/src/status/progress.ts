@@ -1,4 +1,4 @@
-/** What can be said of an action of a run, and of the run, in one word and one tone. */
+/** State of an action of a run, and of the run, in one word and one tone. */
 import { MOVES } from "../api/run-stop";
 import type { ActionRun, Run, Visit } from "../api/runs";
 import { clock } from "../ui/times";
@@ -11,16 +11,18 @@ export interface Progress {
   name?: string;
   tone: Tone;
   word: string;
-  /** When the present visit began, ms; null when none goes on. */
+  /** Begin of the present visit, ms; null if none goes on. */
   since: number | null;
-  /** How long the last visit took at least, ms; null when none ended. */
+  /** Lower bound of the duration of the last visit, ms; null if none ended. */
   took: number | null;
-  /** How long it took at most, ms, where its ends were not seen exactly (Infinity: its code may go on
-   * still); null where they were. */
+  /**
+   * Upper bound of the duration, ms, if its ends were not seen exactly (Infinity: its code may
+   * still run); null if they were.
+   */
   atMost: number | null;
-  /** How often it ran, as far as is known. */
+  /** Number of visits, as far as known. */
   visits: number;
-  /** It may have run more often: an engine is not seen at every moment. */
+  /** Set if there may have been more visits: an engine is not seen at every moment. */
   atLeast?: boolean;
   inferred: boolean;
   /** The values with which the last visit ran, as the engine reported them: JSON texts by flat name. */
@@ -84,7 +86,10 @@ function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Ton
   }
 }
 
-/** How long a visit took at most; null where its ends are known exactly, and while it goes on. */
+/**
+ * Return the upper bound of the duration of a visit; null if its ends are known exactly, and while
+ * it goes on.
+ */
 export function visitDurationBound(visit: Visit): number | null {
   const [from, until] = [time(visit.from), time(visit.until)];
   const [before, after] = [time(visit.not_before), time(visit.not_after)];
@@ -93,7 +98,7 @@ export function visitDurationBound(visit: Visit): number | null {
   return before === from && until === after ? null : after - before;
 }
 
-/** How long a visit took, at least and at most, ms. */
+/** Return the lower and upper bound of the duration of a visit, ms. */
 export function visitDuration(visit: Visit): Pick<Progress, "took" | "atMost"> {
   const [from, until] = [visitBegin(visit), visitEnd(visit)];
   const took = from !== null && until !== null ? Math.max(0, until - from) : null;
@@ -120,13 +125,13 @@ export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progre
   };
 }
 
-/** How often an action ran; "" where it ran once for certain, or was not seen to run. */
+/** Return the number of visits in words; "" for exactly one, or if none was seen. */
 export function visitsText({ visits, atLeast }: Pick<Progress, "visits" | "atLeast">): string {
   if (atLeast) return visits > 0 ? `≥ ${visits}×` : "";
   return visits > 1 ? `${visits}×` : "";
 }
 
-/** What was said of an action last, while nothing about it or its run changed. */
+/** The last progress of each action, reused until the action or its run changes. */
 const lastSaid = new WeakMap<ActionRun, { key: string; progress: Progress }>();
 
 export function progressOfAction(

@@ -1,4 +1,4 @@
-/** How a run stands at this moment, wherever it is listed: nobody knows while the runner is not heard. */
+/** State of a run at this moment, wherever it is listed: unknown while the runner is not heard. */
 
 import type { LiveState } from "../api/live-socket";
 import { useLive } from "../api/page-link";
@@ -16,7 +16,7 @@ export function runStatus(run: Run, { link, since }: Heard): { tone: Tone; word:
   return runLabel(run);
 }
 
-/** The same; of an end also who or what brought it. */
+/** Return the state of a run; for an end also who or what caused it. */
 export function useRunStatus(run: Run): { tone: Tone; word: string } {
   const { now } = useLive();
   const { tone, word } = runStatus(run, now);

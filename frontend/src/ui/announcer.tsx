@@ -1,4 +1,4 @@
-/** What happens, said to those who do not see it: a polite live region, never a flood. */
+/** Announces events to screen readers by a polite live region, at a limited rate. */
 
 import { useEffect, useState } from "react";
 import { tick } from "../clock/server-clock";
@@ -21,7 +21,7 @@ export class Announcer {
     this.#timer = setTimeout(() => this.#flush(), wait);
   }
 
-  /** Who speaks it. Answers how to stop. */
+  /** Subscribe a listener that speaks the texts. Return the function that unsubscribes it. */
   onSay(listener: (text: string) => void): () => void {
     this.#listener = listener;
     return () => {

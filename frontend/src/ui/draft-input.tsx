@@ -12,12 +12,12 @@ interface Props extends DraftOptions {
   rightSection?: TextInputProps["rightSection"];
   rightSectionWidth?: number;
   leftSection?: TextInputProps["leftSection"];
-  /** Where the label is no text. */
+  /** Name for screen readers if the label is no text. */
   ariaLabel?: string;
   disabled?: boolean;
   autoFocus?: boolean;
   inputMode?: "decimal" | "text";
-  /** Of a field of several lines. */
+  /** Element of a field with several lines. */
   area?: React.RefObject<HTMLTextAreaElement | null>;
 }
 
@@ -73,7 +73,7 @@ export function DraftInput(props: Props) {
 
 interface ChoiceProps extends Omit<DraftOptions, "onLeaving"> {
   label: string;
-  /** What others have written, to choose from. */
+  /** Values to choose from, which other people have written. */
   data: readonly string[];
   placeholder?: string;
   leftSection?: TextInputProps["leftSection"];

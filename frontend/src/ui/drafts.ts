@@ -21,7 +21,7 @@ interface PendingDraft {
   readonly write: (() => void) | null;
 }
 
-/** How many drafts write themselves soon, and how many wait for their person. */
+/** Counts of drafts that will be written soon, and of drafts that wait for their person. */
 export interface DraftCounts {
   readonly writing: number;
   readonly waiting: number;
@@ -50,7 +50,7 @@ class PendingDrafts {
   #losses = new Set<(lost: LostDraft) => void>();
   #watch: AbortController | null = null;
 
-  /** The same object until a count changes. */
+  /** Return the counts; the same object until a count changes. */
   readonly counts = (): DraftCounts => this.#counts;
 
   readonly onChange = (listener: Listener): Listener => {
@@ -157,7 +157,7 @@ class KeptTexts {
     return this.#all().get(key) ?? "";
   }
 
-  /** How many texts are kept; those that cannot be are among `pendingDrafts`. */
+  /** Return how many texts are kept; those that cannot be stored are among `pendingDrafts`. */
   count(scope: string): number {
     const keys = [...this.#all().keys()].filter((key) => key.startsWith(scope));
     return keys.filter((key) => !this.#unstored.has(key)).length;
@@ -190,7 +190,7 @@ export function useKeptText(key: string): readonly [string, (text: string) => vo
   return [text, useCallback((next: string) => keptTexts.set(key, next), [key])];
 }
 
-/** How many texts of a person wait in a graph. */
+/** Return how many texts of a person wait in a graph. */
 export function useWaitingTexts(scope: string): number {
   return useSyncExternalStore(keptTexts.onChange, () => keptTexts.count(scope));
 }
@@ -203,9 +203,9 @@ export const DraftOwnerContext = createContext<string | null>(null);
 export interface DraftOptions {
   /** The key of what the field belongs to, where no `DraftOwnerContext` tells it. */
   readonly of?: string;
-  /** What is written now. */
+  /** The value that is written now. */
   readonly value: string;
-  /** What is wrong with a draft; null when it fits. */
+  /** Returns what is wrong with a draft; null when it fits. */
   readonly check?: ((draft: string) => string | null) | undefined;
   /** Writes it. Returns false where there is nothing any more to write it to. */
   readonly onCommit: (value: string) => boolean;
@@ -214,13 +214,13 @@ export interface DraftOptions {
 }
 
 export interface DraftField {
-  /** What the field shows. */
+  /** The text that the field shows. */
   readonly text: string;
   readonly wrong: string | null;
   change(text: string): void;
   /** Writes what fits; an invalid draft stays. */
   commit(): void;
-  /** As `commit`, when the field is left. */
+  /** Write what fits, when the field loses the focus. */
   leave(): void;
   discard(): void;
 }

@@ -45,7 +45,7 @@ const HELD = new Set(["Shift", "Control", "Alt", "Meta", "AltGraph", "CapsLock",
 
 /** `onRest` is called with the first key that rests. Returns how to end it. */
 export function restAfterLostFields(onRest: () => void): () => void {
-  /** Where somebody types, or typed until it went. */
+  /** The field in which a person types, or typed until it was removed. */
   let field: HTMLElement | null = null;
   let isTold = false;
   const end = () => {

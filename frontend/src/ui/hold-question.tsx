@@ -1,4 +1,4 @@
-/** What is asked when a button was pressed that asks to be held. */
+/** Question that opens when a person clicks a button that has to be held down. */
 import { Button, Popover, Text } from "@mantine/core";
 import type { ReactElement } from "react";
 

@@ -15,7 +15,7 @@ export function useIsPhone(): boolean {
   return useMediaQuery("(max-width: 600px)", false, AT_ONCE);
 }
 
-/** Nothing that hovers: there is no mouse, and most likely no keyboard. */
+/** Return whether fingers are the only pointer: there is no mouse, and most likely no keyboard. */
 export function useHasFingersOnly(): boolean {
   return useMediaQuery("(pointer: coarse) and (hover: none)", false, AT_ONCE);
 }
@@ -53,7 +53,7 @@ type KeptKeys = Readonly<Record<string, readonly string[]>>;
 const MOST_GRAPHS = 200;
 const NONE: ReadonlySet<string> = new Set();
 
-/** What was kept for a graph; what has another shape is as if it were not there. */
+/** Return the keys kept for a graph; an empty set if the stored value has another shape. */
 export function keptIn(kept: unknown, id: string): ReadonlySet<string> {
   const found: unknown =
     typeof kept === "object" && kept !== null ? (kept as Record<string, unknown>)[id] : undefined;

@@ -4,7 +4,7 @@ import { isComposing, isStopKey, type KeyPress, keyOf, keysOf, typedCharacter } 
 
 const ctrl = { ctrlKey: true, metaKey: false };
 
-/** Where letters and signs stand on layouts of other scripts: what is typed, at which place. */
+/** Characters that keys type on layouts of other scripts, by the place of the key. */
 const LAYOUTS: Readonly<Record<string, Readonly<Record<string, string>>>> = {
   Russian: { KeyZ: "я", KeyC: "с", KeyN: "т", Period: "ю", BracketLeft: "х", BracketRight: "ъ" },
   Greek: { KeyZ: "ζ", KeyC: "ψ", KeyN: "ν" },

@@ -1,12 +1,12 @@
 /**
- * Which key was pressed: the one place that reads keyboard events.
+ * Reads keyboard events, as the only module of the page.
  *
  * `KeyboardEvent.key` alone is not enough. On a Cyrillic, Greek or Arabic layout it is a letter of that
  * script, so Ctrl Z never arrives; and while an input method composes a word, its Enter and Escape
  * belong to the input method. `src/tree.test.ts` refuses handlers that read the event themselves.
  */
 
-/** What is read of a keyboard event, of the DOM or of React. */
+/** The fields that are read of a keyboard event, of the DOM or of React. */
 export interface KeyPress {
   readonly key: string;
   /** The place of the key, as it is named on a US keyboard; empty on most touch screens. */
@@ -43,7 +43,10 @@ const SIGNS: ReadonlyMap<string, string> = new Map([
   ["Digit0", "0)"],
 ]);
 
-/** What a US keyboard types with this key; null for keys that type nothing, and unknown places. */
+/**
+ * Return what a US keyboard types with this key; null for keys that type nothing, and unknown
+ * places.
+ */
 function usCharacter(code: string, shift: boolean): string | null {
   const letter = /^Key([A-Z])$/.exec(code)?.[1];
   if (letter !== undefined) return shift ? letter : letter.toLowerCase();
@@ -55,8 +58,9 @@ const LAST_LATIN = 0x24f;
 const isOtherScript = (key: string) => (key.codePointAt(0) ?? 0) > LAST_LATIN;
 
 /**
- * Whether the key belongs to an input method that composes a word. Safari ends the composition before
- * it tells of the Enter that did so: only the old `keyCode` of such keys, 229, tells it there.
+ * Return whether the key belongs to an input method that composes a word. Safari ends the
+ * composition before it sends the Enter that ended it: only the old `keyCode` of such keys, 229,
+ * tells it there.
  */
 export function isComposing(event: KeyPress): boolean {
   if (event.isComposing === true || event.nativeEvent?.isComposing === true) return true;

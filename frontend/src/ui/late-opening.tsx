@@ -17,7 +17,7 @@ type Button = ReactElement<ButtonHTMLAttributes<HTMLButtonElement>>;
 interface Props {
   opens: "menu" | "dialog";
   children: Button;
-  /** What opens, around the button that it is given. */
+  /** Returns the element that opens, around the button that it is given. */
   part: (button: Button) => ReactElement;
 }
 

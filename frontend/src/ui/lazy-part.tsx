@@ -68,7 +68,7 @@ export function lazyPart<P extends object>(
   return Object.assign(Part, { preload });
 }
 
-/** Nothing at first, so that what comes at once does not flicker; progress after a second. */
+/** Shows progress after a second, and nothing before, so that fast parts do not flicker. */
 function Loading() {
   return (
     <div className={style.loading} role="status" aria-busy>
@@ -99,7 +99,7 @@ function Missing() {
 
 interface PartBoundaryProps {
   children: ReactNode;
-  /** What stands around the notices where the part brings its own surroundings. */
+  /** Returns the frame around a notice, for parts that bring their own frame. */
   frame?: (notice: ReactNode) => ReactNode;
   /** Instead of `Loading`. */
   waiting?: ReactNode;

@@ -5,7 +5,7 @@ import style from "./long-list.module.css";
 const ROWS = 25; // of a block: about as many as a screen shows
 
 interface Props {
-  /** How tall a row is as a rule, rem: what is out of sight takes as much. */
+  /** Usual height of a row, rem: rows out of sight take as much. */
   rowHeight: number;
   children: ReactNode;
 }

@@ -1,4 +1,7 @@
-/** Where messages appear. Its code is as large as that of a screen; what is told earlier waits for it. */
+/**
+ * Shows notifications. This code is as large as that of a screen; earlier messages wait until it is
+ * loaded.
+ */
 import { Notifications, notifications } from "@mantine/notifications";
 import { announcer } from "./announcer";
 

@@ -23,7 +23,7 @@ export function initials(name: string): string {
   return found.join("").toUpperCase() || "?";
 }
 
-/** What people would call letters; of a pile of marks only the first few. */
+/** Return the letters of a word as people count them; of a pile of marks only the first few. */
 function lettersOf(word: string): string[] {
   const start = word.slice(0, 64);
   return [...letters.segment(start)].map(({ segment }) => segment.slice(0, 12));

@@ -21,18 +21,21 @@ export interface Option {
 interface Props {
   label: string;
   placeholder: string;
-  /** What there is for a search; the first is chosen. */
+  /** Returns the options for a search; the first one is chosen. */
   find: (search: string) => readonly Option[];
   onPick: (id: string) => void;
   none: string;
   take?: string;
-  /** What has been typed before the field was there. */
+  /** Returns the text that was typed before the field was rendered. */
   initial?: () => string;
   /** A key in the empty field; whether it has been taken. */
   onEmptyKey?: (event: React.KeyboardEvent) => boolean;
 }
 
-/** Those in which every word of the search occurs; names that begin so come first. */
+/**
+ * Return the options in which every word of the search occurs; names that begin with the search
+ * come first.
+ */
 export function matching(options: readonly Option[], search: string): Option[] {
   const words = search.toLowerCase().split(/\s+/).filter(Boolean);
   const rank = ({ label, sub = "", also = "" }: Option): number => {
@@ -59,13 +62,13 @@ interface OptionListProps {
   /** The chosen one. */
   at: number;
   grouped?: boolean;
-  /** What is said without any. */
+  /** Text if there is no option. */
   none?: string;
   onPoint: (at: number) => void;
   onPick: (option: Option) => void;
 }
 
-/** What can be taken, below the field that keeps the focus and knows the keys. */
+/** List of options below a field, which keeps the focus and handles the keys. */
 export function OptionList(props: OptionListProps) {
   const { id, label, options, at, grouped = false, none, onPoint, onPick } = props;
   const list = useRef<HTMLDivElement>(null);

@@ -26,7 +26,7 @@ export class PointerDrag<T> {
   };
   now = (): DraggedItem<T> | null => this.#now;
 
-  /** Who takes what is dropped; answers how to stop taking. */
+  /** Subscribe a handler of drops. Return the function that unsubscribes it. */
   onDrop(taker: DropHandler<T>): () => void {
     this.#taker = taker;
     return () => {
@@ -80,7 +80,7 @@ function swallowClick(): void {
   setTimeout(() => window.removeEventListener("click", swallow, { capture: true }), 0);
 }
 
-/** What is carried, under the pointer. */
+/** Preview of the dragged thing, under the pointer. */
 export function DragPreview<T>({ carrier }: { carrier: PointerDrag<T> }) {
   const draggedItem = useSyncExternalStore(carrier.subscribe, carrier.now);
   const active = draggedItem !== null;

@@ -1,10 +1,13 @@
-/** What is printed instead of the page: made when the browser prints, by whatever way, and gone afterwards. */
+/**
+ * Content that is printed instead of the page: rendered when the browser prints, and removed
+ * afterwards.
+ */
 import { type ReactNode, useEffect, useState } from "react";
 import { createPortal, flushSync } from "react-dom";
 import style from "./print-sheet.module.css";
 
 interface Props {
-  /** What it is, and what one must know of it, above everything. */
+  /** Title and facts at the top of the sheet. */
   title: string;
   facts: readonly (readonly [name: string, value: string])[];
   /** Made at that moment only; `across`: on paper that lies so. */

@@ -1,4 +1,4 @@
-/** One of a few words: what shows, what counts. Radio buttons that look like one bar. */
+/** Choice between a few words: radio buttons that look like one bar. */
 import { type ReactNode, useId } from "react";
 import style from "./segments.module.css";
 

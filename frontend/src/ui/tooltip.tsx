@@ -20,7 +20,7 @@ import { keyOf } from "./keys";
 import style from "./tooltip.module.css";
 
 const DELAY = 350; // ms
-/** Where menus and dialogs stand, a place of the page that can be gone to; see `index.html`. */
+/** Selector of the part of the page in which menus and dialogs open; see `index.html`. */
 const MENUS = "[data-mantine-shared-portal-node]";
 
 interface Props {

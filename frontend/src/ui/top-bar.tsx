@@ -10,7 +10,7 @@ import style from "./top-bar.module.css";
 export interface Crumb {
   label: ReactNode;
   to?: string;
-  /** Something within the page: named, yet not what the page is. */
+  /** Set if the crumb is a part of the page, not the page itself. */
   part?: boolean;
   /** Gives the page another name. Returns false where it has none any more. */
   rename?: (name: string) => boolean;
@@ -76,7 +76,7 @@ function NameWriting({ name, rename, onDone }: NameProps) {
   );
 }
 
-/** What the page is; where it can be called otherwise, by pressing its name. */
+/** Title of the page; pressing it renames the page if it can be renamed. */
 function Here({ crumb: { label, rename } }: { crumb: Crumb }) {
   const [writing, setWriting] = useState(false);
   if (rename === undefined || typeof label !== "string") {

@@ -1,7 +1,10 @@
 /** Functions that stay the same, for what would draw again because of a new one. */
 import { useCallback, useLayoutEffect, useRef } from "react";
 
-/** The same function as long as the component is there. It does what the last one given does. */
+/**
+ * Return a function that stays the same object while the component is mounted, and calls the newest
+ * callback.
+ */
 export function useStableCallback<A extends unknown[], R>(
   callback: (...given: A) => R,
 ): (...given: A) => R {

@@ -1,4 +1,6 @@
-/** What can wait comes when the page is idle, within its time, and not once it was called off. */
+/**
+ * Work that can wait runs when the page is idle, within its time, and not after it was cancelled.
+ */
 import { afterEach, expect, test, vi } from "vitest";
 import { whenIdle } from "./lazy-part";
 

@@ -23,7 +23,10 @@ const fileOf = (entry: FileSystemFileEntry): Promise<File> =>
 const isFile = (entry: FileSystemEntry): entry is FileSystemFileEntry => entry.isFile;
 const isFolder = (entry: FileSystemEntry): entry is FileSystemDirectoryEntry => entry.isDirectory;
 
-/** Of a folder only what may be a graph or an action: it has sources and pictures, too. */
+/**
+ * Return the files of a folder that may be graphs or actions, at most `most`; sources and pictures
+ * are left out.
+ */
 async function within(folder: FileSystemDirectoryEntry, most: number): Promise<File[]> {
   const found: File[] = [];
   for (const entry of await entriesOf(folder)) {

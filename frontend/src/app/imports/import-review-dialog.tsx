@@ -1,4 +1,4 @@
-/** What was translated in a file of an old dialect, before it is kept. */
+/** Dialog that shows the translations in a file of an old dialect before it is kept. */
 import { Button, Group, Modal, Text } from "@mantine/core";
 import { useSyncExternalStore } from "react";
 import type { ProblemPlace } from "../../api/graphs";
@@ -10,7 +10,7 @@ import { dialectWords } from "./take-files";
 
 const MOST_PROBLEMS = 8;
 
-/** Where in the file something stands; for one of many the first. */
+/** Shows the line of the file; for several places the first one. */
 function Line({ where }: { where: ProblemPlace }) {
   return where.line === undefined ? null : <Text span c="dimmed">{` line ${where.line}`}</Text>;
 }

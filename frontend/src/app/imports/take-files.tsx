@@ -34,7 +34,9 @@ function wordsOfFailure(file: string, error: unknown): string {
   return `${file}: ${errorText(error)}${where === "" ? "" : ` (${where})`}`;
 }
 
-/** What a file would become; the library looks at what is no graph. */
+/**
+ * Return what a file would become. Files that are no graph are read as an action of the library.
+ */
 async function previewOf(text: string): Promise<{ kind: TakenFile["kind"]; preview: Preview }> {
   try {
     return { kind: "graph", preview: await previewGraph(text) };
@@ -166,7 +168,10 @@ export function tellTaken({ taken, known, failed }: TakenFiles, after: () => voi
   }
 }
 
-/** Where one goes after an import: to what came last, to the list when many actions came. */
+/**
+ * Return the page to open after an import: the newest graph or action, or the list if several
+ * actions came; null for none.
+ */
 export function placeAfter({ taken, known }: Pick<TakenFiles, "taken" | "known">): string | null {
   const last = taken.at(-1);
   if (last === undefined) {
@@ -176,12 +181,12 @@ export function placeAfter({ taken, known }: Pick<TakenFiles, "taken" | "known">
   return taken.length === 1 ? `/actions/${last.made.id}` : "/actions";
 }
 
-/** Nothing was translated and nothing is without a place: there is nothing to look at. */
+/** Return whether a graph file needs no review: it has today's dialect, and no notes. */
 export function isPlain({ dialect, notes }: Preview): boolean {
   return dialect === "D3" && notes.length === 0;
 }
 
-/** The same of the file of one action. */
+/** Return whether the file of an action needs no review. */
 function isPlainAction({ dialect, notes }: Preview): boolean {
   return dialect === "D3-action" && notes.length === 0;
 }

@@ -61,7 +61,7 @@ function ConfirmRestButton({ run }: { run: Run }) {
 interface Props {
   run: Run;
   versionLabel: string;
-  /** What fits beside the rest; empty where it does not, or there is nothing. */
+  /** More words about the run, if there is room and anything to say; else empty. */
   told: string;
   announces: boolean;
   /** The canvas shows the run as it was at an earlier moment, ms. */
@@ -86,7 +86,7 @@ function FoldButton({ folded, onFold }: { folded: boolean; onFold: Props["onFold
   );
 }
 
-/** Who started it, when, and how long it took or has been going on. */
+/** Shows who started the run, when, and how long it took or has been running. */
 function Origin({ run, until }: { run: Run; until: number | null }) {
   const by = useCurrentName(run.author);
   const goes = run.ended_at === null;
@@ -105,7 +105,7 @@ function Origin({ run, until }: { run: Run; until: number | null }) {
   );
 }
 
-/** Where one can go from here. */
+/** Links to the statistics of the graph and to the page of the run. */
 function Ways({ run }: { run: Run }) {
   return (
     <>

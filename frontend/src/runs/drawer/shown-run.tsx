@@ -16,7 +16,7 @@ import style from "./run-drawer.module.css";
 import { RunHead } from "./run-head";
 import { ValuesPanel } from "./values-panel";
 
-/** What the notice shouts on every page already. */
+/** Alarms that the notice of STOP already shows on every page. */
 const SHOUTED: ReadonlySet<string> = new Set(["stop_unconfirmed", "moves_again"]);
 const SHORT = 60; // characters that fit beside the rest
 
@@ -29,7 +29,7 @@ export interface ShownRunProps {
   versionLabel: string;
   selected: string | null;
   onPick: (aid: string) => void;
-  /** Where the canvas shows the run, ms; null: as it is now. */
+  /** The moment of the run that the canvas shows, ms; null for the present. */
   cursor: number | null;
   onSeek: (at: number | null) => void;
   /** Only the head is shown; null: it cannot be folded. */
@@ -37,7 +37,7 @@ export interface ShownRunProps {
   onFold: (folded: boolean) => void;
 }
 
-/** What a person must know of it now, or why it ended so. */
+/** Return what a person must know of the run now, or why it ended this way. */
 function toldOf(run: Run): string {
   const alarm = currentAlarm(run)?.text ?? "";
   return run.ended_at === null ? alarm : run.detail || alarm;
@@ -135,7 +135,7 @@ function shownAction(run: Run, selected: string | null): string | null {
   return going.sort((a, b) => begun(b).localeCompare(begun(a)))[0]?.aid ?? null;
 }
 
-/** The same lanes for other runs of the graph; the same objects while nothing about them changes. */
+/** Return the same lanes for other runs of the graph; unchanged tracks stay the same objects. */
 function useTracks(others: readonly Run[], graph: Graph, lanes: readonly Lane[]): Track[] {
   const silenceOf = useSilence();
   const engines = others.map(({ engine }) => engine).join("\n");
@@ -163,7 +163,7 @@ interface DrawerBodyProps {
   graph: Graph;
   selected: string | null;
   onPick: (aid: string) => void;
-  /** Where the canvas shows the run, ms; null: as it is now. */
+  /** The moment of the run that the canvas shows, ms; null for the present. */
   cursor: number | null;
   onSeek: (at: number | null) => void;
 }
@@ -204,7 +204,9 @@ export interface RobotTab {
   readonly words: string;
 }
 
-/** What one robot of a run does, or how its run stands. `unheard`: nothing is heard of any run. */
+/**
+ * Return what one robot of a run does, or the state of its run. `unheard`: the runner is not heard.
+ */
 function said(run: Run, names: ReadonlySet<string> | null, unheard: boolean) {
   if (run.ended_at === null && (unheard || run.state === "unknown" || run.state === "lost")) {
     return { tone: "unknown", words: "not known" } as const;

@@ -9,7 +9,7 @@ import { duration, instant, stopwatch, useNow } from "../../ui/times";
 import { isolated } from "../../words/isolated";
 import style from "./run-drawer.module.css";
 
-/** How old the newest answer of the engine is; looked at once a second, with all that tells times. */
+/** Shows the age of the newest answer of the engine, updated once a second. */
 function Age({ run }: { run: Run }) {
   const { live } = useLive();
   const present = useNow(1000, run.ended_at === null);

@@ -1,4 +1,4 @@
-/** What was looked at on one engine, item by item, in words. */
+/** List of the pre-flight checks of one engine, in words. */
 import { Button, Loader } from "@mantine/core";
 import {
   IconAlertTriangle,
@@ -150,7 +150,7 @@ function Waiting({ robot, seconds }: { robot: string; seconds: number }) {
   );
 }
 
-/** What writing would do, before anybody does it. */
+/** Shows what writing into the index folder would change, before a person confirms it. */
 function What({ folder, robot }: { folder: IndexFolderLook; robot: string }) {
   const names = folder.writable.map(({ graph }) => isolated(graph)).join(", ");
   const replaced = folder.writable.filter(({ replaces }) => replaces !== "");
@@ -221,7 +221,10 @@ function WriteButton({ folder, robot, busy, onWrite }: WriteButtonProps) {
   );
 }
 
-/** Nothing where the runner has no such folder. Stays until the look is closed, to say how it went. */
+/**
+ * Offers to write sub-graphs into the index folder of the robot, if the runner has one; stays open
+ * to show the result.
+ */
 function IndexWriting({ item, look, robot, graph, seq, onLookAgain }: IndexWritingProps) {
   const { runner } = useLive();
   const may = useMay("operate");
@@ -271,7 +274,7 @@ function IndexWriting({ item, look, robot, graph, seq, onLookAgain }: IndexWriti
 interface MomentLookedAt {
   readonly graph: string;
   readonly seq: number;
-  /** What leads away from the look closes it. */
+  /** Called when a link leads away, to close the dialog. */
   readonly onLeave: () => void;
   /** Look again, now. */
   readonly onLookAgain: () => void;
@@ -303,7 +306,7 @@ function OneGraph({ graph, onLeave }: Omit<MomentLookedAt, "seq" | "onLookAgain"
   );
 }
 
-/** Nothing where nothing of this item comes from graphs inside. */
+/** Remedies for check items that come from sub-graphs; renders nothing for other items. */
 function InsideRemedies({ item, look, graph, seq, onLeave }: InsideRemediesProps) {
   if (item.verdict !== "blocked") return null;
   if (item.code === "subgraphs") {

@@ -12,7 +12,7 @@ interface Props {
   graph: string;
   seq: number;
   obstacle: string | null;
-  /** What was decided in the dry-run. */
+  /** Outcomes that were chosen in the dry-run. */
   script: Script;
   /** The start is on its way: the dry-run may go. */
   onStarted: () => void;

@@ -22,7 +22,7 @@ interface Props {
   seq: number;
   /** The name of the moment on screen: others' edits show a little before they are named. */
   settle: () => Promise<number>;
-  /** Why this moment cannot be started; null when it can. */
+  /** The reason why this moment cannot be started; null when it can. */
   obstacle: string | null;
   compact?: boolean;
   /** In two lines, within reach of a thumb. */

@@ -158,7 +158,7 @@ function Exactly({
   );
 }
 
-/** Why nothing can be started now; null when it can. */
+/** Return why nothing can be started now; null when it can. */
 function obstacleOf(
   engines: readonly string[],
   looks: readonly Preflight[] | undefined,
@@ -326,7 +326,10 @@ function BehavioursChoice(props: { on: boolean; onChange: (on: boolean) => void 
   );
 }
 
-/** Whether behaviours were chosen, and what they are chosen with; neither where nothing is simulated. */
+/**
+ * Return whether Python behaviours were chosen, with the control to choose them; both empty unless
+ * an engine is simulated.
+ */
 export function useBehaviours(simulated: boolean): { behaviours: boolean; choice: ReactNode } {
   const [chosen, choose] = useState(false);
   const choice = simulated ? <BehavioursChoice on={chosen} onChange={choose} /> : null;

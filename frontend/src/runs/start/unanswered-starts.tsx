@@ -1,4 +1,7 @@
-/** What has become of starts that nobody answered: unknown until the runner tells, never sent again. */
+/**
+ * Starts that got no answer: their outcome is unknown until the runner tells it, and they are never
+ * sent again.
+ */
 import { CloseButton, Loader } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useEffect, useSyncExternalStore } from "react";
@@ -20,7 +23,7 @@ export function missing(sent: SentStart, found: StartFound | undefined): string[
   return sent.engines.filter((engine) => !there.has(engine));
 }
 
-/** What is known of those without a run, and what is not. */
+/** Return words for starts whose outcome is unknown. */
 export function unknownWords(
   sent: SentStart,
   found: StartFound | undefined,
@@ -103,10 +106,10 @@ export interface SentStart {
   /** Its `request_id`: by this the runner knows what it has become. */
   request: string;
   graph: string;
-  /** What was sent, in words: "v3 of patrol". */
+  /** The graph that was sent, in words: "v3 of patrol". */
   what: string;
   engines: readonly string[];
-  /** When it was sent, ms. */
+  /** Time at which it was sent, ms. */
   at: number;
 }
 
@@ -124,7 +127,7 @@ export class UnansweredStarts {
   readonly #awaited = new Set<string>();
   #unsure: readonly SentStart[];
 
-  /** What is stored was sent by a page that is gone: its answer comes no more. */
+  /** Starts in the storage were sent by an earlier page, which can no longer get their answers. */
   constructor(storage: Storing | null) {
     this.#storage = storage;
     this.#sent = stored(storage);
@@ -136,10 +139,13 @@ export class UnansweredStarts {
     return () => this.#listeners.delete(listener);
   };
 
-  /** Those that will not be answered any more. */
+  /** Return the starts that no answer will come for. */
   list = (): readonly SentStart[] => this.#unsure;
 
-  /** It is about to leave; from here on only an answer says what became of it. */
+  /**
+   * Note a start right before it is sent: from then on its outcome is unknown until an answer
+   * comes.
+   */
   sends(start: SentStart): void {
     this.#awaited.add(start.request);
     this.#put([...this.#sent, start].slice(-MOST));
@@ -151,7 +157,7 @@ export class UnansweredStarts {
     this.#put(this.#sent);
   }
 
-  /** It was answered, or somebody has seen what became of it. */
+  /** Forget a start that was answered, or whose outcome a person has seen. */
   settle(request: string): void {
     this.#awaited.delete(request);
     this.#put(this.#sent.filter((each) => each.request !== request));

@@ -18,13 +18,13 @@ export interface StartInput {
   /** The moment that shall run; awaited when the page has yet to hear its name. */
   seq: number | Promise<number>;
   engines: readonly string[];
-  /** Of the graph that was looked at; null when nobody looked. */
+  /** Digest of the graph that a person looked at; null if nobody looked. */
   digest: string | null;
-  /** The same with the graphs inside of it; left out when nobody looked. */
+  /** Tree digest, with all sub-graphs, that a person looked at; left out if nobody looked. */
   tree?: string;
-  /** What actions do in the simulator. */
+  /** Outcomes of actions in the simulator. */
   script?: Script;
-  /** Whether they do what their Python behaviours say, there too. */
+  /** Set if actions follow their Python behaviours in the simulator. */
   behaviours?: boolean;
   override?: NonNullable<StartOrder["override"]>;
 }
@@ -123,7 +123,7 @@ function nameIn(version: Version): string {
 
 const CHOICE = "aa.engines";
 
-/** Where a graph was started last from this browser. */
+/** Return the engines on which this browser last started a graph. */
 export function lastEngines(graph: string): string[] {
   try {
     const all = JSON.parse(localStorage.getItem(CHOICE) ?? "{}") as Record<string, string[]>;

@@ -50,7 +50,7 @@ function font(inner: Node): HTMLElement {
   return outer;
 }
 
-/** Each of them is how some translator does it. */
+/** Ways in which real translators replace a text. */
 const TRANSLATORS: Readonly<Record<string, (text: Text) => void>> = {
   "wraps a text": (text) => {
     const at = document.createElement("i");

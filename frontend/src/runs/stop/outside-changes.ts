@@ -9,7 +9,9 @@ import { tick } from "../../clock/server-clock";
 const OFTEN = 20; // times that a page is put right within `WITHIN`; who goes on is a fight, and is told
 const WITHIN = 10_000; // ms
 
-/** What translators wrap texts in, and this page never draws. */
+/**
+ * Return whether a node is a `<font>`: translators wrap texts in it, and this page never draws one.
+ */
 const isWrapper = (node: Node | null): node is HTMLElement => node?.nodeName === "FONT";
 
 /** The child of `parent` in which `node` stands now; null when it is nowhere in it. */

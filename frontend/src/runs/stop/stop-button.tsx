@@ -17,7 +17,10 @@ export function stopButtonText(link: LiveLink, count: number, unknown = 0): stri
   return count === 1 ? "1 run" : `${count} runs`;
 }
 
-/** What Stop means beside a graph: its one run, or its runs that were started together. */
+/**
+ * Return what STOP means on the page of a graph: its one run, or all runs that were started
+ * together.
+ */
 export function runToStop(here: readonly Run[]): { id: string; words: string } | null {
   const [first, ...others] = here;
   if (first === undefined) return null;

@@ -1,4 +1,4 @@
-/** What became of a Stop, in words, until it is proven. */
+/** Notice with the state of a Stop, in words, until it is proven. */
 
 import { useState, useSyncExternalStore } from "react";
 import type { LiveState, StopRequest } from "../../api/live-socket";
@@ -28,7 +28,7 @@ export type StopNoticeText = {
   stays?: true;
 } | null;
 
-/** Why it is not proven, as the runner says; "" when it has not said so yet. */
+/** Return the runner's reason why the Stop is not proven; "" before it has given one. */
 function reasonOf(run: Run): string {
   if (run.unconfirmed) return `${run.unconfirmed.replace(/\.$/, "")}.`;
   const alarm = run.alarms.findLast((each) => each.code === "stop_unconfirmed");
@@ -115,7 +115,10 @@ function provenNotice(
   return { tone: "done", text };
 }
 
-/** What others run and what is being stopped, until it is proven; then the loudest first. */
+/**
+ * Notice about graphs that were not started from here and are being stopped, until proven;
+ * unconfirmed ones first.
+ */
 function foreignNotice(now: LiveState, since?: string): StopNoticeText {
   const stopping = foreignGraphs(now).filter(({ held }) => held.stopping !== null);
   const [first] = stopping.sort((a, b) => Number(!a.held.stopping) - Number(!b.held.stopping));
@@ -132,7 +135,7 @@ function foreignNotice(now: LiveState, since?: string): StopNoticeText {
   return { tone: "loud", stays: true, text };
 }
 
-/** Everything has ended that the runner knows of. */
+/** Notice that all runs that the runner knows of have ended. */
 function doneNotice(runs: readonly Run[], unknown: readonly Robot[]): StopNoticeText {
   const ends = runs.map((run) => `Run ${run.number}: ${run.state}`).join(" · ");
   if (unknown.length === 0) {
@@ -163,7 +166,10 @@ export function movingAgain(now: LiveState): StopNoticeText {
   return { tone: "loud", stays: true, text };
 }
 
-/** What somebody else has asked for and what is not proven either: everybody is told. */
+/**
+ * Return the notice about Stops that other people asked for and that are not proven: everybody sees
+ * it.
+ */
 export function othersNotice(now: LiveState): StopNoticeText {
   if (now.link === "down") return null;
   const shouting = openRuns(now).filter(
@@ -187,18 +193,25 @@ export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
 
 type ShownNotice = NonNullable<StopNoticeText>;
 
-/** What stays to be read when the rest is put aside: STOP UNCONFIRMED, say. */
+/**
+ * Return the headline that stays visible when the notice is minimized, such as STOP UNCONFIRMED.
+ */
 export function headOf({ text }: ShownNotice): string {
   return text.split(":", 1)[0] ?? text;
 }
 
-/** The same notice stays aside while it says the same of the same runs; anything new is shouted again. */
+/**
+ * Return a key by which a minimized notice stays minimized while its text is the same; a new text
+ * opens it again.
+ */
 export function noticeKey({ text }: ShownNotice): string {
   return `${headOf({ tone: "loud", text })} ${(text.match(/run \d+/g) ?? []).sort().join(" ")}`;
 }
 
-/** Whether the loud notice is put aside. What it says stays to be seen, in short; `asked`: the newest
- * Stop, with which it is shouted again. */
+/**
+ * Tracks whether a person has minimized the loud notice; its headline stays visible. `asked`: the
+ * newest Stop, which opens the notice again.
+ */
 function useAside(notice: StopNoticeText, asked: string) {
   const [put, setPut] = useState("");
   const key = notice?.stays ? `${asked} ${noticeKey(notice)}` : "";

@@ -1,4 +1,7 @@
-/** What STOP and the page around it tell each other: they are drawn apart, and neither needs the other. */
+/**
+ * Values that STOP and the page around it share: they are rendered apart, and neither needs the
+ * other.
+ */
 import { Watched } from "../../ui/watched";
 
 /** The graph on screen: its run is the one that Stop means, if it goes. */
@@ -7,13 +10,16 @@ export const graphOnScreen = new Watched<string | null>(null);
 /** The run about whose rest a person wants to say something. */
 export const askedRun = new Watched<string | null>(null);
 
-/** Whether the page can ask that: it stands, and the person may operate robots. */
+/**
+ * Set while the page can ask a person about a run's rest: it is rendered, and the person may
+ * operate robots.
+ */
 export const mayAnswer = new Watched(false);
 
 /** An error that the page around STOP did not outlive, in its own words; "" while it stands. */
 export const pageError = new Watched("");
 
-/** Whether a translation or an extension has changed what the page drew. */
+/** Set when a translation or an extension has changed what the page rendered. */
 export const changedFromOutside = new Watched(false);
 
 /** The button itself while it is drawn: whether another script has removed it. */

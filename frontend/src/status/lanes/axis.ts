@@ -7,7 +7,7 @@ import { instant } from "../../ui/times";
 import { type Tone, visitBegin, visitEnd } from "../progress";
 
 export interface TimeAxis {
-  /** When the run began, ms. */
+  /** Start of the run, ms. */
   readonly start: number;
   /** ms. */
   readonly span: number;
@@ -30,12 +30,12 @@ export function wholeSpan(elapsed: number): number {
   return Math.max(1000, elapsed);
 }
 
-/** Where a moment stands, 0 to 1. */
+/** Return the position of a moment on the axis, 0 to 1. */
 export function shareOf(axis: TimeAxis, at: number): number {
   return Math.min(1, Math.max(0, (at - axis.start) / axis.span));
 }
 
-/** How many times what grows is drawn while it passes a whole axis: steps of some px. */
+/** Number of steps in which a growing bar is drawn over a whole axis: some px each. */
 const DRAWINGS = 120;
 const RENEWALS = [1000, 500]; // ms
 
@@ -60,12 +60,12 @@ interface BarSpan {
 }
 
 export interface Bar {
-  /** Where it went on for certain; null where no such moment is known. */
+  /** The span in which the visit certainly went on; null if no such moment is known. */
   readonly sure: BarSpan | null;
   readonly tone: Tone;
-  /** It goes on, and the bar with it. */
+  /** Set while the visit goes on, so that the bar grows. */
   readonly open: boolean;
-  /** Where it may have gone on as well: nobody saw its ends. */
+  /** The span in which it may have gone on as well, since its ends were not seen. */
   readonly maybe: BarSpan | null;
 }
 
@@ -124,7 +124,7 @@ export function growingWay(left: number): Waypoint[] {
   ];
 }
 
-/** How far the time of an animation may be off, ms: it stands still while a computer sleeps. */
+/** Largest error of the time of an animation, ms: it stands still while a computer sleeps. */
 const SLACK = 1000;
 const LOOK = 1000; // ms
 

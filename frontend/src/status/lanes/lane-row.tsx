@@ -18,15 +18,15 @@ interface Props {
   visits: readonly Visit[];
   progress: Progress | null;
   axis: TimeAxis;
-  /** When its run ended, ms; null while it goes on. */
+  /** End of its run, ms; null while it goes on. */
   ended: number | null;
   /** Since when nothing is heard of its run, ms. */
   silentSince: number | null;
   selected: boolean;
   onPick: ((lane: Lane) => void) | undefined;
-  /** Whether the lanes inside of it are shown; null where there are none. */
+  /** True if its inner lanes are shown, false if hidden; null if it has none. */
   opened: boolean | null;
-  /** Whether any lane has others inside: then all names leave room for the sign of it. */
+  /** Set if any lane has inner lanes: then all names leave room for the toggle. */
   nested: boolean;
   onOpen: (name: string) => void;
 }
@@ -59,7 +59,7 @@ function LaneName({ lane, onPick, opened, nested, onOpen }: Omit<Props, "visits"
 
 const percent = (share: number) => `${share * 100}%`;
 
-/** What reaches from a moment to now: moved, not drawn again, while time goes on. */
+/** Bar from a moment to now: it is moved, not rendered again, while time passes. */
 function Growing({ axis, from, ...look }: GrowingProps) {
   const left = shareOf(axis, from);
   const grown = useRef<HTMLElement>(null);
@@ -123,7 +123,7 @@ function VisitBar(props: Pick<Props, "axis" | "ended" | "silentSince"> & { visit
   return <Growing axis={axis} from={from} tone="run" className={style.open} />;
 }
 
-/** How long it has been going on. */
+/** Shows how long a visit has been going on. */
 function Since({ progress, since }: { progress: Progress; since: number }) {
   const now = useNow(1000);
   return (
@@ -199,7 +199,7 @@ interface AllLevelsProps {
   inside: OpenLanes;
 }
 
-/** Nothing where no lane has others inside. */
+/** Toggle for all levels; renders nothing if no lane has inner lanes. */
 export function AllLevels({ lanes, inside }: AllLevelsProps) {
   const holding = lanes.filter(({ holds }) => holds);
   if (holding.length === 0) return null;

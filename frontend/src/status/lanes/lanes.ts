@@ -6,7 +6,7 @@ import { isEqual } from "../../graph/values";
 import { factOf, type LevelPlace, placesIn, placesOf } from "../level-places";
 
 export interface Lane {
-  /** As the run tells it. */
+  /** Name by which the run reports the action. */
   name: string;
   /** Its own name in its level. */
   label: string;
@@ -16,13 +16,16 @@ export interface Lane {
   levels: readonly string[];
   /** The lane of the action that it is right inside of. */
   around: string | null;
-  /** Whether there are lanes inside of it. */
+  /** Set if it has inner lanes. */
   holds: boolean;
 }
 
 type Sorted = Map<string | null, { name: string; place: LevelPlace }[]>;
 
-/** What is right inside of each, those that ran first, in the order in which they began. */
+/**
+ * Return the actions directly inside of each action, in the order in which they began; those that
+ * never ran come last.
+ */
 function byAround(run: Run, places: ReadonlyMap<string, LevelPlace>): Sorted {
   const began = (name: string) => run.actions?.[name]?.visits[0]?.from ?? "~";
   const inside: Sorted = new Map();
@@ -63,7 +66,7 @@ export function lanesOf(run: Run, graph: Graph, robot = ""): Lane[] {
   return lanes;
 }
 
-/** Those that are seen while only these are open. */
+/** Return the lanes that are visible while only these are open. */
 export function openLanes<One extends Pick<Lane, "name" | "around">>(
   lanes: readonly One[],
   open: ReadonlySet<string>,

@@ -1,5 +1,5 @@
 // @vitest-environment jsdom
-/** What moves along an axis is where time is, and is looked after once a second. */
+/** Things that move along an axis are where the time is, and are corrected once a second. */
 
 import { act } from "react";
 import { createRoot } from "react-dom/client";
@@ -9,7 +9,7 @@ import { growingWay, shareOf, type TimeAxis, useMoving, type Waypoint, WHOLE_WAY
 
 afterEach(() => vi.useRealTimers());
 
-/** How far an element is moved at a share of the axis, in shares of its width. */
+/** Return how far an element is moved at a share of the axis, in shares of its width. */
 function placeAt(way: readonly Waypoint[], share: number): number {
   const moved = ({ transform }: Waypoint) =>
     Number(transform.slice("translateX(".length, -2)) / 100;

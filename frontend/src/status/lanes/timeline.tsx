@@ -32,9 +32,9 @@ interface Props extends Track {
   /** The name of a lane. */
   selected?: string | null;
   onPick?: ((lane: Lane) => void) | undefined;
-  /** Whether a lane can be picked; without this those of the graph itself can be. */
+  /** Returns whether a lane can be picked; without it, lanes of the graph itself can be. */
   picks?: (lane: Lane) => boolean;
-  /** Where a replay stands, ms; null at the live edge. */
+  /** Time at which a replay stands, ms; null at the live edge. */
   cursor?: number | null;
   onSeek?: (at: number | null) => void;
   /** The keyboard seeks here: nothing else beside it does. */
@@ -105,7 +105,7 @@ interface AcrossProps {
   gaps: readonly TimeGap[];
 }
 
-/** Everything that stands across the lanes: ticks, gaps, signs and the playhead. */
+/** Marks that cross all lanes: ticks, gaps, signs and the playhead. */
 function Across({ axis, cursor, goes, silentSince, signs, gaps }: AcrossProps) {
   const at = (moment: number) => shareOf(axis, moment) * 100;
   return (
@@ -135,10 +135,10 @@ function Across({ axis, cursor, goes, silentSince, signs, gaps }: AcrossProps) {
 }
 
 const NOTHING: readonly never[] = [];
-/** Where a lane that was out of sight comes to stand, of the height of the list. */
+/** Place to which a lane is scrolled into view, as a share of the height of the list. */
 const RESTS_AT = 0.4;
 
-/** What begins to run comes into view, within the list only, with room for what follows it. */
+/** Scroll a lane into view when it begins to run, with room for the lanes that follow. */
 function useNewestInView(lanes: Props["lanes"], run: Run, live: boolean) {
   const list = useRef<HTMLUListElement>(null);
   const newest = live
@@ -191,7 +191,7 @@ function useSeeking(axis: TimeAxis, cursor: number | null, onSeek: Props["onSeek
   return { ruler, pull: { onPointerDown: seek, onPointerMove: seek }, onKeyDown };
 }
 
-/** How the ruler is told and moved by those who do not use a pointer. */
+/** Return the slider attributes and keys of the ruler, for people without a pointer. */
 function sliderOf(axis: TimeAxis, cursor: number | null) {
   const at = cursor === null ? axis.span : cursor - axis.start;
   return {
@@ -298,7 +298,7 @@ export function Timeline(props: Props) {
   );
 }
 
-/** Where the sign of a moment has room beside its line. */
+/** Side on which the sign of a moment has room beside its line. */
 type Side = "left" | "right" | undefined;
 
 const sideOf = (share: number): Side => (share > 0.9 ? "left" : share < 0.06 ? "right" : undefined);
@@ -311,7 +311,7 @@ function Cursor({ side, label, live }: { side: Side; label: string; live: boolea
   );
 }
 
-/** What is told of a moment is drawn anew once a second; its line moves meanwhile. */
+/** Playhead at the present: its text is rendered once a second, and its line moves meanwhile. */
 function LiveCursor({ axis, silentSince }: { axis: TimeAxis; silentSince: number | null }) {
   const now = useNow(1000);
   const words = silentSince === null ? "live" : "not known";
@@ -332,7 +332,9 @@ function LiveHead({ axis, silentSince }: { axis: TimeAxis; silentSince: number |
 
 interface PlayheadProps {
   axis: TimeAxis;
-  /** Where a replay stands, ms; null at the live edge, or at the end of what is over. */
+  /**
+   * Time at which a replay stands, ms; null at the live edge, or at the end of a run that is over.
+   */
   cursor: number | null;
   goes: boolean;
   silentSince: number | null;
