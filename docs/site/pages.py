@@ -24,7 +24,7 @@ SECTIONS: Final = (
     (
         "How it is built",
         (
-            *("architecture", "glossary", "performance", "comparison"),
+            *("architecture", "first-change", "glossary", "performance", "comparison"),
             *("decisions/index", "contributing", "changes"),
         ),
     ),
