@@ -3,7 +3,7 @@
  * would behave differently.
  */
 
-import { Button, Modal, Skeleton, TextInput } from "@mantine/core";
+import { Button, Group, Modal, Skeleton, TextInput } from "@mantine/core";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { useLocation } from "wouter";
@@ -102,12 +102,12 @@ function Make({ flat, context, onClose }: Props & { flat: FlatGraph }) {
         error={wrong || undefined}
         onChange={(event) => setName(event.currentTarget.value)}
       />
-      <div className={style.answers}>
+      <Group justify="flex-end" gap="sm" mt="lg">
         <Button onClick={onClose}>Cancel</Button>
         <Button type="submit" variant="filled" loading={busy}>
           Make it
         </Button>
-      </div>
+      </Group>
     </form>
   );
 }

@@ -1,6 +1,6 @@
 /** Dialogs that make a sub-graph of selected actions, and that unpack a sub-graph in place of its action. */
 
-import { Button, Modal, Skeleton, TextInput } from "@mantine/core";
+import { Button, Group, Modal, Skeleton, TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo, useRef, useState } from "react";
@@ -219,12 +219,12 @@ function Form({ look, again, ...props }: ExtractProps & Looked) {
       <p className={style.quiet}>
         A robot runs it only with the new graph in its index, and cannot be paused meanwhile.
       </p>
-      <div className={style.answers}>
+      <Group justify="flex-end" gap="sm" mt="lg">
         <Button onClick={onClose}>Cancel</Button>
         <Button type="submit" variant="filled" loading={busy} disabled={isTaken}>
           {differences.length === 0 ? "Make it" : "Make it anyway"}
         </Button>
-      </div>
+      </Group>
     </form>
   );
 }
@@ -244,9 +244,9 @@ function Refused({ look, context, onClose }: ExtractProps & { look: ExtractionLo
         told={ofGraph(context)}
         {...{ context, onClose }}
       />
-      <div className={style.answers}>
+      <Group justify="flex-end" gap="sm" mt="lg">
         <Button onClick={onClose}>Close</Button>
-      </div>
+      </Group>
     </>
   );
 }
@@ -319,7 +319,7 @@ function Asked({ look, context, onClose, name }: Asking) {
           <bdi>{name}</bdi>.
         </p>
       )}
-      <div className={style.answers}>
+      <Group justify="flex-end" gap="sm" mt="lg">
         <Button onClick={onClose}>{refused ? "Close" : "Cancel"}</Button>
         {!refused && (
           <Button
@@ -332,7 +332,7 @@ function Asked({ look, context, onClose, name }: Asking) {
             {told.length > 0 ? "Unpack it anyway" : "Unpack it"}
           </Button>
         )}
-      </div>
+      </Group>
     </>
   );
 }
