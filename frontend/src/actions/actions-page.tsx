@@ -26,7 +26,7 @@ interface NewActionProps {
   onMake: (name: string) => void;
 }
 
-function Ask({ name: first, busy, wrong, onClose, onMake }: NewActionProps) {
+function NewActionForm({ name: first, busy, wrong, onClose, onMake }: NewActionProps) {
   const [name, setName] = useState(first ?? "");
   return (
     <form
@@ -59,7 +59,7 @@ function Ask({ name: first, busy, wrong, onClose, onMake }: NewActionProps) {
 function NewActionDialog(props: NewActionProps) {
   return (
     <Modal opened={props.name !== null} onClose={props.onClose} title="New action">
-      <Ask {...props} />
+      <NewActionForm {...props} />
     </Modal>
   );
 }
@@ -87,7 +87,7 @@ function useAddress() {
 }
 
 /** Shown while no action is selected. */
-function Nothing({ isEmpty }: { isEmpty: boolean }) {
+function NoSelection({ isEmpty }: { isEmpty: boolean }) {
   return (
     <Empty icon={<IconBolt size={22} />} title={isEmpty ? "No action yet" : "What robots can do"}>
       {isEmpty
@@ -97,14 +97,14 @@ function Nothing({ isEmpty }: { isEmpty: boolean }) {
   );
 }
 
-interface ChosenProps extends Props {
+interface SelectedActionProps extends Props {
   all: readonly ListedAction[];
   isEmpty: boolean;
   knowledge: RobotsKnowledge;
   making: ReturnType<typeof useNewActions>;
 }
 
-function Chosen({ all, knowledge, making, isEmpty, ...props }: ChosenProps) {
+function SelectedAction({ all, knowledge, making, isEmpty, ...props }: SelectedActionProps) {
   const { id, person, slots } = props;
   const { name, editing } = useAddress();
   const [, go] = useLocation();
@@ -124,7 +124,7 @@ function Chosen({ all, knowledge, making, isEmpty, ...props }: ChosenProps) {
     );
   }
   const listed = name === null ? undefined : all.find((each) => each.name === name);
-  if (listed === undefined) return <Nothing isEmpty={isEmpty} />;
+  if (listed === undefined) return <NoSelection isEmpty={isEmpty} />;
   return (
     <UnlistedAction
       listed={listed}
@@ -187,7 +187,7 @@ export function ActionsPage(props: Props) {
               All actions
             </Button>
           )}
-          <Chosen
+          <SelectedAction
             {...props}
             all={all}
             isEmpty={library.isSuccess && all.length === 0}

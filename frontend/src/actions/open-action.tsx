@@ -179,7 +179,7 @@ function useFreshLibrary(seq: number, unsaved: number): void {
   }, [client, seq, unsaved, opened]);
 }
 
-function Places({ known, action, knowledge, context }: PlacesProps) {
+function UsesAndRobots({ known, action, knowledge, context }: UsesAndRobotsProps) {
   const client = useQueryClient();
   const take = async (graph: string, name: string) => {
     try {
@@ -216,7 +216,7 @@ function Places({ known, action, knowledge, context }: PlacesProps) {
   );
 }
 
-interface PlacesProps extends Pick<Props, "known" | "knowledge"> {
+interface UsesAndRobotsProps extends Pick<Props, "known" | "knowledge"> {
   action: Action;
   context: EditorContext;
 }
@@ -244,14 +244,14 @@ function Body(props: Props & { action: Action; context: EditorContext; seq: numb
         </div>
       ) : (
         <ActionOverview {...action} labels={graphLabels(context.graph)}>
-          <Places {...props} />
+          <UsesAndRobots {...props} />
         </ActionOverview>
       )}
     </div>
   );
 }
 
-function Inside(props: Props) {
+function OpenedAction(props: Props) {
   const { id, person, slots } = props;
   const { context } = useEditor(id, noPanel);
   const { seq, unsaved } = useThrottledLink();
@@ -262,7 +262,7 @@ function Inside(props: Props) {
   useFreshLibrary(seq, unsaved);
   const action = context.graph.actions.find(({ missing }) => !missing);
   const inSlot = (slot: HTMLElement | null, part: ReactNode) => slot && createPortal(part, slot);
-  if (gone) return <Gone />;
+  if (gone) return <MissingAction />;
   return (
     <EditorReactContext value={context}>
       {inSlot(slots.status, <SaveStatus />)}
@@ -282,7 +282,7 @@ function Inside(props: Props) {
   );
 }
 
-function Gone() {
+function MissingAction() {
   return (
     <Empty
       icon={<IconMapOff size={22} />}
@@ -306,7 +306,7 @@ export function OpenAction(props: Props) {
       keep={{ graph: id, person }}
       fallback={<Skeleton height={180} m="lg" />}
     >
-      <Inside key={id} {...props} />
+      <OpenedAction key={id} {...props} />
     </RoomProvider>
   );
 }

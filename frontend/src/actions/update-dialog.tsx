@@ -122,7 +122,7 @@ const nameOf = ({ side, from }: Rename): string =>
   `${side === "in" ? "" : "output "}${pathWords(from)}`;
 
 /** Offers, for each removed parameter, the names that it may have now. */
-function Others({ update }: { update: Update }) {
+function OtherRenames({ update }: { update: Update }) {
   const names = [...new Set(update.possible.map(nameOf))];
   if (names.length === 0) return null;
   return (
@@ -173,7 +173,7 @@ function RenameChoices({ update }: { update: Update }) {
           onChange={() => update.tick(each.key)}
         />
       ))}
-      <Others update={update} />
+      <OtherRenames update={update} />
     </fieldset>
   );
 }
@@ -218,7 +218,7 @@ function Use({ use, update, mayEdit }: UseProps) {
   );
 }
 
-function Done({ done, update }: { done: readonly UpdatedUse[]; update: Update }) {
+function UpdatedGraphs({ done, update }: { done: readonly UpdatedUse[]; update: Update }) {
   const changed = done.filter((each) => each.changed);
   if (done.length === 0) return null;
   const nameOf = (graph: string) =>
@@ -257,7 +257,7 @@ function Body({ id, mayEdit, onClose }: Props) {
           {update.wrong}
         </p>
       )}
-      <Done done={update.done} update={update} />
+      <UpdatedGraphs done={update.done} update={update} />
       {mayEdit && <RenameChoices update={update} />}
       {older.length === 0 ? (
         <p>Every graph uses the parameters as they are.</p>

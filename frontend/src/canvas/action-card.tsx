@@ -65,7 +65,7 @@ function Head({ action, oldName }: { action: Action; oldName: string | null }) {
 }
 
 /** Shows everything that is read on a card: head, state and parameters. */
-function Words({ data, selected }: Pick<NodeProps<CardNode>, "data" | "selected">) {
+function CardText({ data, selected }: Pick<NodeProps<CardNode>, "data" | "selected">) {
   const { action, progress, givers } = data;
   const rows = cardRows(action.inputs, givers, progress?.inputs);
   const says = progress !== null || action.missing;
@@ -153,7 +153,7 @@ export const ActionCard = memo(function ActionCard({
       {expanded ? (
         <expanded.Frame of={action.key} progress={progress} />
       ) : (
-        <Words data={data} selected={selected} />
+        <CardText data={data} selected={selected} />
       )}
       {OUTCOMES.map((outcome, i) => (
         <Handle

@@ -46,13 +46,13 @@ export function toneOf({
 }
 
 /** Return the place of a pill; it moves away from its card while single ports are shown. */
-function played({ pill, docked, direction }: RoutedLine, open: boolean): Point | null {
+function pillPlace({ pill, docked, direction }: RoutedLine, open: boolean): Point | null {
   if (!pill || !docked || !open) return pill;
   return direction === "right" ? [pill[0] + PILL_PLAY, pill[1]] : [pill[0], pill[1] + PILL_PLAY];
 }
 
 /** Return the corners of the piece from a port to the pill of its bundle. */
-function stub(line: RoutedLine, x: number, y: number, pill: Point): Point[] {
+function portPiece(line: RoutedLine, x: number, y: number, pill: Point): Point[] {
   const [side] = line.points;
   if (line.direction === "right") {
     const turn = (side?.[0] ?? x) + 15;
@@ -79,7 +79,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
     edge?.style.setProperty("--end", `${dx}px ${dy}px`);
   }, [dx, dy]);
   if (!data || !line) return <g ref={group} />;
-  const pill = played(line, open);
+  const pill = pillPlace(line, open);
   const opened = open && line.docked && pill !== null && !data.entry && !data.portless;
   return (
     <g ref={group}>
@@ -89,9 +89,9 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
       {opened && (
         <BaseEdge
           id={`${id}|port`}
-          path={pathOf(stub(line, sourceX, sourceY, pill), 5)}
+          path={pathOf(portPiece(line, sourceX, sourceY, pill), 5)}
           interactionWidth={14}
-          className={style.stub ?? ""}
+          className={style.portPiece ?? ""}
           style={{ stroke: outcomeColor[data.outcome], strokeWidth: data.lit ? 2.75 : 2 }}
         />
       )}

@@ -53,7 +53,7 @@ interface Props {
 }
 
 /** Shows placeholders while the graph loads, and a hint while it is empty. */
-function Emptiness({ waiting, context }: { waiting: boolean; context: EditorContext }) {
+function EmptyCanvas({ waiting, context }: { waiting: boolean; context: EditorContext }) {
   const fingers = useHasFingersOnly();
   if (waiting) {
     return (
@@ -99,7 +99,7 @@ function Emptiness({ waiting, context }: { waiting: boolean; context: EditorCont
 }
 
 /** Shows the tools at the bottom left, and `children` in the other corner. */
-function Foot(props: { compact: boolean; hidden: boolean; children: ReactNode }) {
+function PaneFoot(props: { compact: boolean; hidden: boolean; children: ReactNode }) {
   return (
     <div className={style.foot}>
       <div className={style.tools} data-covers="bottom" data-hidden={props.hidden || undefined}>
@@ -126,20 +126,20 @@ function FollowRun({ onFollow }: { onFollow: () => void }) {
   );
 }
 
-function Inside(props: Props) {
+function PaneInFlow(props: Props) {
   const { me, canvasHandle, compact, phone, writing, corner, past } = props;
   const seen = useWatched(past.drawn);
   const context = useDrawnContext(seen);
   const { graph } = context;
-  const dry = context.dryRun !== null || undefined;
-  const then = context.past !== null || undefined;
-  const { progress, marks, run } = then ? NOTHING_RUNS : props;
+  const isDryRun = context.dryRun !== null || undefined;
+  const isPast = context.past !== null || undefined;
+  const { progress, marks, run } = isPast ? NOTHING_RUNS : props;
   const arrived = useLinkPart(({ seq }) => seq > 0);
   const first = useFirstLayout(context, arrived, props.onPlacing);
   const { selection, select, folded } = context;
   const canvas = useCanvasElements({
     graph: first.pending ? EMPTY_GRAPH : context.graph,
-    ...{ selection, select, folded, marks, alone: then === true },
+    ...{ selection, select, folded, marks, alone: isPast === true },
     progress: context.dryRun?.sighting.progress ?? progress,
     laidOut: first.places,
   });
@@ -158,8 +158,8 @@ function Inside(props: Props) {
     direction: graph.direction,
     phone,
     opens: begun ? "cards" : arrived && !first.pending ? "ends" : "nothing",
-    progress: dry ? NOTHING : progress,
-    run: dry ? null : run,
+    progress: isDryRun ? NOTHING : progress,
+    run: isDryRun ? null : run,
     pointer,
   });
   const followed = useFollowedView({ flow, frame, view, onPanned });
@@ -175,15 +175,15 @@ function Inside(props: Props) {
 
   return (
     <div className={style.whole}>
-      <Above id={context.id} />
+      <DraftBarAbove id={context.id} />
       <div className={style.sides} data-side={side !== null || undefined}>
         {side && <side.Canvas {...{ side, flow, onPanned: endFollowing }} />}
         <div
           className={style.stage}
           ref={frame}
           aria-busy={first.busy}
-          data-dry={dry}
-          data-then={then}
+          data-dry={isDryRun}
+          data-then={isPast}
         >
           <ChangeMarked marks={seen?.marks ?? null}>
             <EditableCanvas
@@ -196,16 +196,19 @@ function Inside(props: Props) {
               writing={writing}
             />
           </ChangeMarked>
-          <Emptiness waiting={waiting} context={context} />
+          <EmptyCanvas waiting={waiting} context={context} />
           {!compact && <Robots />}
           <FollowFrame />
-          <Foot compact={compact || side !== null} hidden={phone && (dry ?? then) === true}>
+          <PaneFoot
+            compact={compact || side !== null}
+            hidden={phone && (isDryRun ?? isPast) === true}
+          >
             {lost && <FollowRun onFollow={onFollow} />}
             {!context.dryRun && corner}
-          </Foot>
+          </PaneFoot>
         </div>
       </div>
-      <Below context={context} record={props.record} {...{ past }} />
+      <PlaybackBar context={context} record={props.record} {...{ past }} />
     </div>
   );
 }
@@ -226,7 +229,7 @@ function useDrawnContext(seen: SeenPast | null): EditorContext {
 }
 
 /** Shows the bar above the canvas of a draft, which leads to its origin. */
-function Above({ id }: { id: string }) {
+function DraftBarAbove({ id }: { id: string }) {
   return (
     <PartBoundary waiting={null}>
       <DraftBar id={id} />
@@ -234,14 +237,14 @@ function Above({ id }: { id: string }) {
   );
 }
 
-interface BelowProps {
+interface PlaybackBarProps {
   context: EditorContext;
   record: ReactNode;
   past: Past;
 }
 
 /** Shows the bar of the dry-run, or that of the moment of the past. */
-function Below({ context, record, past }: BelowProps) {
+function PlaybackBar({ context, record, past }: PlaybackBarProps) {
   const { dryRun, past: place } = context;
   if (dryRun) {
     return (
@@ -279,7 +282,7 @@ function useDryRunInView(context: EditorContext): void {
 export function CanvasPane(props: Props) {
   return (
     <ReactFlowProvider>
-      <Inside {...props} />
+      <PaneInFlow {...props} />
     </ReactFlowProvider>
   );
 }

@@ -13,7 +13,7 @@ import { type Maps, mapsFrom, mapsOf, type Root } from "../graph/document-keys";
 import { asLogged } from "../sync/changed-twice";
 import type { ChangedTwice } from "../sync/indexed-db";
 import { useGraph, useRoom } from "../sync/use-room";
-import { Say } from "./room-notice";
+import { Notice } from "./room-notice";
 import style from "./stranded-edits-dialog.module.css";
 
 interface ToldTwice {
@@ -164,7 +164,7 @@ export function ChangedTwiceNotice({ all }: { all: readonly ChangedTwice[] }) {
   const unseen = told.filter(({ twice }) => twice.cause === "unseen").length;
   const away = told.length - unseen;
   return (
-    <Say
+    <Notice
       icon={<IconGitMerge size={16} />}
       tone="warn"
       action={
@@ -186,6 +186,6 @@ export function ChangedTwiceNotice({ all }: { all: readonly ChangedTwice[] }) {
         </>
       )}
       <ChangedTwiceDialog told={told} opened={open} onClose={() => setOpen(false)} />
-    </Say>
+    </Notice>
   );
 }

@@ -116,7 +116,7 @@ const loadSinceMarks = () => import("../history/since-marks").then((part) => par
 
 const loadLostDrafts = () => import("./panels/lost-drafts").then((part) => part.LostDrafts);
 
-function QuietPart({ load }: { load: () => Promise<ComponentType> }) {
+function LatePart({ load }: { load: () => Promise<ComponentType> }) {
   const [Part, setPart] = useState<ComponentType | null>(null);
   useEffect(() => {
     let gone = false;
@@ -131,12 +131,12 @@ function QuietPart({ load }: { load: () => Promise<ComponentType> }) {
   return Part === null ? null : <Part />;
 }
 
-function QuietParts() {
+function LateParts() {
   return (
     <>
-      <QuietPart load={loadLevels} />
-      <QuietPart load={loadSinceMarks} />
-      <QuietPart load={loadLostDrafts} />
+      <LatePart load={loadLevels} />
+      <LatePart load={loadSinceMarks} />
+      <LatePart load={loadLostDrafts} />
     </>
   );
 }
@@ -457,7 +457,7 @@ export function Editor(props: Props) {
         <DesktopLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
       )}
       <RoomNotices />
-      <QuietParts />
+      <LateParts />
       <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />
       <AddPane context={context} request={adding} known={known} onClose={editor.closeAdd} />
     </EditorContextProvider>

@@ -2,14 +2,14 @@
 import type { ReactNode } from "react";
 import style from "./room-notices.module.css";
 
-interface SayProps {
+interface NoticeProps {
   icon: ReactNode;
   tone?: "warn";
   children: ReactNode;
   action?: ReactNode;
 }
 
-export function Say({ icon, tone, children, action }: SayProps) {
+export function Notice({ icon, tone, children, action }: NoticeProps) {
   return (
     <div className={style.say} data-tone={tone}>
       <span className={style.icon} aria-hidden>

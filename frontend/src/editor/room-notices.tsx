@@ -17,7 +17,7 @@ import {
   useStrandedEdits,
 } from "../sync/use-room";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
-import { Say } from "./room-notice";
+import { Notice } from "./room-notice";
 import style from "./room-notices.module.css";
 
 const ChangedTwiceNotice = lazyPart(() =>
@@ -40,22 +40,22 @@ function ReadOnly() {
   const readOnly = useLinkPart((link) => link.readOnly);
   if (readOnly === undefined) return null;
   return (
-    <Say icon={<IconLock size={16} />} tone="warn">
+    <Notice icon={<IconLock size={16} />} tone="warn">
       {readOnly} What was before that is shown, and can be downloaded and run. Whoever runs the
       server can look with <code>action-assistant verify</code> and bring a backup back with{" "}
       <code>restore</code>.
-    </Say>
+    </Notice>
   );
 }
 
-function Others() {
+function OthersNotice() {
   const waiting = useOthersWaiting();
   const graph = useGraphPart(({ name }) => name);
   const [opened, setOpened] = useState<boolean | null>(null);
   const said = otherPeopleWait(waiting.others);
   if (said === null) return null;
   return (
-    <Say
+    <Notice
       icon={<IconUsers size={16} />}
       action={
         <Button size="compact-sm" onClick={() => setOpened(true)}>
@@ -74,7 +74,7 @@ function Others() {
           />
         )}
       </OverlayBoundary>
-    </Say>
+    </Notice>
   );
 }
 
@@ -141,17 +141,17 @@ export function RoomNotices() {
       <div className={style.notices} role="status">
         <ReadOnly />
         {said && (
-          <Say
+          <Notice
             icon={
               said.notice === "went-back" ? <IconHistory size={16} /> : <IconInfoCircle size={16} />
             }
             action={<CloseButton aria-label="Close the note" onClick={said.dismiss} />}
           >
             {words[said.notice]}
-          </Say>
+          </Notice>
         )}
         {choosing.waits && (
-          <Say
+          <Notice
             icon={<IconArchive size={16} />}
             tone="warn"
             action={
@@ -162,10 +162,10 @@ export function RoomNotices() {
           >
             {choosing.edits === 1 ? "1 edit waits" : `${choosing.edits} edits wait`} for your
             decision, {choosing.cause}.
-          </Say>
+          </Notice>
         )}
         <ChangedByBoth />
-        <Others />
+        <OthersNotice />
       </div>
       <OverlayBoundary>
         {choosing.any && (

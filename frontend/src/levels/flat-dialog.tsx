@@ -63,7 +63,7 @@ function Origins({ flat: { origins, left_out } }: { flat: FlatGraph }) {
   );
 }
 
-function Make({ flat, context, onClose }: Props & { flat: FlatGraph }) {
+function FlatForm({ flat, context, onClose }: Props & { flat: FlatGraph }) {
   const client = useQueryClient();
   const [, go] = useLocation();
   const [wrong, setWrong] = useState("");
@@ -124,7 +124,7 @@ export function FlatDialog({ context, onClose }: Props) {
       )}
       {flat.data?.umrf &&
         (mayEdit ? (
-          <Make flat={flat.data} {...{ context, onClose }} />
+          <FlatForm flat={flat.data} {...{ context, onClose }} />
         ) : (
           <Origins flat={flat.data} />
         ))}

@@ -57,9 +57,9 @@ function cardsOf(given: Graph, { levels }: LevelGraph) {
   const closed = estimatedSizes(given);
   const rest = positionsOf(given, closed);
   const sizes = new Map<Key, Size>([...levels].map(([key, each]) => [key, layoutOf(each).size]));
-  const roomy = roomFor(given, rest, sizes);
-  const graph = roomy?.graph ?? given;
-  const places: Positions = roomy ? placesIn(roomy, rest) : rest;
+  const enlarged = roomFor(given, rest, sizes);
+  const graph = enlarged?.graph ?? given;
+  const places: Positions = enlarged ? placesIn(enlarged, rest) : rest;
   const cards = graph.actions.map((action): LevelCard => {
     const [x, y] = places.get(action.key) ?? [0, 0];
     const size = sizes.get(action.key) ?? closed.get(action.key) ?? EMPTY;

@@ -84,7 +84,7 @@ function UsedIn() {
 }
 
 /** The button to leave an inner graph; it replaces the line of levels on narrow screens. */
-function Out() {
+function LeaveButton() {
   const leave = useWatched(graphsInside, (inside) => inside?.leave);
   if (!leave) return null;
   return (
@@ -97,7 +97,7 @@ function Out() {
 export function LevelStatus() {
   return (
     <>
-      <Out />
+      <LeaveButton />
       <UsedIn />
     </>
   );

@@ -98,7 +98,7 @@ function framed(graph: Graph, toView: PlaceMap): Graph["notes"] {
 }
 
 /** A graph with room for enlarged cards. */
-interface Roomy {
+interface EnlargedGraph {
   /** The graph with its waypoints and frames as they are drawn. */
   readonly graph: Graph;
   /** Sizes of the enlarged cards. */
@@ -113,7 +113,7 @@ export function roomFor(
   rest: Positions,
   sizes: Sizes,
   hidden?: ReadonlyMap<Key, string>,
-): Roomy | null {
+): EnlargedGraph | null {
   const closed = new Map(
     graph.actions.flatMap((action) =>
       sizes.has(action.key) && rest.has(action.key) && !hidden?.has(action.key)
@@ -138,7 +138,7 @@ export function roomFor(
 }
 
 /** Return the drawn places of places in the document. */
-export const placesIn = ({ toView }: Roomy, places: Positions): Positions =>
+export const placesIn = ({ toView }: EnlargedGraph, places: Positions): Positions =>
   new Map([...places].map(([key, at]) => [key, toView(at)]));
 
 /** Return the folded frames with the places and sizes as they are drawn. */
@@ -155,13 +155,13 @@ export function spreadOf(
   { graph, rest, folding, flow }: StandingGraph,
   sizes: Sizes,
 ): Spread | null {
-  const roomy = roomFor(graph, rest, sizes, folding?.blockOf);
-  if (roomy === null) return null;
-  const { toView, toDocument } = roomy;
+  const enlarged = roomFor(graph, rest, sizes, folding?.blockOf);
+  if (enlarged === null) return null;
+  const { toView, toDocument } = enlarged;
   return {
-    graph: roomy.graph,
-    folding: folding && foldedIn(roomy.graph, folding),
-    expanded: roomy.sizes,
+    graph: enlarged.graph,
+    folding: folding && foldedIn(enlarged.graph, folding),
+    expanded: enlarged.sizes,
     flow: {
       ...flow,
       screenToFlowPosition: (at, options) => {
@@ -172,7 +172,7 @@ export function spreadOf(
     },
     toView,
     toDocument,
-    placesOf: (places) => placesIn(roomy, places),
-    sizesOf: (measured) => new Map([...measured, ...roomy.sizes]),
+    placesOf: (places) => placesIn(enlarged, places),
+    sizesOf: (measured) => new Map([...measured, ...enlarged.sizes]),
   };
 }

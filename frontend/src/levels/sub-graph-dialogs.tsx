@@ -103,7 +103,7 @@ function ofGraph({ graph }: EditorContext) {
     way.filter(({ key }) => there.has(key)).slice(-1);
 }
 
-function Sides({ look: { inputs = {}, outputs = {} } }: { look: ExtractionLook }) {
+function ParameterLists({ look: { inputs = {}, outputs = {} } }: { look: ExtractionLook }) {
   const sides = [
     ["Takes", inputs],
     ["Gives", outputs],
@@ -157,7 +157,7 @@ function useMaking(context: EditorContext, look: ExtractionLook, again: () => Pr
   };
 }
 
-function Form({ look, again, ...props }: ExtractProps & Looked) {
+function ExtractForm({ look, again, ...props }: ExtractProps & PreviewProps) {
   const { context, actions, onClose } = props;
   const taken = useTakenNames(context);
   const first = context.graph.actions.find(({ key }) => actions.includes(key))?.name ?? "";
@@ -202,7 +202,7 @@ function Form({ look, again, ...props }: ExtractProps & Looked) {
           setWrong("");
         }}
       />
-      <Sides look={look} />
+      <ParameterLists look={look} />
       {differences.length === 0 ? (
         <p className={style.quiet}>It does what these actions do now, for all of their results.</p>
       ) : (
@@ -229,12 +229,12 @@ function Form({ look, again, ...props }: ExtractProps & Looked) {
   );
 }
 
-interface Looked {
+interface PreviewProps {
   look: ExtractionLook;
   again: () => Promise<unknown>;
 }
 
-function Refused({ look, context, onClose }: ExtractProps & { look: ExtractionLook }) {
+function ExtractRefusal({ look, context, onClose }: ExtractProps & { look: ExtractionLook }) {
   return (
     <>
       <p>No graph can be made of exactly these actions:</p>
@@ -270,8 +270,8 @@ export function ExtractDialog(props: ExtractProps) {
     >
       {isPending && <Skeleton height={180} />}
       {error !== null && <p role="alert">{errorText(error)}</p>}
-      {data?.umrf === null && <Refused look={data} {...props} />}
-      {data?.umrf && <Form look={data} again={refetch} {...props} />}
+      {data?.umrf === null && <ExtractRefusal look={data} {...props} />}
+      {data?.umrf && <ExtractForm look={data} again={refetch} {...props} />}
     </Modal>
   );
 }
@@ -299,7 +299,7 @@ function unpack(context: EditorContext, look: UnpackingLook): void {
   announcer.say(`Unpacked into ${counted(count, "action")}`);
 }
 
-function Asked({ look, context, onClose, name }: Asking) {
+function UnpackQuestion({ look, context, onClose, name }: UnpackQuestionProps) {
   const { differences = [], reasons = [], left_out: left = [] } = look;
   const refused = reasons.length > 0;
   const told = refused ? reasons : differences;
@@ -337,7 +337,7 @@ function Asked({ look, context, onClose, name }: Asking) {
   );
 }
 
-interface Asking extends Omit<UnpackProps, "action"> {
+interface UnpackQuestionProps extends Omit<UnpackProps, "action"> {
   look: UnpackingLook;
   name: string;
 }
@@ -374,7 +374,7 @@ export function UnpackDialog({ context, action, onClose }: UnpackProps) {
   if (look === null) return null;
   return (
     <Modal opened onClose={onClose} title={`Unpack ${isolated(name)}`} size="32rem">
-      <Asked {...{ look, context, onClose, name }} />
+      <UnpackQuestion {...{ look, context, onClose, name }} />
     </Modal>
   );
 }

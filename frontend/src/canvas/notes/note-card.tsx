@@ -113,7 +113,7 @@ export function NoteTools({ note, notes, above = 10 }: ToolsProps) {
   );
 }
 
-function Words({ note, empty }: { note: Note; empty: string }) {
+function NoteWords({ note, empty }: { note: Note; empty: string }) {
   if (note.text === "") return <span data-empty>{empty}</span>;
   return note.kind === "frame" ? <span>{note.text}</span> : <NoteText text={note.text} />;
 }
@@ -161,7 +161,7 @@ export const NoteCard = memo(function NoteCard({ data, selected }: NodeProps<Not
         {editing && notes ? (
           <NoteField note={note} notes={notes} />
         ) : (
-          <Words note={note} empty={empty} />
+          <NoteWords note={note} empty={empty} />
         )}
       </div>
     </div>

@@ -248,7 +248,7 @@ function Faults({ context, run }: { context: EditorContext; run: DryRun }) {
   );
 }
 
-function Said({ run }: { run: DryRun }) {
+function MomentText({ run }: { run: DryRun }) {
   if (run.failed) return <span className={style.failed}>{errorText(run.failed)}</span>;
   if (run.moments.length === 0)
     return <span>{run.busy ? "Working it out …" : "Nothing happens."}</span>;
@@ -337,7 +337,7 @@ export function DryRunBar({
       </div>
       <div className={style.row}>
         <p className={style.said} aria-live="polite">
-          <Said run={run} />
+          <MomentText run={run} />
         </p>
         <Choices context={context} run={run} />
       </div>

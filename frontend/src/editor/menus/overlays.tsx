@@ -50,13 +50,13 @@ export function Overlays(props: Props) {
         <GraphPrint context={props.context} />
       </PartBoundary>
       <OverlayBoundary>
-        <Opened {...props} />
+        <OpenOverlay {...props} />
       </OverlayBoundary>
     </>
   );
 }
 
-function Opened({ context, known, overlay, onClose }: Props) {
+function OpenOverlay({ context, known, overlay, onClose }: Props) {
   if (overlay === null) return null;
   switch (overlay.kind) {
     case "arrow":

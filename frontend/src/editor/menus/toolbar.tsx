@@ -82,7 +82,7 @@ const EditActionMenu = lazyPart(() =>
   import("./edit-action-menu").then((part) => part.EditActionMenu),
 );
 
-function Everything() {
+function AllActionsButton() {
   return (
     <LateOpening opens="menu" part={(button) => <EditActionMenu button={button} />}>
       <ActionIcon
@@ -113,7 +113,7 @@ export const Toolbar = memo(function Toolbar({ compact }: { compact: boolean }) 
       {!compact && <Tool editAction={zoomOut} />}
       {!compact && <Tool editAction={zoomIn} />}
       <Tool editAction={fit} />
-      <Everything />
+      <AllActionsButton />
     </div>
   );
 });
