@@ -84,7 +84,7 @@ test("one makes a sub-graph while another edits, both see it, and undo brings al
   await expect(dialog).toContainText("Takesthing string");
   await expect(dialog).toContainText("Givesnothing");
   await dialog.getByRole("textbox", { name: "Name of the new graph" }).fill("Locate");
-  await expect(dialog).toContainText("called that already");
+  await expect(dialog).toContainText("has this name already");
   await dialog.getByRole("textbox", { name: "Name of the new graph" }).fill("Take");
   expect(await violations(page)).toEqual([]);
   await annotate(mari.page, "Place", "gently");

@@ -141,6 +141,21 @@ test("no folders import each other in a circle, folders in folders neither", () 
   expect([...edges.keys()].filter((folder) => reaches(folder, folder))).toEqual([]);
 });
 
+test("no files import each other in a circle, not even for a type", () => {
+  const isInCircle = (file: string): boolean => {
+    const seen = new Set<string>();
+    const next = [...(imports.get(file) ?? [])];
+    for (let at = next.pop(); at !== undefined; at = next.pop()) {
+      if (at === file) return true;
+      if (seen.has(at)) continue;
+      seen.add(at);
+      next.push(...(imports.get(at) ?? []));
+    }
+    return false;
+  };
+  expect(modules.filter(isInCircle)).toEqual([]);
+});
+
 test("what only tests need is imported by tests only", () => {
   const wrong = modules.filter(
     (file) =>

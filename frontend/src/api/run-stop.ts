@@ -3,7 +3,14 @@
  * loads this and no list.
  */
 import { fetchJson } from "./http";
-import type { Run } from "./runs";
+import type { RunnerApi } from "./schema/runner";
+
+/** A run as far as it is told: lists leave out its actions, and what is live its graph. */
+export type Run = RunnerApi["RunSummary"] & {
+  [Part in Exclude<keyof RunnerApi["RunWhole"], keyof RunnerApi["RunSummary"]>]?:
+    | RunnerApi["RunWhole"][Part]
+    | undefined;
+};
 
 /** A lost run has not: nobody has seen it at rest yet. */
 export function hasEnded(run: Run): boolean {

@@ -3,7 +3,7 @@
 import { useQuery } from "@tanstack/react-query";
 import { isolated } from "../words/isolated";
 import { fetchJson } from "./http";
-import { getRun } from "./run-stop";
+import { getRun, type Run } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
 
 /**
@@ -18,12 +18,7 @@ export type DurationBounds = RunnerApi["DurationBounds"];
  * which it went on for certain. */
 export type Visit = RunnerApi["VisitShown"];
 export type ActionRun = RunnerApi["ActionShown"];
-/** A run as far as it is told: lists leave out its actions, and what is live its graph. */
-export type Run = RunnerApi["RunSummary"] & {
-  [Part in Exclude<keyof RunnerApi["RunWhole"], keyof RunnerApi["RunSummary"]>]?:
-    | RunnerApi["RunWhole"][Part]
-    | undefined;
-};
+export type { Run };
 
 /** Return the address of a person as words that follow the name; "" if none was recorded. */
 export function requesterPlace(asker: Requester | null): string {

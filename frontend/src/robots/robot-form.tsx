@@ -18,7 +18,6 @@ import { useLive } from "../api/page-link";
 import { changeRobot, type Registration, registerRobot } from "../api/robots";
 import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
-import type { EditedRobot } from "./robots-page";
 
 export const NEW: Registration = {
   name: "",
@@ -112,6 +111,12 @@ function Reach({ robot, errorOf, onChange }: ReachProps) {
       />
     </Stack>
   );
+}
+
+/** A registration in its form; `isNew`: the robot is not registered yet. */
+export interface EditedRobot {
+  robot: Registration;
+  isNew: boolean;
 }
 
 export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose: () => void }) {

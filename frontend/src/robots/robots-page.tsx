@@ -7,17 +7,12 @@ import { useMay } from "../api/people";
 import { type FoundEngine, type Registration, useFoundEngines, useRosReach } from "../api/robots";
 import { Empty } from "../ui/empty";
 import { RobotCard } from "./robot-card";
-import { NEW, RobotForm } from "./robot-form";
+import { type EditedRobot, NEW, RobotForm } from "./robot-form";
 import style from "./robots-page.module.css";
 
 interface Props {
   /** Makes a graph of what a robot runs or was told. */
   onImport: (text: string, name: string) => void;
-}
-
-export interface EditedRobot {
-  robot: Registration;
-  isNew: boolean;
 }
 
 function Practise() {
