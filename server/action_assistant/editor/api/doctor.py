@@ -42,6 +42,7 @@ def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
         "/api/doctor",
         guards=[Needs("restore")],
         summary="What `doctor` finds wrong with this installation; takes some seconds",
+        operation_id="examine",
     )
     async def doctor() -> list[Diagnostic]:
         found = await examination.answer()
@@ -53,6 +54,7 @@ def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
         "/api/doctor/last",
         guards=[Needs("restore")],
         summary="What `doctor` found last, and how long ago, at once; with `look` it begins to look again",
+        operation_id="getLastExamination",
     )
     async def last_examination(look: bool = False) -> LastExamination:
         if look:

@@ -34,8 +34,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def read_pieces(request: Request[Any, Any, Any]) -> Pieces:
         found = await app_state.services.workers.files(importing.pieces, await request.body())
-        pieces: Pieces = encoded(found)
-        return pieces
+        return encoded(Pieces, found)
 
     @post(
         "/api/graphs/{graph_id:str}/rehearsal",
@@ -52,7 +51,6 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         sight = await services.graph_reader.moment(graph_id, data.seq)
         inside = await services.graph_checks.inside(sight)
         found = await services.workers.files(rehearsed, sight, data, inside)
-        played: Rehearsal = encoded(found)
-        return played
+        return encoded(Rehearsal, found)
 
     return [read_pieces, rehearse]

@@ -46,8 +46,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_flat(graph_id: str, at: Seq | None = None) -> FlatGraph:
         services = app_state.services
         whole = await _whole(services, graph_id, at)
-        found: FlatGraph = encoded(await services.graph_reader.ask(flat_graph, *whole))
-        return found
+        return encoded(FlatGraph, await services.graph_reader.ask(flat_graph, *whole))
 
     @post(
         "/api/graphs/{graph_id:str}/flat",

@@ -100,11 +100,11 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
     ) -> Response[MadeGraph] | Response[Preview]:
         if preview:
             found = await _previewed(app_state.services, await request.body())
-            return Response(encoded(found), status_code=200)
+            return Response(encoded(Preview, found), status_code=200)
         services, person = app_state.services, person_of(request)
         await services.people.seen(person)
         made, told = await services.catalogue.create(await request.body(), person.id)
-        reading = None if told is None else encoded(told)
+        reading = None if told is None else encoded(ImportReport, told)
         body = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
         return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
@@ -177,7 +177,9 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, seq)
-        return Problems(sight.seq, encoded(await services.graph_checks.problems(sight)))
+        return Problems(
+            sight.seq, encoded(tuple[Problem, ...], await services.graph_checks.problems(sight))
+        )
 
     @post(
         "/api/graphs/{graph_id:str}/rewriting",
@@ -194,8 +196,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id)
         then = await services.graph_reader.at(graph_id, seq)
         inside = await _inside_with(services, then, text)
-        answer: TextEdit = encoded(await services.workers.files(edited_text, then, text, inside))
-        return answer
+        return encoded(TextEdit, await services.workers.files(edited_text, then, text, inside))
 
     @put(
         "/api/graphs/{graph_id:str}/umrf",

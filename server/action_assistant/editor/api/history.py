@@ -78,8 +78,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         found = await services.history.of(graph_id, limit=limit, before=before)
-        entries: list[HistoryEntry] = encoded(found)
-        return entries
+        return encoded(list[HistoryEntry], found)
 
     @get(
         "/api/graphs/{graph_id:str}/document",
@@ -110,8 +109,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id)
         newest = await services.journal.newest(graph_stream(graph_id))
         found = await services.blame.changes(graph_id, after, min(upto, newest), limit)
-        steps: list[DocumentStep] = encoded(found)
-        return steps
+        return encoded(list[DocumentStep], found)
 
     @get(
         "/api/graphs/{graph_id:str}/diff",
@@ -127,10 +125,10 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id)
         then = await _moment(services, graph_id, before, "/from")
         later = await _moment(services, graph_id, after, "/to")
-        found: Difference = encoded(
-            await services.change_index.text(change_summaries.differing, graph_id, then, later)
+        return encoded(
+            Difference,
+            await services.change_index.text(change_summaries.differing, graph_id, then, later),
         )
-        return found
 
     return [get_history, get_document, get_changes, get_difference]
 
@@ -144,8 +142,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_blame(graph_id: str, of: str, at: Seq | None = None) -> list[FieldBlame]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        fields: list[FieldBlame] = encoded(await services.blame.of(graph_id, of, at))
-        return fields
+        return encoded(list[FieldBlame], await services.blame.of(graph_id, of, at))
 
     @get(
         "/api/graphs/{graph_id:str}/blame/values",
@@ -157,8 +154,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
     ) -> list[FieldValue]:
         services = app_state.services
         await services.catalogue.require(graph_id)
-        values: list[FieldValue] = encoded(await services.blame.of_field(graph_id, of, field, at))
-        return values
+        return encoded(list[FieldValue], await services.blame.of_field(graph_id, of, field, at))
 
     @post(
         "/api/graphs/{graph_id:str}/since",

@@ -11,7 +11,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.graphs import MadeGraph, Seq
 from action_assistant.editor.catalogue.catalogue import GraphView
-from action_assistant.editor.interchange.importing import Preview
+from action_assistant.editor.interchange.importing import ImportReport, Preview
 from action_assistant.editor.library import library_updates
 from action_assistant.editor.library.action_uses import GraphAsAction, LibraryAction
 from action_assistant.editor.library.library_edits import GraphMoment, UpdatedGraph
@@ -82,8 +82,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="listActions",
     )
     async def list_actions() -> list[LibraryAction]:
-        known: list[LibraryAction] = encoded(await app_state.services.library.all())
-        return known
+        return encoded(list[LibraryAction], await app_state.services.library.all())
 
     @get(
         "/api/actions/graphs",
@@ -91,8 +90,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="listGraphsAsActions",
     )
     async def list_graphs_as_actions() -> list[GraphAsAction]:
-        known: list[GraphAsAction] = encoded(await app_state.services.library.graphs())
-        return known
+        return encoded(list[GraphAsAction], await app_state.services.library.graphs())
 
     @get(
         "/api/actions/deleted",
@@ -122,10 +120,10 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         body = await request.body()
         if preview:
             found = await services.workers.files(library_updates.preview, body)
-            return Response(encoded(found), status_code=200)
+            return Response(encoded(Preview, found), status_code=200)
         await services.people.seen(person)
         made, told = await services.library_edits.create(body, person.id)
-        reading = None if told is None else encoded(told)
+        reading = None if told is None else encoded(ImportReport, told)
         whole = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
         return Response(whole, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
@@ -168,10 +166,9 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def compare_with_file(action_id: str, request: Asking) -> Difference:
         body = await request.body()
-        found: Difference = encoded(
-            await app_state.services.library_edits.replacing_would(action_id, body)
+        return encoded(
+            Difference, await app_state.services.library_edits.replacing_would(action_id, body)
         )
-        return found
 
     return [
         *(list_actions, list_graphs_as_actions, list_deleted_actions, create_action),
@@ -191,7 +188,7 @@ def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(action_id, "action")
         renames = Renames(_pairs("inputs", inputs), _pairs("outputs", outputs))
         seq, found = await services.library_edits.uses(action_id, renames)
-        return ActionUses(seq, encoded(found))
+        return ActionUses(seq, encoded(tuple[ActionUse, ...], found))
 
     @post(
         "/api/actions/{action_id:str}/uses",

@@ -29,10 +29,9 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         services = app_state.services
         kind = await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, at)
-        found: PackageList = encoded(
-            await services.workers.files(action_packages.listed, sight, kind)
+        return encoded(
+            PackageList, await services.workers.files(action_packages.listed, sight, kind)
         )
-        return found
 
     @get(
         "/api/graphs/{graph_id:str}/packages/{package:str}",
@@ -44,8 +43,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         kind = await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, at)
         made = await services.workers.files(action_packages.contents, sight, kind, package)
-        found: PackageContents = encoded(made)
-        return found
+        return encoded(PackageContents, made)
 
     @get(
         "/api/graphs/{graph_id:str}/packages.zip",

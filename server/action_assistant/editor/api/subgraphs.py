@@ -96,8 +96,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def look_at_extraction(graph_id: str, data: Extracting) -> ExtractionLook:
         services = app_state.services
         chosen = await _chosen(services, graph_id, data)
-        look: ExtractionLook = encoded(await services.workers.files(extraction_look, *chosen))
-        return look
+        return encoded(ExtractionLook, await services.workers.files(extraction_look, *chosen))
 
     @post(
         "/api/graphs/{graph_id:str}/subgraphs",
@@ -114,7 +113,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
             chosen = await _chosen(services, graph_id, data)
             found = await services.workers.files(subgraph_file, *chosen)
             made, _ = await services.catalogue.bring(found.umrf, person.id, keys=found.keys)
-        body = MadeSubGraph(made, encoded(found.changes))
+        body = MadeSubGraph(made, encoded(tuple[KeyChange, ...], found.changes))
         return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
     @post(
@@ -135,10 +134,10 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         if known is None or known.graph == graph_id:
             raise NotFound(f"“{name}” stands for no graph.")
         inside = await services.graph_reader.now(known.graph)
-        look: UnpackingLook = encoded(
-            await services.workers.files(unpacking_look, sight, data.action, data.at, inside)
+        return encoded(
+            UnpackingLook,
+            await services.workers.files(unpacking_look, sight, data.action, data.at, inside),
         )
-        return look
 
     @post(
         "/api/graphs/{graph_id:str}/uses",

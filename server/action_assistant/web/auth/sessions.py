@@ -203,7 +203,7 @@ def session_routes(
     """Return the routes under `/api/session`."""
     sessions = Sessions(keys, page_port, reception, addresses=addresses, limits=limits)
 
-    @get("/api/session", summary="Who is signed in")
+    @get("/api/session", summary="Who is signed in", operation_id="getSession")
     async def who(request: _Asking) -> SignedIn:
         session = live_session(request)
         await to_thread.run_sync(browsers.note, session)
@@ -213,6 +213,7 @@ def session_routes(
         "/api/session",
         status_code=200,
         summary="Sign in, or change one's name",
+        operation_id="signIn",
         request_max_body_size=_BODY,
     )
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
@@ -224,12 +225,18 @@ def session_routes(
         "/api/session/invitation",
         status_code=200,
         summary="What an invitation leads to",
+        operation_id="lookAtInvitation",
         request_max_body_size=_BODY,
     )
     async def look(data: JSONBody[InvitationQuestion], request: _Asking) -> Invited:
         return sessions.look(data.invitation, request)
 
-    @delete("/api/session", status_code=204, summary="Sign out: this session ends, everywhere")
+    @delete(
+        "/api/session",
+        status_code=204,
+        summary="Sign out: this session ends, everywhere",
+        operation_id="signOut",
+    )
     async def sign_out(request: _Asking) -> Response[None]:
         try:
             await _end(revoked, request)
@@ -247,6 +254,7 @@ def revocation(revoked: Revocations) -> list[ControllerRouterHandler]:
         "/api/revocations",
         status_code=204,
         summary="End every session that came in by an invitation, or one session",
+        operation_id="revokeSessions",
         guards=[Needs("share")],
     )
     async def revoke(data: JSONBody[Revocation]) -> None:
@@ -261,7 +269,12 @@ def revocation(revoked: Revocations) -> list[ControllerRouterHandler]:
         except ValueError as error:
             raise BadInput(f"{error}.", where={"path": "/invitation"}) from error
 
-    @delete("/api/session", status_code=204, summary="Sign out: this session ends, everywhere")
+    @delete(
+        "/api/session",
+        status_code=204,
+        summary="Sign out: this session ends, everywhere",
+        operation_id="signOut",
+    )
     async def sign_out(request: _Asking) -> None:
         await _end(revoked, request)
 

@@ -230,7 +230,11 @@ _PASSED_ON: Final = ("x-forwarded-for", "forwarded", "via")
 def _proving(keys: Keys) -> ControllerRouterHandler:
     keys.prove("", "")  # takes a moment, once
 
-    @get("/api/server", summary="That this server knows the token, before anybody shows it")
+    @get(
+        "/api/server",
+        summary="That this server knows the token, before anybody shows it",
+        operation_id="proveServer",
+    )
     async def prove(
         request: Request[Any, Any, Any],
         challenge: Annotated[str, Parameter(min_length=20, max_length=100)],
@@ -247,16 +251,25 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
 def _health(monitoring: Monitoring | None) -> list[ControllerRouterHandler]:
     health = Health("ok", VERSION, commit())
 
-    @get("/healthz", summary="Whether the process answers")
+    @get("/healthz", summary="Whether the process answers", operation_id="getHealth")
     async def healthz() -> Health:
         return health
 
-    @get("/readyz", summary="Whether the process can do its work, and which part of it cannot")
+    @get(
+        "/readyz",
+        summary="Whether the process can do its work, and which part of it cannot",
+        operation_id="getReadiness",
+    )
     async def readyz() -> Response[Readiness]:
         found = await monitoring.readiness() if monitoring is not None else Readiness(ready=True)
         return Response(found, status_code=200 if found.ready else 503)
 
-    @get(METRICS, media_type=MediaType.TEXT, summary="Measures, as Prometheus reads them")
+    @get(
+        METRICS,
+        media_type=MediaType.TEXT,
+        summary="Measures, as Prometheus reads them",
+        operation_id="getMetrics",
+    )
     async def metrics() -> Response[str]:
         text = await monitoring.exposition() if monitoring is not None else ""
         return Response(text, media_type="text/plain; version=0.0.4")
@@ -265,6 +278,7 @@ def _health(monitoring: Monitoring | None) -> list[ControllerRouterHandler]:
         "/api/status",
         guards=[Needs("restore")],
         summary="How the process is: versions, room, queues, what goes on",
+        operation_id="getStatus",
     )
     async def status() -> ProcessStatus:
         if monitoring is None:

@@ -101,13 +101,13 @@ class DraftMerges:
             into=asked.into,
             seq=pair.origin.seq,
             draft_seq=pair.draft.seq,
-            changes=encoded(found.changes),
-            conflicts=encoded(found.conflicts),
-            problems=encoded(found.problems),
-            umrf=encoded(found.umrf),
+            changes=encoded(Changes, found.changes),
+            conflicts=encoded(tuple[DraftConflict, ...], found.conflicts),
+            problems=encoded(tuple[Problem, ...], found.problems),
+            umrf=encoded(str, found.umrf),
             authors=tuple(self._people.person(each) for each in found.authors),
-            origin_did=encoded(found.origin_did),
-            draft_did=encoded(found.draft_did),
+            origin_did=encoded(Changes, found.origin_did),
+            draft_did=encoded(Changes, found.draft_did),
         )
 
     async def merge(self, draft: str, author: str, wanted: WantedMerge) -> MergedDraft:
