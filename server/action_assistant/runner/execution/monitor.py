@@ -63,7 +63,7 @@ class Finding(NamedTuple):
 Job: TypeAlias = Callable[[RunInWorker], Awaitable[Finding]]
 
 
-class Look(NamedTuple):
+class EngineQuery(NamedTuple):
     """One look at the engine: its place in the order of everything that is sent and asked, and when it
     began, in seconds of the event loop's clock."""
 
@@ -205,9 +205,9 @@ class Monitor:
 
     # --- what is asked ------------------------------------------------------------------------
 
-    def begin_look(self) -> Look:
+    def begin_query(self) -> EngineQuery:
         """Note that the engine is being asked now."""
-        return Look(next(self._order), anyio.current_time())
+        return EngineQuery(next(self._order), anyio.current_time())
 
     def pace(self, run: Run) -> float:
         """Return after how many seconds the engine is to be asked again, at the least."""
@@ -227,7 +227,9 @@ class Monitor:
         self._hear_nothing(changes, why)
         return changes
 
-    def answered(self, run: Run, standing: Standing, answer: Answer, look: Look) -> RunChanges:
+    def answered(
+        self, run: Run, standing: Standing, answer: Answer, look: EngineQuery
+    ) -> RunChanges:
         """Take in the answer to one look, and `standing` as it is after that."""
         changes = RunChanges(run, self._clock_us)
         self._take(changes, standing, answer, look)
@@ -241,7 +243,9 @@ class Monitor:
             at = self._clock_us()
             changes.tell(Silent(at, at - round(silent * 1e6), self.trouble))
 
-    def _take(self, changes: RunChanges, standing: Standing, answer: Answer, look: Look) -> None:
+    def _take(
+        self, changes: RunChanges, standing: Standing, answer: Answer, look: EngineQuery
+    ) -> None:
         """Draw the conclusions that one answer allows, and no others."""
         run = changes.run
         name = run.graph_name
@@ -349,7 +353,7 @@ class Monitor:
         shown: list[Snapshot],
         ours: list[Snapshot],
         answer: Answer,
-        look: Look,
+        look: EngineQuery,
     ) -> None:
         """Decide whether the run is over, or why that is not proven. `shown`: the graph and all that may
         be sub-graphs of it; `ours`: those that it has begun."""

@@ -338,7 +338,7 @@ class OpenRun:
                 with anyio.move_on_after(wait):
                     await self._asks.wait()
                 self._asks = anyio.Event()
-                look = self.watch.begin_look()
+                look = self.watch.begin_query()
                 try:
                     with anyio.fail_after(_GET_S):
                         answer = await self._link.get()

@@ -89,7 +89,7 @@ class Simulators:
         if behaviours is not None and with_behaviours >= MOST_WITH_BEHAVIOURS:
             most = MOST_WITH_BEHAVIOURS
             raise TooMany(f"{most} runs with behaviours go on already; stop some, or wait.")
-        link = SimulatedLink(_Made(facts, script, behaviours), clock_us, self.take)
+        link = SimulatedLink(_EngineConfig(facts, script, behaviours), clock_us, self.take)
         self._links.add(link)
         return link
 
@@ -101,7 +101,7 @@ class Simulators:
             await anyio.sleep(_REST * (time.perf_counter() - began))
 
 
-class _Made(msgspec.Struct, frozen=True):
+class _EngineConfig(msgspec.Struct, frozen=True):
     """The configuration of a simulated engine."""
 
     facts: EngineFacts
@@ -117,7 +117,7 @@ class SimulatedLink:
 
     def __init__(
         self,
-        made: _Made,
+        made: _EngineConfig,
         clock_us: Callable[[], int],
         take: Callable[[Callable[[], None]], Awaitable[None]],
     ) -> None:
@@ -283,7 +283,7 @@ class SimulatedLink:
             self._subscribers.tell(EngineChanged(at=self._clock_us(), state="gone", why=self._why))
 
 
-def _born(theirs: socket.socket, made: _Made) -> Any:
+def _born(theirs: socket.socket, made: _EngineConfig) -> Any:
     with theirs:
         return child(_live, theirs, made, name="simulated engine", nice=_NICE)
 
@@ -296,7 +296,7 @@ def _framed(value: object) -> bytes:
 # --- in the process -------------------------------------------------------------------------------
 
 
-def _live(wire: socket.socket, made: _Made) -> None:
+def _live(wire: socket.socket, made: _EngineConfig) -> None:
     """Run one engine until the runner closes its end of the socket."""
     performer = None
     if made.behaviours is not None:
@@ -310,7 +310,9 @@ def _live(wire: socket.socket, made: _Made) -> None:
             performer.end()
 
 
-async def _serve(wire: socket.socket, made: _Made, performer: BehaviourPerformer | None) -> None:
+async def _serve(
+    wire: socket.socket, made: _EngineConfig, performer: BehaviourPerformer | None
+) -> None:
     reader, writer = await asyncio.open_connection(sock=wire)
     writer.transport.set_write_buffer_limits(high=_WAITING)
     engine = engine_of(made.facts, made.script, performer)

@@ -160,7 +160,7 @@ def test_it_can_be_killed_before_its_process_is_there(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("number", ["SIGKILL", "SIGSTOP"])
-def test_not_even_one_that_turns_on_its_keeper_gets_away(bench: Bench, number: str) -> None:
+def test_not_even_one_that_turns_on_its_supervisor_gets_away(bench: Bench, number: str) -> None:
     write(
         bench.folder,
         acts=f"""

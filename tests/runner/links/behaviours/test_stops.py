@@ -160,8 +160,10 @@ def test_the_end_of_the_engines_process_ends_its_behaviours(
     write(folder, deaf=DEAF)
     run = start(client, chain("Deaf"))
     moves(client, run, "Deaf_0")
-    keeper = until(lambda: [each for each in processes() if each.parent() not in processes()])[0]
-    engine = keeper.parent()
+    supervisor = until(lambda: [each for each in processes() if each.parent() not in processes()])[
+        0
+    ]
+    engine = supervisor.parent()
     assert engine is not None
     engine.kill()
     until(lambda: not processes())

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 import psutil
 
-from action_assistant.runner.links.behaviours import inside
+from action_assistant.runner.links.behaviours import call_program
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -78,11 +78,11 @@ def side_by_side(count: int, source: str, name: str = "wide") -> Graph:
 
 
 def processes() -> list[psutil.Process]:
-    """Of behaviours that go on, and their keepers, as far as tests of this process have begun them."""
+    """Of behaviours that go on, and their supervisors, as far as tests of this process have begun them."""
     found = []
     for each in psutil.process_iter():
         with suppress(psutil.Error):
-            ours = str(Path(inside.__file__)) in each.cmdline()
+            ours = str(Path(call_program.__file__)) in each.cmdline()
             if ours and each.environ()["PATH"].endswith(_OURS):
                 found.append(each)
     return found

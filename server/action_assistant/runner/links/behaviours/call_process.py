@@ -13,9 +13,9 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.runner.links.behaviours.call_output import BadOutput, CallOutput, LineReader
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder, Unusable, file_of
-from action_assistant.runner.links.behaviours.keeper import Keeper
-from action_assistant.runner.links.behaviours.sayings import LineReader, Sayings, Unbelievable
+from action_assistant.runner.links.behaviours.supervisor import Supervisor
 from action_assistant.umrf.semantics import Call, Returned
 
 _CHUNK: Final = 65_536  # bytes that are read at once, as many as a pipe holds
@@ -35,7 +35,7 @@ class CallProcess:
         self._call = call
         self._ended = ended
         self._lock = threading.Lock()
-        self._sayings = Sayings(call.outputs)
+        self._output = CallOutput(call.outputs)
         self._commands = bytearray()
         self._order = b""
         self._wrong = ""  # why the call is killed
@@ -59,9 +59,9 @@ class CallProcess:
         with self._lock:
             self._wrong = self._wrong or why
             self._wake()
-            return self._sayings.told(why)
+            return self._output.text(why)
 
-    def joined(self, seconds: float) -> bool:
+    def wait(self, seconds: float) -> bool:
         """Wait for the end of the call, so many seconds at most; return whether it has ended."""
         self._thread.join(seconds)
         return not self._thread.is_alive()
@@ -74,7 +74,7 @@ class CallProcess:
 
     def _live(self) -> None:
         try:
-            error = self._carried_out()
+            error = self._run()
         except Unusable as unusable:
             error = str(unusable)
         except OSError as failed:
@@ -82,8 +82,8 @@ class CallProcess:
         with self._lock:
             self._closed = True
             os.close(self._nudge)
-            said = self._sayings
-            message = said.told(*([error] if error else []))
+            said = self._output
+            message = said.text(*([error] if error else []))
         is_good = not error and said.done is not None
         result = "on_error" if not is_good or said.done is None else _RESULTS[said.done.result]
         self._ended(
@@ -95,7 +95,7 @@ class CallProcess:
             )
         )
 
-    def _carried_out(self) -> str:
+    def _run(self) -> str:
         """Start the process, read its output and wait for its end; return what went wrong, or "". Raises OSError,
         Unusable."""
         source = self._folder.source(self._call.name)
@@ -106,51 +106,51 @@ class CallProcess:
             "inputs": self._call.inputs,
         }
         self._order = msgspec.json.encode(order) + b"\n"
-        with Keeper() as keeper:
-            self._hear_out(keeper)
-            code = keeper.ended()
+        with Supervisor() as supervisor:
+            self._exchange(supervisor)
+            code = supervisor.ended()
         with self._lock:
-            done = self._sayings.done
+            done = self._output.done
             if self._wrong:
                 return self._wrong
         return _death(code) if done is None else done.error or ""
 
-    def _hear_out(self, keeper: Keeper) -> None:
-        """Send commands to the behaviour and read its output until its keeper has ended."""
+    def _exchange(self, supervisor: Supervisor) -> None:
+        """Send commands to the behaviour and read its output until its supervisor has ended."""
         readers = {
-            keeper.said: LineReader(self._sayings.hear, cut=False),
-            keeper.printed: LineReader(self._sayings.hear_print, cut=True),
+            supervisor.said: LineReader(self._output.take_line, cut=False),
+            supervisor.printed: LineReader(self._output.take_printed, cut=True),
         }
         with selectors.DefaultSelector() as selector:
-            for number in (keeper.end_sign, self._nudge, *readers):
+            for number in (supervisor.end_sign, self._nudge, *readers):
                 selector.register(number, selectors.EVENT_READ)
-            while not keeper.is_over():
-                self._tell_on(keeper, selector)
-                for key, _ in selector.select(keeper.patience):
+            while not supervisor.is_over():
+                self._write_on(supervisor, selector)
+                for key, _ in selector.select(supervisor.patience):
                     if key.fd == self._nudge:
                         os.eventfd_read(self._nudge)
                     elif key.fd in readers and not self._hear(key.fd, readers[key.fd]):
                         selector.unregister(key.fd)
-                if self._wrong or self._sayings.done is not None:
-                    keeper.let_go()
+                if self._wrong or self._output.done is not None:
+                    supervisor.let_go()
         for number, lines in readers.items():
             for _ in range(_LAST):
                 if not self._hear(number, lines):
                     break
             self._take(lines.end)
 
-    def _tell_on(self, keeper: Keeper, selector: selectors.BaseSelector) -> None:
+    def _write_on(self, supervisor: Supervisor, selector: selectors.BaseSelector) -> None:
         """Write as much to the behaviour as it takes, and have the selector report when it takes more."""
         if self._order:
-            self._order = self._order[keeper.write(self._order) :]
+            self._order = self._order[supervisor.write(self._order) :]
         with self._lock:
             if self._commands and not self._order:
-                del self._commands[: keeper.write(bytes(self._commands))]
+                del self._commands[: supervisor.write(bytes(self._commands))]
             waits = bool(self._order or self._commands)
-        if waits and keeper.commands not in selector.get_map():
-            selector.register(keeper.commands, selectors.EVENT_WRITE)
-        elif not waits and keeper.commands in selector.get_map():
-            selector.unregister(keeper.commands)
+        if waits and supervisor.commands not in selector.get_map():
+            selector.register(supervisor.commands, selectors.EVENT_WRITE)
+        elif not waits and supervisor.commands in selector.get_map():
+            selector.unregister(supervisor.commands)
 
     def _hear(self, number: int, lines: LineReader) -> bool:
         """Read one chunk; return whether more may come."""
@@ -169,7 +169,7 @@ class CallProcess:
             try:
                 if not self._wrong:
                     said()
-            except Unbelievable as wrong:
+            except BadOutput as wrong:
                 self._wrong = str(wrong)
 
 

@@ -121,7 +121,7 @@ class BehaviourPerformer:
         """Kill all calls and wait for their end, 3 s at most."""
         deadline = time.monotonic() + _ENDING_S
         for process in self.kill_all():
-            if not process.joined(max(0.0, deadline - time.monotonic())):
+            if not process.wait(max(0.0, deadline - time.monotonic())):
                 log.error("a behaviour goes on that cannot be killed")
 
     def _tell(self, number: int, command: str) -> None:

@@ -13,8 +13,8 @@ from typing import Final, Self
 
 log: Final = logging.getLogger(__name__)
 
-_INSIDE: Final = Path(__file__).with_name("inside.py")
-_KEEPER_S: Final = 1.0  # for the keeper to end all its descendants
+_PROGRAM: Final = Path(__file__).with_name("call_program.py")
+_SUPERVISOR_S: Final = 1.0  # for the supervisor to end all its descendants
 _AGAIN_S: Final = 0.05
 _LONG_S: Final = 10.0  # after this an error is logged
 #: The only environment variables that a behaviour gets. The last one says that a Python made by `make ros` was
@@ -25,7 +25,7 @@ _KNOWN: Final = (
 )
 
 
-class Keeper:
+class Supervisor:
     """A process that starts a behaviour and kills all its descendants when the behaviour ends, when `let_go` is
     called, or when the runner dies. Used on one thread."""
 
@@ -40,7 +40,7 @@ class Keeper:
                     "-I",
                     "-P",
                     "-B",
-                    str(_INSIDE),
+                    str(_PROGRAM),
                     str(lifeline.fileno()),
                 ],
                 stdin=theirs.fileno(),
@@ -108,7 +108,7 @@ class Keeper:
         if self._process.poll() is not None:
             return True
         waited = 0.0 if self._let_go is None else time.monotonic() - self._let_go
-        if waited > _KEEPER_S:
+        if waited > _SUPERVISOR_S:
             self._kill_group()
             self._process.kill()
         if waited > _LONG_S and not self._warned:
@@ -120,7 +120,7 @@ class Keeper:
         """Return how the behaviour's process ended, as its exit code or minus its signal, once every descendant
         has ended. Call it after the process has ended."""
         code: int = self._process.wait()
-        if code >= 0:  # the keeper has waited for all its descendants
+        if code >= 0:  # the supervisor has waited for all its descendants
             return code if code < 128 else 128 - code
         while self._kill_group():
             time.sleep(_AGAIN_S)

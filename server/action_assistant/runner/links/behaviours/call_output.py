@@ -13,36 +13,36 @@ _TOLD: Final = 20  # messages that are kept, and as many printed lines
 _TEXT: Final = 500  # characters of each
 
 
-class Unbelievable(Exception):
+class BadOutput(Exception):
     """Output of a behaviour that breaks the rules, for which it is killed; the message is a sentence for people."""
 
 
-class OutputSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="output"):
+class OutputLine(msgspec.Struct, frozen=True, tag_field="kind", tag="output"):
     """The behaviour has set an output to this value."""
 
     name: str
     value: Any
 
 
-class MessageSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="message"):
+class MessageLine(msgspec.Struct, frozen=True, tag_field="kind", tag="message"):
     """The behaviour has a message for people."""
 
     text: str
 
 
-class DoneSaid(msgspec.Struct, frozen=True, tag_field="kind", tag="done"):
+class DoneLine(msgspec.Struct, frozen=True, tag_field="kind", tag="done"):
     """The behaviour has ended; with an `error` the result does not count."""
 
     result: bool
     error: str | None = None
 
 
-_Said: TypeAlias = OutputSaid | MessageSaid | DoneSaid
+_Line: TypeAlias = OutputLine | MessageLine | DoneLine
 
 
 class LineReader:
     """Splits chunks of bytes into lines and passes each on. A line that is too long is cut (`cut`), or raises
-    Unbelievable."""
+    BadOutput."""
 
     def __init__(self, hear: Callable[[bytes], None], *, cut: bool) -> None:
         self._hear = hear
@@ -78,51 +78,51 @@ class LineReader:
             self._rest.clear()
             self._drops = True
         else:
-            raise Unbelievable(f"The behaviour said more than {most >> 20} MB in one line.")
+            raise BadOutput(f"The behaviour said more than {most >> 20} MB in one line.")
 
 
-class Sayings:
+class CallOutput:
     """The checked output of one call. `types` are the types of the action's outputs, by flat name."""
 
     def __init__(self, types: dict[str, str]) -> None:
         self._types = types
         self.outputs: dict[str, Any] = {}
-        self.done: DoneSaid | None = None
+        self.done: DoneLine | None = None
         self._messages = _Kept()
         self._printed = _Kept()
 
-    def hear(self, line: bytes) -> None:
-        """Take in one line of the protocol. Raises Unbelievable."""
+    def take_line(self, line: bytes) -> None:
+        """Take in one line of the protocol. Raises BadOutput."""
         try:
-            said = msgspec.json.decode(line, type=_Said)
+            said = msgspec.json.decode(line, type=_Line)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            raise Unbelievable(f"The behaviour said what nobody can read: {error}.") from error
+            raise BadOutput(f"The behaviour said what nobody can read: {error}.") from error
         match said:
-            case OutputSaid(name=name, value=value):
+            case OutputLine(name=name, value=value):
                 self.outputs[name] = self._checked(name, value)
-            case MessageSaid(text=text):
+            case MessageLine(text=text):
                 self._messages.add(text)
-            case DoneSaid():
+            case DoneLine():
                 self.done = self.done or said
 
-    def hear_print(self, line: bytes) -> None:
+    def take_printed(self, line: bytes) -> None:
         """Take in one line that the behaviour has printed."""
         self._printed.add(line.decode(errors="replace"))
 
-    def told(self, *more: str) -> str | None:
+    def text(self, *more: str) -> str | None:
         """Return the messages and printed lines, followed by `more`, as one text; None if there are none."""
-        lines = [*self._messages.told("messages"), *self._printed.told("printed lines"), *more]
+        lines = [*self._messages.lines("messages"), *self._printed.lines("printed lines"), *more]
         return "\n".join(lines) or None
 
     def _checked(self, name: str, value: Any) -> Any:
         if name not in self._types:
-            raise Unbelievable(f"The action has no output “{name[:80]}”.")
+            raise BadOutput(f"The action has no output “{name[:80]}”.")
         kind = self._types[name]
         try:
             return value_of(kind, value)
         except (ValueError, OverflowError):
             given = type(value).__name__
-            raise Unbelievable(f"The output “{name[:80]}” is a {kind}, not {given}.") from None
+            raise BadOutput(f"The output “{name[:80]}” is a {kind}, not {given}.") from None
 
 
 class _Kept:
@@ -139,7 +139,7 @@ class _Kept:
         else:
             self._more += 1
 
-    def told(self, what: str) -> list[str]:
+    def lines(self, what: str) -> list[str]:
         more = [f"… and {self._more:,} more {what}"] if self._more else []
         return [*self._lines, *more]
 

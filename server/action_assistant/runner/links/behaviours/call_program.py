@@ -1,6 +1,6 @@
 """The program of one call: started by its path in isolated mode, so it imports nothing of this package.
 
-It is two processes. One runs the behaviour. The other one, the keeper, waits until the behaviour ends or its
+It is two processes. One runs the behaviour. The other one, the supervisor, waits until the behaviour ends or its
 lifeline (a socket to the runner) is closed; then it kills all its descendants, waits for them, and exits.
 """
 
@@ -103,20 +103,20 @@ class _Saying:
             self._out.flush()
 
 
-# --- the keeper -----------------------------------------------------------------------------------
+# --- the supervisor -----------------------------------------------------------------------------------
 
 
-def keep(lifeline: int) -> NoReturn:
+def supervise(lifeline: int) -> NoReturn:
     """Fork the behaviour, wait for its end or the lifeline's, and kill all descendants. Exits with the code of
     the behaviour, or 128 plus the signal that ended it."""
     libc = ctypes.CDLL(None)
     libc.prctl(_SUBREAPER, 1)
     libc.prctl(_NO_NEW_PRIVILEGES, 1)
-    keeper = os.getpid()
+    supervisor = os.getpid()
     child = os.fork()
     if child == 0:
         libc.prctl(_PDEATHSIG, signal.SIGKILL)
-        if os.getppid() != keeper:
+        if os.getppid() != supervisor:
             os._exit(1)
         os.setpgid(0, 0)
         os.close(lifeline)
@@ -257,4 +257,4 @@ def _told_of(error: BaseException, file: str) -> str:
 
 
 if __name__ == "__main__":
-    keep(int(sys.argv[1]))
+    supervise(int(sys.argv[1]))
