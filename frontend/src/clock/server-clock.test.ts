@@ -46,7 +46,7 @@ test("a server's clock that is set back is followed", () => {
   expect(offset.now()).toBe(2 * HOUR);
 });
 
-test("what is no time changes nothing", () => {
+test("a stamp that is no time changes nothing", () => {
   const offset = new ServerOffset(7);
   offset.hear(Number.NaN, 1);
   offset.hearRoundTrip(Number.NaN, 1, 2);

@@ -101,7 +101,7 @@ async function placed(context: EditorContext, clip: Clip): Promise<Clip> {
 }
 
 async function land(context: EditorContext, clip: Clip, own: boolean): Promise<void> {
-  // Where the pointer is now: laying out takes a moment.
+  // The pointer is read now, since laying out takes a moment.
   const pointer = context.view.pointer();
   const pieces = await placed(context, clip);
   const keys = paste(
@@ -122,7 +122,7 @@ async function land(context: EditorContext, clip: Clip, own: boolean): Promise<v
 export async function pasteText(context: EditorContext, text: string): Promise<void> {
   const ours = lastCopied();
   if (ours !== null && ours.text === text && !isEmpty(ours.clip)) {
-    // Where it came from it would lie on itself.
+    // In the graph it came from, the copy would lie on the original.
     const same = Object.keys(ours.clip.actions).some((key) =>
       context.graph.actions.some((action) => action.key === key),
     );

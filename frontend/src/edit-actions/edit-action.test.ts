@@ -60,7 +60,7 @@ test("Mod is the command key on a Mac", () => {
   expect(printedKeys("Mod+Shift+z", true)).toEqual(["⌘", "⇧", "Z"]);
 });
 
-test("who may only look is offered nothing that changes the graph, and told why", () => {
+test("a viewer is offered no change of the graph, and is told why", () => {
   const context = {
     mayEdit: false,
     canUndo: true,

@@ -87,7 +87,7 @@ const signs: Record<string, string> = {
   Escape: "Esc",
 };
 
-/** The shortcut as it is printed on keys. */
+/** Returns the keys of a shortcut as they are printed on a keyboard. */
 export function printedKeys(shortcut: string, mac = onMac): string[] {
   const parts = shortcut.split("+");
   const last = parts.at(-1) ?? "";

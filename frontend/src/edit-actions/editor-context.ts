@@ -100,7 +100,7 @@ export interface CanvasView {
   reopen(): void;
   zoomIn(): void;
   zoomOut(): void;
-  /** `whole`: as large as it fits; else only so near that it can be read. */
+  /** Shows these keys. `whole`: as large as they fit; else only so large that they can be read. */
   show(keys: readonly Key[], goal?: "middle" | "whole"): void;
   /** Moves the view only if this is not in it. */
   reveal(at: Position): void;
@@ -133,12 +133,12 @@ export interface EditorContext {
   readonly view: CanvasView;
   /** The graph is played on the canvas; null while it is not. */
   readonly dryRun: DryRun | null;
-  /** The graph is shown as it was, to look at; null: as it is now. */
+  /** The past moment that is shown, to look at; null for the present. */
   readonly past: PastPlace | null;
   lookAt(place: PastPlace | null): void;
   /** True if this person may change the present graph; the past cannot be changed. */
   readonly mayGoBack: boolean;
-  /** `from`: a moment of a run, as the record has it; `script`: what actions do to begin with. */
+  /** Begins a dry-run. `from` is a recorded moment of a run; `script` says what actions do at first. */
   beginDryRun(from?: DryRunSeed | null, script?: DryRunSeed["behaviours"]): void;
   select(ids: Iterable<string>): void;
   setTool(tool: Tool): void;
@@ -238,7 +238,7 @@ export function freePosition(context: EditorContext): Position {
 
 /**
  * Adds an action by hand: everything else stays where it is drawn. The first one of a graph is what
- * the graph starts with. Answers its key.
+ * the graph starts with. Returns its key.
  */
 export function addActionAt(context: EditorContext, action: NewAction, position: Position): Key {
   return asOneEdit(context.doc, () => {

@@ -1,4 +1,4 @@
-/** Edit actions that fold frames, which is how one looks at a graph: nothing of it changes. */
+/** Edit actions that fold frames. Folding is part of the view; the graph is not changed. */
 import { IconFold } from "@tabler/icons-react";
 import { framesOf } from "../canvas/folding/folding";
 import { announcer } from "../ui/announcer";

@@ -43,7 +43,7 @@ test("an address leads to a moment, and to what it is compared with", () => {
   expect(pastOf("?at=12&with=<b>")?.with).toBe("own");
 });
 
-test("what else an address says stays", () => {
+test("other parts of an address stay", () => {
   expect(withPast("?action=a1&at=3&with=now", { at: 5, with: "own" })).toBe("?action=a1&at=5");
   expect(withPast("?at=3", null)).toBe("");
   expect(pastOf(withPast("", { at: 9, with: 4 }))).toEqual({ at: 9, with: 4 });

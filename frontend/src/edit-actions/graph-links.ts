@@ -5,7 +5,7 @@ import { relationId } from "../graph/document-keys";
 import type { Graph } from "../graph/model";
 import type { PastPlace } from "./editor-context";
 
-/** The address of a graph, with what is to be shown of it. */
+/** Returns the address of a graph, with the things to be shown. */
 export function linkTo(
   graph: string,
   selection: readonly string[],

@@ -46,7 +46,7 @@ test("a form that is loaded only now gets the keyboard when it is there", () => 
   expect(document.activeElement?.id).toBe("name");
 });
 
-test("whoever types elsewhere by then stays there", () => {
+test("a person who types elsewhere by then keeps the focus there", () => {
   details.run(context);
   later();
   document.getElementById("search")?.focus();
@@ -55,7 +55,7 @@ test("whoever types elsewhere by then stays there", () => {
   expect(document.activeElement?.id).toBe("search");
 });
 
-test("where nothing can be typed the first button gets it", () => {
+test("the first button gets the focus where there is no field", () => {
   show(form('<button id="fix"></button>'));
   details.run(context);
   later();

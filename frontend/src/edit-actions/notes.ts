@@ -138,7 +138,7 @@ export const details: EditAction = {
     const chosen = formOfSelection(context);
     if (chosen === null) return;
     const form = selectorOf(chosen);
-    // Where the panel slides in, it cannot have the focus before it is seen.
+    // A panel that slides in cannot have the focus before it is visible.
     setTimeout(() => whenThere(form, (found) => focusFirst(found, before), PATIENCE), 60);
   },
 };

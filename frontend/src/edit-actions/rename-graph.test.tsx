@@ -63,7 +63,7 @@ test("a graph that others run is renamed at once, and whether they follow is ask
   });
 });
 
-test("nothing is asked where the name stands for another graph, an action, or has not changed", () => {
+test("no question is asked where the name stands for another graph or an action, or has not changed", () => {
   expect(renamed("LiftSafely", false)).toEqual({ name: "LiftSafely", asked: [] });
   expect(renamed("LiftSafely", true, "library")).toEqual({ name: "LiftSafely", asked: [] });
   expect(renamed("Lift", true)).toEqual({ name: "Lift", asked: [] });

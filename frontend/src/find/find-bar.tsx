@@ -110,7 +110,7 @@ export function FindBar({ problems, onClose }: Props) {
     const hit: Hit | undefined = hits[(index + hits.length) % Math.max(1, hits.length)];
     if (hit === undefined) return;
     setAt(hits.indexOf(hit));
-    // What is found on a card with a graph in it is where that card is.
+    // A hit on a card with a graph in it is shown at that card.
     context.select([hit.id.split("/")[0] ?? hit.id]);
     context.view.show(hit.keys);
   };

@@ -49,7 +49,7 @@ test("a hit says what of it was found, unless its name does", () => {
   expect(find(graph, [], "5.0")[0]?.why).toBe("parameter goal.x = 5.0");
 });
 
-test("what is drawn on a card is found where the card is, with the levels that lead there", () => {
+test("actions drawn on a card are found at the card, with the levels that lead there", () => {
   const [, inner] = graph.actions;
   if (!inner) throw new Error("no action");
   const box = { x: 0, y: 0, width: 208, height: 88, progress: null, expanded: false };

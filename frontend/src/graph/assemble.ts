@@ -18,7 +18,7 @@ import {
 } from "./model";
 import { byText, isEqual } from "./values";
 
-/** An action as its own keys tell it, with its place; numbering is not its own affair. */
+/** An action as its own keys describe it, with its place, before actions are numbered. */
 export interface RawAction {
   readonly action: Action;
   readonly order: number;
@@ -29,7 +29,7 @@ export interface Assembly {
   readonly graph: Graph;
   readonly numbered: ReadonlyMap<Action, Action>;
   readonly redirected: ReadonlyMap<Relation, Relation>;
-  /** Ghosts, and the real actions that took up their names. */
+  /** The real action by ghost, for ghosts whose name a real action has taken. */
   readonly takenUp: ReadonlyMap<Key, Key>;
 }
 
@@ -127,7 +127,7 @@ function share(group: readonly Action[], numbers: Map<Key, number>): void {
   }
 }
 
-/** Ghosts whose full name a real action has taken up, and that action. */
+/** Returns the ghosts whose full name a real action has, with that action. */
 function ghostsTakenUp(actions: readonly Action[]): Map<Key, Key> {
   const ghosts = actions.filter((action) => action.missing);
   if (ghosts.length === 0) return new Map();
@@ -144,7 +144,7 @@ function ghostsTakenUp(actions: readonly Action[]): Map<Key, Key> {
   return taken;
 }
 
-/** Arrows of ghosts that were taken up lead to the real action; a pair that exists gets a further listing. */
+/** Redirects arrows of replaced ghosts to the real action; a pair that exists gets a further listing. */
 function redirect(
   relations: readonly Relation[],
   takenUp: ReadonlyMap<Key, Key>,

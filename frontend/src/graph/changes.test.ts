@@ -71,7 +71,7 @@ test("changes are told by what they are changes of, with the values before and a
   ]);
 });
 
-test("what was deleted has its name, and its arrows go with it", () => {
+test("a deleted action is told by its name, and its arrows go with it", () => {
   const { changes } = worked((doc, _, gone) => {
     for (const key of [...rootOf(doc, "actions").keys()]) {
       if (key.startsWith(gone)) rootOf(doc, "actions").delete(key);
@@ -84,7 +84,7 @@ test("what was deleted has its name, and its arrows go with it", () => {
   ]);
 });
 
-test("what somebody else made of it meanwhile is said", () => {
+test("the value that somebody else set meanwhile is shown", () => {
   const { given, then, look } = worked((doc, action) => rename(doc, action, "Peek"));
   const now = { ...then, actions: new Map([...then.actions, [look, "Stare"]]) };
   expect(changesOf(given, now)[0]?.lines).toEqual([

@@ -65,7 +65,7 @@ const SILENT = new Set(["order", "po", "co", "only", "in", "out", "missing", "tw
 const ORDER = ["graph", "action", "arrow", "drawing", "comment"] as const;
 const LONGEST = 120;
 
-/** The changes, as they stand against the graph as it is `now`. */
+/** Returns the changes, compared with the present graph `now`. */
 export function changesOf(given: ChangesInput, now: Maps): readonly GraphChange[] {
   const groups = new Map<string, [Root, string][]>();
   for (const root of ROOTS) {

@@ -72,7 +72,7 @@ test("an arrow tells which of its responses become others", () => {
   ]);
 });
 
-test("what is new or gone is told as that, and what is drawn elsewhere is no difference", () => {
+test("added and removed things are told as such, and another place is no difference", () => {
   const fewer = { ...graph, actions: graph.actions.slice(0, 1), relations: [] };
   expect(differences(graph, fewer).map(({ kind, what }) => `${kind} ${what}`)).toContain(
     "removed Action Drive_1",

@@ -86,7 +86,7 @@ export interface Relation {
   readonly conditions: Conditions;
   readonly required: boolean;
   readonly remap: readonly Remap[];
-  /** The one array that has it, when a file lists one side only. */
+  /** The one list that has the arrow, where a file lists it on one side only. */
   readonly only: "parents" | "children" | null;
   readonly parentOrder: number;
   readonly childOrder: number;

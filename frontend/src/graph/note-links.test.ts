@@ -35,7 +35,7 @@ test("a name that several actions have leads nowhere, and stays as it was writte
   expect(linkedAction(ALL, { name: "Grip", id: "dddddddddddd" })).toBeNull();
 });
 
-test("whatever is written, nothing but links changes, and doing it twice is doing it once", () => {
+test("renaming changes only links, and twice is the same as once, whatever is written", () => {
   const piece = fc.constantFrom(
     "[[",
     "]]",

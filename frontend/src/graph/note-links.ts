@@ -6,7 +6,7 @@
  */
 import type { Action, Graph, Key } from "./model";
 
-/** A link as it is written; `id` is empty as long as it has only a name. */
+/** Matches a link; `id` is empty while it has only a name. */
 const LINK = /\[\[([^[\]\n#]{1,200})(?:#([A-Za-z0-9]{12}))?\]\]/g;
 
 export interface NoteLink {
@@ -57,7 +57,7 @@ export function withLinkIds(text: string, actions: Actions): string {
     .join("");
 }
 
-/** The text as it is said and listed: names without ids. */
+/** Returns the text as people read it: names without ids. */
 export function spokenNote(text: string): string {
   return text.replace(LINK, "$1");
 }
@@ -70,7 +70,7 @@ export interface OpenLink {
   readonly typed: string;
 }
 
-/** Null where no link is open: before `[[`, and once something stands there that no name has. */
+/** Returns the link in which the caret stands; null before `[[`, and after a character that no name has. */
 export function openLink(text: string, caret: number): OpenLink | null {
   const at = text.slice(0, caret).lastIndexOf("[[");
   const typed = text.slice(at + 2, caret);

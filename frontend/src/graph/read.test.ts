@@ -95,7 +95,7 @@ function twoActions(): Y.Doc {
   return doc;
 }
 
-test("what did not change stays the same object", () => {
+test("parts that did not change stay the same objects", () => {
   const doc = twoActions();
   const source = followGraph(doc);
   const before = source.graph();

@@ -50,7 +50,7 @@ import {
   isEqual,
 } from "./values";
 
-/** The fields of one owner: what stands right of its first `|`. */
+/** The fields of one owner, by the part of the key after its first `|`. */
 type OwnerFields = ReadonlyMap<string, unknown>;
 
 /** Reads one document state. Never throws. */
@@ -58,7 +58,7 @@ export function readGraph(maps: Maps): Graph {
   return new Reader(maps).graph();
 }
 
-/** A graph that follows keys as they are told, from whatever keeps them. */
+/** A graph that is updated key by key, from any source of keys. */
 export interface SteppedGraph {
   /** `undefined`: there is nothing under this key. */
   set(root: Root, key: string, value: unknown): void;
@@ -70,7 +70,7 @@ export function stepGraph(maps: Maps): SteppedGraph {
   return new Reader(maps);
 }
 
-/** The ghosts that real actions took up, and under which ids their arrows are shown since. */
+/** Returns the ghosts that real actions replaced, and the ids under which their arrows are shown since. */
 export function readTakenUp(maps: Maps): {
   readonly ghosts: readonly Key[];
   readonly arrows: readonly (readonly [from: string, to: string])[];
@@ -84,11 +84,11 @@ export function readTakenUp(maps: Maps): {
 
 /** A graph that follows a document. `subscribe` and `graph` fit `useSyncExternalStore`. */
 export interface GraphSource {
-  /** The graph now; the same object until something of it changes. */
+  /** Returns the present graph: the same object until a part of it changes. */
   graph(): Graph;
   /** Calls back after a transaction that may have changed it: at once if it is of this page, `own`. */
   subscribe(listener: (own: boolean) => void): () => void;
-  /** Lets go of the document. */
+  /** Stops following the document. */
   close(): void;
 }
 

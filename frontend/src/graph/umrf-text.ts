@@ -17,7 +17,7 @@ import {
   type Relation,
 } from "./model";
 
-/** A value on its way to text. A text is JSON as it stands. */
+/** A tree of values to be written; a text is JSON already. */
 type Tree = JsonText | readonly Tree[] | ReadonlyMap<string, Tree>;
 
 const text = (value: unknown): JsonText => JSON.stringify(value);
@@ -40,7 +40,7 @@ function written(tree: Tree, indent: string): string {
 
 const isList = (tree: Tree): tree is readonly Tree[] => Array.isArray(tree);
 
-/** The chosen actions as a UMRF graph without entry and exit. */
+/** Returns the chosen actions as the text of a UMRF graph without entry and exit. */
 export function umrfText(
   graph: Graph,
   chosen: ReadonlySet<Key>,

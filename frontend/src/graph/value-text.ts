@@ -10,7 +10,7 @@ export function pathWords(path: string): string {
     .join(".");
 }
 
-/** The value as it is spelled; null when there is none. */
+/** Returns the value as it is spelled; null when there is none. */
 export function valueText(parameter: Parameter): string | null {
   const text = parameter.text.trimStart();
   return text.startsWith("{") ? memberText(text, "pvf_value") : text;
@@ -22,7 +22,7 @@ export interface ParameterLine {
   readonly value: string | null;
 }
 
-/** The inputs that matter most: those with a value, then those that still wait for one. */
+/** Returns the most important inputs, `most` of them: those with a value, then those without. */
 export function cardLines(inputs: readonly Parameter[], most: number): ParameterLine[] {
   const lines = inputs.map((input) => ({
     name: pathWords(input.path),

@@ -26,7 +26,7 @@ test("the page is one page at each of its addresses, below its own path only", (
   expect(asked("https://other.example/temoto/", "navigate")).toBe("pass");
   expect(asked("assets/index-abc.js")).toBe("part");
   expect(asked("mark.svg", "no-cors")).toBe("sign");
-  // Whether there is a newer page is asked of the server alone.
+  // Only the server is asked for a newer page.
   expect(asked("")).toBe("pass");
 });
 

@@ -52,7 +52,7 @@ async function kept(url: string): Promise<Response | undefined> {
   return (await (await caches.open(STORE)).match(url, any)) ?? caches.match(url, any);
 }
 
-/** Answers with what the server has, else with the stored copy. The page itself says what it does not reach. */
+/** Returns with what the server has, else with the stored copy. The page itself says what it does not reach. */
 async function newest(request: Request, url: string): Promise<Response> {
   const late = new Promise<null>((resolve) => setTimeout(resolve, PATIENCE, null));
   const asked = fetch(request);

@@ -120,7 +120,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     select([subject]);
     if (!phone) context.view.show(subject.split(">").map((end) => end.split(";")[0] ?? end));
   };
-  // What is selected elsewhere is found here too.
+  // A selection that was made elsewhere is scrolled into view here, too.
   useEffect(() => {
     if (only === undefined || tree.current?.contains(document.activeElement)) return;
     const row = rows.find((candidate) => subjectOf(candidate) === only);

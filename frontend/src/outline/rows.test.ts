@@ -29,7 +29,7 @@ function words(graph: Graph, row: OutlineItem): string {
   }
 }
 
-test("what is expanded in an action stands below it, each level below its own", () => {
+test("graphs expanded in an action stand below it, each level below its own", () => {
   const doc = new Y.Doc();
   const fetch = addAction(doc, { name: "Fetch" });
   const graph = read(doc);

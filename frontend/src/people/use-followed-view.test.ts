@@ -12,7 +12,7 @@ const viewport = fc.record({
   zoom: fc.integer({ min: 80, max: 2200 }).map((n) => n / 1000),
 });
 
-test("who has a frame of the same size sees exactly the same", () => {
+test("a follower with a frame of the same size sees exactly the same", () => {
   fc.assert(
     fc.property(viewport, size, (theirs, frame) => {
       const mine = viewportOnto(viewOf(theirs, frame), frame);
@@ -23,7 +23,7 @@ test("who has a frame of the same size sees exactly the same", () => {
   );
 });
 
-test("whatever the size of one's own frame, all they see is in it, around its middle, never larger", () => {
+test("a follower sees all that the other sees, around the middle and never larger, in a frame of any size", () => {
   fc.assert(
     fc.property(viewport, size, size, (theirs, their, my) => {
       const view = viewOf(theirs, their);

@@ -59,7 +59,7 @@ export function useFollowedView({ flow, frame, view: own, onPanned }: FollowedVi
   const tell = useCallback(
     (viewport: Viewport) => {
       const size = sizeOf();
-      // Who follows passes on what is followed: two who follow each other come to rest.
+      // A follower passes on the view that they follow, so two who follow each other come to rest.
       const told = following.whom() === null ? size && viewOf(viewport, size) : following.view();
       if (told !== null) presence.tell({ view: told });
     },

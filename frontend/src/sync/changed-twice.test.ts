@@ -54,7 +54,7 @@ const told = (all: readonly ChangedTwice[]) =>
   all.map(({ key, mine, theirs }) => [key.split("|")[1] ?? "", mine, theirs]);
 
 describe.each([true, false])("where the value of this page stands: %s", (wins) => {
-  test("both values of a field that both have changed are told, and one of them is chosen", () => {
+  test("a field that two people changed is told with two values, and one of them is chosen", () => {
     open(wins);
     const a = addAction(room.doc, { name: "A" });
     const undo = undoOf(room.doc);
@@ -122,7 +122,7 @@ describe.each([true, false])("where the value of this page stands: %s", (wins) =
     expect(arrows(server.doc)).toEqual(["A>B"]);
   });
 
-  test("what comes between the return and the acknowledgement is told, too", () => {
+  test("a change between the return and the acknowledgement is told, too", () => {
     open(wins);
     const a = addAction(room.doc, { name: "A" });
     server.last.end(1006);
@@ -139,7 +139,7 @@ describe.each([true, false])("where the value of this page stands: %s", (wins) =
   });
 });
 
-test("what waits for seconds on a socket that does not notice is told; what two do at once is not", () => {
+test("an edit that waits for seconds on a dead socket is compared; edits of the same moment are not", () => {
   open(true);
   const a = addAction(room.doc, { name: "A" });
   server.stalled = true;
@@ -275,7 +275,7 @@ describe("a person who stayed on the page", () => {
   });
 });
 
-test("whatever two do, the one who stayed is told of each stored value that was replaced unseen, and of no other", () => {
+test("the person who stayed is told each stored value that was replaced unseen, and no other", () => {
   const steps = fc.array(
     fc.oneof(
       fc.tuple(fc.constantFrom("ada", "bo"), fc.nat(2), fc.constantFrom("a", "b", "c", null)),
@@ -366,7 +366,7 @@ const valuesIn = (doc: Y.Doc) => {
   return new Map(ROOTS.flatMap((root) => [...maps[root]].map(([k, v]) => [`${root} ${k}`, v])));
 };
 
-test("whatever both set at the same time, each field with two values is told, and no other", () => {
+test("each field that two people set at the same time is told, and no other", () => {
   fc.assert(
     fc.property(work, work, work, fc.boolean(), (before, here, there, wins) => {
       const mine = new Y.Doc();
@@ -399,7 +399,7 @@ test("whatever both set at the same time, each field with two values is told, an
         const [was, me, them] = [old, own, other].map((values) => values.get(id));
         const twice = found.get(id);
         if (twice === undefined) {
-          // Nobody's value is lost without a word.
+          // No value is lost without a word.
           expect([me, them === was ? me : them, was]).toContain(now.get(id));
           if (me !== was && them !== was && them !== undefined) expect(me).toEqual(them);
         } else {

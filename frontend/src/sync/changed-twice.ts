@@ -75,7 +75,7 @@ class StoredItems {
 
   add(client: number, clock: number, at: number): void {
     const all = this.clocks.get(client) ?? [];
-    // Of those that are old enough only the newest counts.
+    // Only the newest of the old enough entries counts.
     const old = all.findLastIndex((each) => each.at <= deviceNow() - AWAY_MS);
     this.clocks.set(client, [...all.slice(Math.max(old, 0)), { clock, at }]);
   }

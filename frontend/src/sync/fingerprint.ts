@@ -87,7 +87,7 @@ const TABLE = Int32Array.from({ length: 256 }, (_, n) => {
 const utf8 = new TextEncoder();
 const double = new DataView(new ArrayBuffer(8));
 
-/** A CRC-32 that goes on from another; not yet inverted. */
+/** Continues a CRC-32 from `begun`; the result is not inverted yet. */
 function crcOfBytes(bytes: Uint8Array, begun = -1): number {
   let crc = begun;
   for (const byte of bytes) crc = (TABLE[(crc ^ byte) & 0xff] ?? 0) ^ (crc >>> 8);

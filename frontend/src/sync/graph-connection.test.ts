@@ -130,7 +130,7 @@ test("edits that wait on the old history are laid aside with the values before a
   expect(names(server.doc)).toEqual(["Gone", "Look"]);
 });
 
-test("of what was laid aside the person takes some; it is stored, and the rest is let go", async () => {
+test("the person takes some of the edits laid aside: these are stored, the rest is dropped", async () => {
   const connection = await come();
   const { kept } = await strand(connection);
   const [stranded] = connection.now().stranded;
@@ -145,7 +145,7 @@ test("of what was laid aside the person takes some; it is stored, and the rest i
   expect(names(server.doc)).toEqual(["Gone", "Look"]);
 });
 
-test("who decides later finds the same choice after closing the page, and goes on working", async () => {
+test("a person who decides later can work on, and finds the same choice after closing the page", async () => {
   const first = await come();
   const { kept } = await strand(first);
   addAction(docOf(first), { name: "New" });
@@ -221,7 +221,7 @@ function twisted(doc: Y.Doc): Y.Doc {
   return copy;
 }
 
-test("who shares a client id with somebody else takes another, and loses nothing", async () => {
+test("a page whose client id belongs to somebody else takes another and loses nothing", async () => {
   const connection = await come();
   await arrive();
   const action = addAction(docOf(connection), { name: "Look" });
@@ -242,7 +242,7 @@ test("who shares a client id with somebody else takes another, and loses nothing
   expect(device.waiting).toBe(0);
 });
 
-test("what another page left on the same history is shown, not erased, once this one has decided", async () => {
+test("edits that another page left on the same history are shown, not erased, after this page has decided", async () => {
   const first = await come();
   await arrive();
   const second = await come();
@@ -270,7 +270,7 @@ test("what another page left on the same history is shown, not erased, once this
   expect(device.waiting).toBe(0);
 });
 
-test("where no device keeps edits, leaving the graph keeps its room until they are stored", async () => {
+test("without a device, leaving the graph keeps its room open until the edits are stored", async () => {
   vi.spyOn(console, "warn").mockImplementation(() => undefined);
   device.refuses = true;
   const connection = await come();
@@ -310,7 +310,7 @@ test("a device that keeps nothing loses no choice while the page is open", async
 
 // -- what the server refuses ------------------------------------------------------------------
 
-/** Lets in whoever comes, until all is quiet. */
+/** Accepts every socket until all is quiet. */
 async function comeAndGo(): Promise<void> {
   for (let n = 0; n < 40; n += 1) {
     if (server.last.readyState === 0) server.accept();
@@ -318,7 +318,7 @@ async function comeAndGo(): Promise<void> {
   }
 }
 
-/** Refuses every update in which this text stands. */
+/** Refuses every update that contains this text. */
 function refuse(text: string, code: number): void {
   server.refuses = (update) => (new TextDecoder().decode(update).includes(text) ? code : null);
 }
@@ -368,7 +368,7 @@ test("an edit that is refused alone is laid aside at once, and the next ones are
   expect(connection.now().stranded.map(({ edits }) => edits)).toEqual([1, 1]);
 });
 
-test("what was refused can be made once the server takes it; until then it stays where it is", async () => {
+test("a refused edit can be made once the server takes it, and stays until then", async () => {
   const connection = await come();
   await arrive();
   refuse("Cursed", 4413);
@@ -423,7 +423,7 @@ test("a message that is no edit and is refused each time is not sent for ever", 
   expect(link(connection)).toMatchObject({ state: "refused", why: "not-accepted" });
 });
 
-test("whatever is refused among many edits, by many, all the rest is stored and nothing is lost", async () => {
+test("all other edits are stored and none is lost, whichever edits are refused", async () => {
   const edits = fc.array(fc.tuple(fc.boolean(), fc.boolean()), { minLength: 1, maxLength: 6 });
   await fc.assert(
     fc.asyncProperty(edits, async (script) => {

@@ -52,11 +52,11 @@ interface StrandedEpoch {
   readonly stranded: StrandedEdits;
   /** Returns true if the device has stored them, so that they survive this page. */
   isKept(): boolean;
-  /** Lets go of them on the device. */
+  /** Deletes them on the device. */
   forget(): Promise<void>;
 }
 
-/** A document that differs so often has a fault that opening anew does not mend. */
+/** After so many differences the document has a fault that reopening does not mend. */
 const MOST_DIFFERENCES = 3;
 
 /** Left, with edits that no server and no device has yet. */
@@ -100,7 +100,7 @@ export class GraphConnection {
 
   /**
    * Makes these changes in the graph as the server has it now, as one edit that can be undone, and
-   * lets go of the old edits once that is stored. Answers how many keys changed. When it fails, the
+   * lets go of the old edits once that is stored. Returns how many keys changed. When it fails, the
    * old edits are where they were.
    */
   async apply(stranded: StrandedEdits, difference: DocumentDifference): Promise<number> {
@@ -110,7 +110,7 @@ export class GraphConnection {
     return changed;
   }
 
-  /** Lets go of these edits. */
+  /** Drops these edits. */
   async drop(stranded: StrandedEdits): Promise<void> {
     const aside = this.asides.find((each) => each.stranded === stranded);
     await aside?.forget();
@@ -241,12 +241,12 @@ export class GraphConnection {
     return true;
   }
 
-  /** Makes each of these edits in the newest room. Answers those that are not taken. */
+  /** Makes each of these edits in the newest room. Returns those that are not taken. */
   private async makeAnew(room: Room, edits: readonly UnsavedEdit[]): Promise<UnsavedEdit[]> {
     const left: UnsavedEdit[] = [];
     for (const edit of edits) {
       const { difference } = strandedEditsIn(room.doc, [edit]);
-      // What builds on something that was refused waits with it.
+      // An edit that builds on a refused one waits with it.
       const stored = await this.make(difference, fitsWhole).then(
         (changed) => changed !== null,
         () => false,
@@ -274,7 +274,7 @@ export class GraphConnection {
   }
 
   /** Makes these changes as one edit, unless they do not fit, and waits until it is stored. Rejects
-   * when it is refused. Answers how many keys changed. */
+   * when it is refused. Returns how many keys changed. */
   private async make(difference: DocumentDifference): Promise<number>;
   private async make(
     difference: DocumentDifference,
@@ -305,7 +305,7 @@ export class GraphConnection {
     });
   }
 
-  /** Edits that were laid aside when this graph was open here before. */
+  /** Looks for edits that were laid aside when this graph was open here before. */
   private async lookAside(): Promise<void> {
     this.looked = true;
     const { keep } = this.options;
@@ -368,7 +368,7 @@ function otherEpoch(room: Room): string {
   return theirs !== "" && theirs !== epochName(here) ? theirs : newEpoch(theirs);
 }
 
-/** Aborts when a room is refused. */
+/** Returns a signal that aborts when the room is refused. */
 function untilRefused(room: Room): AbortSignal {
   const controller = new AbortController();
   const look = () => {
@@ -382,7 +382,10 @@ function untilRefused(room: Room): AbortSignal {
   return controller.signal;
 }
 
-/** For `ConnectOptions.admit`. Throws `Unreachable` when nobody answers. */
+/**
+ * Returns the `admit` of a room: it asks the server who this browser is. Rejects with `Unreachable` when nobody
+ * answers.
+ */
 function admissionCheck(
   graph: string,
   person: string,

@@ -72,7 +72,7 @@ export interface StoredCopy {
   readonly clients?: readonly number[];
 }
 
-/** One write: all of it or nothing. */
+/** One write, which is stored as a whole or not at all. */
 export interface StoreWrite {
   readonly waits: readonly UnsavedEdit[];
   readonly known: readonly Uint8Array[];
@@ -107,11 +107,11 @@ export interface EditStore {
   /** Returns the copies of all histories of the graph; the last used one is the last. */
   read(owner: CopyOwner): Promise<readonly StoredCopy[]>;
   write(owner: CopyOwner, epoch: string, batch: StoreWrite): Promise<void>;
-  /** Lets go of these edits (by id), and of the copy unless others wait on it: another page's, say. */
+  /** Deletes these edits (by id), and the copy unless edits of another page wait on it. */
   forget(owner: CopyOwner, epoch: string, edits: readonly string[]): Promise<void>;
   /** The graphs of which this person has a copy here, the last used first. */
   graphs(person: string): Promise<readonly KeptGraph[]>;
-  /** Lets go of this person's copies in which no edit and no choice waits. */
+  /** Deletes this person's copies in which no edit and no choice waits. */
   leave(person: string): Promise<void>;
   /** The others with edits of this graph that wait here. */
   others(owner: CopyOwner): Promise<readonly OtherPerson[]>;
@@ -120,7 +120,7 @@ export interface EditStore {
 /** The epoch under which a graph is kept until its server has named its history. */
 export const UNNAMED_EPOCH = "0";
 
-/** A place for a document that begins anew although the server calls the history the same. */
+/** Returns an epoch for a document that begins anew although the server calls the history the same. */
 export function newEpoch(name: string): string {
   return `${name || UNNAMED_EPOCH}~${freshId()}`;
 }
@@ -159,7 +159,7 @@ const MOST_CLIENTS = 100;
 type CopyKey = readonly [graph: string, person: string, epoch: string];
 
 /**
- * The browser's storage. Opens it at the first call, once.
+ * Returns the store of this browser. The database is opened once, at the first call.
  *
  * @public e2e/browser-storage.spec.ts builds this module by itself
  */
@@ -239,7 +239,7 @@ export function indexedDbStore(factory: IDBFactory | undefined = globalThis.inde
 
 let ofBrowser: EditStore | null = null;
 
-/** The storage of this browser, the same for all rooms. */
+/** Returns the store of this browser, the same for all rooms. */
 export function browserStore(): EditStore {
   ofBrowser ??= indexedDbStore();
   return ofBrowser;
@@ -266,7 +266,7 @@ function openDatabase(factory: IDBFactory | undefined, onLost: () => void): Prom
   });
 }
 
-/** All keys that begin with these parts: an array sorts after every text. */
+/** Returns the range of all keys that begin with these parts: an array sorts after every text. */
 function within(...parts: readonly string[]): IDBKeyRange {
   return IDBKeyRange.bound([...parts], [...parts, []]);
 }
@@ -329,7 +329,7 @@ async function writeBatch(
   await done;
 }
 
-/** Lets go of copies in which no edit and no choice waits, except the newest and the one in use. */
+/** Deletes copies in which no edit and no choice waits, except the newest and the one in use. */
 async function prune(database: IDBDatabase, owner: CopyOwner, most: number): Promise<void> {
   const work = database.transaction(["copies", "known", "waiting"], "readwrite");
   const done = finished(work);
@@ -358,7 +358,7 @@ function busyPlaces(copies: readonly Copy[], edits: readonly CopyKey[]): Readonl
   );
 }
 
-/** Each graph once, whatever histories are kept of it. */
+/** Returns each graph once, whatever number of histories is kept of it. */
 function keptOf(
   copies: readonly Copy[],
   waiting: readonly CopyKey[],
@@ -380,7 +380,7 @@ function remove(work: IDBTransaction, place: CopyKey): void {
 
 let made = 0;
 
-/** A key that nobody else makes, and that sorts after those made before. No secure context needed. */
+/** Returns a unique key that sorts after all earlier ones. Needs no secure context. */
 function freshId(): string {
   made += 1;
   const parts = [deviceNow().toString(36).padStart(9, "0"), made.toString(36).padStart(6, "0")];

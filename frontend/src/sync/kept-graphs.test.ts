@@ -31,7 +31,7 @@ test("a device lists the graphs of one person, with what waits, and nobody else'
   ]);
 });
 
-test("whoever signs out leaves no copy behind, and loses no edit", async () => {
+test("signing out leaves no copy behind and loses no edit", async () => {
   const store = await device();
   await leaveDevice("ada", store);
   expect((await keptGraphs("ada", store)).map(({ name }) => name)).toEqual(["Graph unsaved"]);

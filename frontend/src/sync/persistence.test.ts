@@ -156,7 +156,7 @@ test("a value of an earlier visit that was replaced unseen is told", async () =>
   ]);
 });
 
-test("nobody's edits go under another name, and who they wait for is known", async () => {
+test("edits never go under another name, and the person they wait for is known", async () => {
   const ada = await open(ADA);
   write(ada.doc, "of ada");
   await vanish(ada);
@@ -259,7 +259,7 @@ test("a backlog that is too large for one message goes in pieces", async () => {
 
 // -- other histories ------------------------------------------------------------------------------
 
-/** A server with the document as it was. */
+/** Replaces the server by one that has an older document, as after a restore. */
 function restored(update: Uint8Array): void {
   const { seq } = server;
   server = new FakeServer();
@@ -384,7 +384,7 @@ const steps = fc.constantFrom(
   ...(["reload", "reload", "wait", "full"] as const),
 );
 
-test("whatever breaks when, and however often the page is closed, no edit that was kept is lost", async () => {
+test("no stored edit is lost, whatever breaks and however often the page is closed", async () => {
   vi.spyOn(console, "warn").mockImplementation(() => undefined);
   await fc.assert(
     fc.asyncProperty(fc.array(steps, { maxLength: 40 }), async (script) => {

@@ -111,7 +111,7 @@ export class Persistence {
   private async read(): Promise<StoredCopy | null> {
     try {
       const all = await this.device.read(this.owner);
-      // It may have been named meanwhile.
+      // The server may have named the history meanwhile.
       const only = this.epoch === UNNAMED_EPOCH ? this.only : this.epoch;
       const kept = (only === null ? all.at(-1) : all.find((each) => each.epoch === only)) ?? null;
       this.opened = true;

@@ -38,7 +38,7 @@ export interface SocketHandler {
   /** A question that any living server answers at once. */
   probe(): Uint8Array<ArrayBuffer>;
   onOpen(): void;
-  /** Throws what cannot be read; the socket then begins anew. */
+  /** Takes a message. Throws for one that cannot be read; the socket is then opened anew. */
   onMessage(data: Uint8Array): void;
   /** The socket is gone, whatever comes next. */
   onDrop(): void;
@@ -153,7 +153,7 @@ export class ReconnectingSocket {
   private onMessage(socket: Socket, data: unknown): void {
     if (socket !== this.socket) return;
     this.heardAt = tick();
-    // It may have been on its way before the question: only the answer ends the doubt.
+    // This message may have been sent before the question: only the answer ends the doubt.
     if (this.probedAt !== null) this.probedAt = this.heardAt;
     if (!(data instanceof ArrayBuffer)) return;
     try {

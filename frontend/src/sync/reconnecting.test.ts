@@ -146,7 +146,7 @@ test.each(["online", "offline", "visibilitychange"])(
   },
 );
 
-test("what was edited while a socket was in doubt goes over it when it has answered, and not before", () => {
+test("edits made while a socket is in doubt are sent after it has answered, and not before", () => {
   const page = stage();
   const { doc, changedTwice, link } = page.other;
   [doc.clientID, server.doc.clientID] = [2_000, 1_000];

@@ -37,7 +37,7 @@ export interface StrandedEdits {
   readonly difference: DocumentDifference;
   /** The values that the first of them found there, as far as they are known. */
   readonly before: DocumentDifference;
-  /** The graph as it was here, with these edits. */
+  /** The graph on this page, with these edits. */
   readonly here: Maps;
 }
 
@@ -174,8 +174,8 @@ export function differenceOf(before: Y.Doc, after: Y.Doc): DocumentDifference {
 }
 
 /**
- * Makes the same changes here as one fresh edit. What belongs to actions that are not there is left
- * out, since nobody would see it. Answers how many keys changed.
+ * Makes the same changes as one new edit. Changes that belong to missing actions are left out, since nobody would
+ * see them. Returns the number of changed keys.
  */
 export function applyDifference(doc: Y.Doc, difference: DocumentDifference): number {
   const fits = fitting(doc, difference);

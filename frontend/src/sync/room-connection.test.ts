@@ -68,7 +68,7 @@ test("edits made while offline wait, count, and arrive on return", () => {
   expect(keys(server.doc)).toEqual(["a", "b"]);
 });
 
-test("what was sent but not acknowledged before the connection broke goes again", () => {
+test("an edit that was sent but not acknowledged when the connection broke is sent again", () => {
   server.accept();
   server.stalled = true;
   write("a");
@@ -114,7 +114,7 @@ function changeMuch(doc: Y.Doc): void {
   undo.undo();
 }
 
-test("what is larger than a message may be goes in pieces, and counts as stored after the last one", () => {
+test("an edit above the size of a message goes in pieces, and counts as stored after the last one", () => {
   server.accept();
   server.stalled = true;
   changeMuch(room.doc);
@@ -131,7 +131,7 @@ test("what is larger than a message may be goes in pieces, and counts as stored 
   expect(keys(server.doc)).toEqual(["next"]);
 });
 
-test("what is larger than a message may be goes in pieces after a time offline, too", () => {
+test("an edit above the size of a message goes in pieces also after a time offline", () => {
   server.accept();
   server.last.end(1006);
   changeMuch(room.doc);
@@ -146,7 +146,7 @@ const steps = fc.constantFrom(
   ...(["edit", "edit", "colleague", "stall", "commit", "drop", "crash", "accept", "wait"] as const),
 );
 
-test("whatever breaks when, nothing is called saved that the server lacks, and in the end both agree", () => {
+test("no edit is called saved that the server lacks, and in the end both agree, whatever breaks", () => {
   fc.assert(
     fc.property(fc.array(steps, { maxLength: 40 }), (script) => {
       const server = new FakeServer();
@@ -187,7 +187,7 @@ test("whatever breaks when, nothing is called saved that the server lacks, and i
   );
 });
 
-test("what others change moves the moment and is not counted as one's own", () => {
+test("changes by others advance the moment and are not counted as one's own", () => {
   server.accept();
   server.broadcast((doc) => write("theirs", doc));
   expect(room.link()).toEqual({ state: "live", unsaved: 0, seq: 1 });

@@ -284,7 +284,7 @@ class Connection implements Room, SocketHandler {
   onDrop(): void {
     const others = [...this.awareness.meta.keys()].filter((id) => id !== this.doc.clientID);
     removeAwarenessStates(this.awareness, others, this);
-    // Whoever is still there comes back with the clock that is known; only strangers may do that.
+    // People who are still there come back with the clock that is known; an awareness takes that from unknown clients only.
     for (const id of others) this.awareness.meta.delete(id);
   }
 
@@ -385,7 +385,7 @@ class Connection implements Room, SocketHandler {
 
   // -- what goes out --------------------------------------------------------------------------
 
-  /** Answers a step 1 with what the server lacks, in pieces when that is too much for one message. */
+  /** Returns a step 1 with what the server lacks, in pieces when that is too much for one message. */
   private give(state: Uint8Array): void {
     const whole = Y.encodeStateAsUpdate(this.doc, state);
     const edits = this.outbox.edits;
@@ -394,7 +394,7 @@ class Connection implements Room, SocketHandler {
       this.socket.send(messages.syncStep2(whole));
       return;
     }
-    // Where nothing waits, all that is large is what was deleted at any time, which the server has.
+    // Without waiting edits only the list of all deletions is large, and the server has it.
     this.outbox.sentSome(0);
     this.socket.send(messages.syncStep2(messages.EMPTY_UPDATE));
     edits.forEach(({ update }, n) => {

@@ -1,13 +1,13 @@
 import { expect, test } from "vitest";
 import { otherPeopleWait, unsavedReason } from "./unsaved-reasons";
 
-test("nothing is said when everything is saved", () => {
+test("no reason is given when everything is saved", () => {
   expect(unsavedReason({ state: "live", unsaved: 0, seq: 3 })).toBeNull();
   expect(unsavedReason({ state: "connecting", unsaved: 0, seq: 0 })).toBeNull();
   expect(otherPeopleWait([])).toBeNull();
 });
 
-test("who works offline reads how many edits wait, and where", () => {
+test("a person who works offline reads how many edits wait, and where", () => {
   const link = { state: "offline", unsaved: 2, seq: 3 } as const;
   expect(unsavedReason({ ...link, kept: true })).toBe(
     "The server does not answer. 2 changes wait on this device and survive closing the page. Sent when it is back.",

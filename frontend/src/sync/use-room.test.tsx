@@ -96,7 +96,7 @@ test("a page shows the link, the graph, the people and undo as they change", asy
   expect(text()).toBe("live 0 Ada");
 });
 
-test("who looks at one part is drawn again only when that part changes", async () => {
+test("a component that reads one part is drawn again only when that part changes", async () => {
   show();
   await heard(() => void server.accept());
   const before = drawn.name;
@@ -107,7 +107,7 @@ test("who looks at one part is drawn again only when that part changes", async (
   expect(document.querySelector("h1")?.textContent).toBe("other");
 });
 
-test("what others send between two frames is drawn once", async () => {
+test("changes by others between two frames are drawn once", async () => {
   show();
   await heard(() => void server.accept());
   const before = drawn.graph;
@@ -191,7 +191,7 @@ test("a page knows who edits a field, where somebody looks, and whose edits wait
   expect(text()).toBe("live 0 Mari:1");
 });
 
-test("what another person left on this device can be read and let go, and is never sent", async () => {
+test("edits of another person on this device can be read and dropped, and are never sent", async () => {
   const device = new FakeEditStore();
   await showKept({ graph: "g", person: MARI, device });
   act(() => void addAction(open.doc, { name: "Scan" }));

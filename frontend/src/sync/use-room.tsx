@@ -32,9 +32,9 @@ export type { OpenRoom } from "./open-room";
 /** The person's decision about edits that wait on a history which the server has left. */
 export interface StrandedEditsChoice {
   readonly stranded: StrandedEdits;
-  /** Makes these of the changes in the graph as it is now, and lets go of the rest once stored. */
+  /** Makes the chosen changes in the present graph, and drops the rest once these are stored. */
   apply(chosen: StrandedEdits["difference"]): Promise<number>;
-  /** Lets go of the edits. */
+  /** Drops the edits. */
   drop(): Promise<void>;
 }
 
@@ -47,8 +47,8 @@ interface RoomContextValue {
 const RoomContext = createContext<RoomContextValue | null>(null);
 
 /**
- * Keeps the room at `url` open as long as it is shown. Children see it through the hooks below.
- * With `keep`, edits that wait survive closing the page, for that person only.
+ * Keeps the room at `url` open while it is mounted. Children use it through the hooks below. With `keep`, waiting
+ * edits survive closing the page, for that person only.
  */
 export function RoomProvider({
   url,
@@ -137,7 +137,7 @@ export function useGraph(): Graph {
   return useSyncExternalStore(source.subscribe, source.graph, () => EMPTY_GRAPH);
 }
 
-/** The graph for what stands beside the canvas: own edits at once, those of others some times a second. */
+/** Returns the graph for parts beside the canvas: own edits at once, those of others some times a second. */
 export function useThrottledGraph(): Graph {
   const { source, throttled: calm } = useRoom();
   return useSyncExternalStore(calm.onGraph, source.graph, () => EMPTY_GRAPH);
@@ -191,8 +191,8 @@ export function usePersonColors(ids: readonly string[] = NO_IDS): (id: string) =
 }
 
 /**
- * Asks for the colours of people again when the room is back: a server that was started anew gives
- * them in the order in which people come.
+ * Refreshes the colours of people when the room is back: a restarted server gives colours in the order in which
+ * people come.
  */
 export function useColorsAfterReturn(): void {
   const isLive = useLinkPart(({ state }) => state === "live");
@@ -299,7 +299,7 @@ export interface OthersWaiting {
   readonly others: readonly OtherPerson[];
   /** Returns the changes of another person, to save them as a file; they are never sent. */
   read(id: string): Promise<readonly StrandedEdits[]>;
-  /** Lets go of somebody's edits for good. */
+  /** Deletes another person's edits for good. */
   forget(id: string): Promise<void>;
 }
 

@@ -30,7 +30,7 @@ test("keys of one's own replace those that came, and take them from whoever had 
   expect(takenBy(EDIT_ACTIONS, "tidy", "f").map(({ name }) => name)).toEqual(["fit"]);
 });
 
-test("what is put back as it came is kept no longer, and takes its keys back", () => {
+test("a shortcut that is reset is not stored any more, and takes its keys back", () => {
   const own = assigned(EDIT_ACTIONS, {}, "tidy", ["Mod+Shift+y"]);
   expect(assigned(EDIT_ACTIONS, own, "tidy", ["Shift+t"])).toEqual({});
 });
@@ -53,7 +53,7 @@ test("shortcuts of one's own are the same on every layout, and older ones of oth
   expect(editActionFor(withOwn(EDIT_ACTIONS, own), pressed)?.name).toBe("tidy");
 });
 
-test("what browsers, screen readers and the walk through the page need is refused with its reason", () => {
+test("keys of browsers, screen readers and moving through the page are refused with the reason", () => {
   expect(refusalOf("Mod+w")).toMatch(/Browsers/);
   expect(refusalOf("Mod+Alt+k")).toMatch(/Screen readers/);
   expect(refusalOf("Tab")).toMatch(/walked/);
@@ -64,7 +64,7 @@ test("what browsers, screen readers and the walk through the page need is refuse
   expect(shortcutOf(press("?", "S"), false)).toBe("?");
 });
 
-test("whatever was kept, no two edit actions share keys, and the clipboard's stay", () => {
+test("no two edit actions share keys and those of the clipboard stay, whatever was stored", () => {
   const keys = fc.oneof(
     fc.constantFrom(
       "f",

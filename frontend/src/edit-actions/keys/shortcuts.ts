@@ -94,7 +94,7 @@ export function useShortcuts(context: EditorContext): void {
       if (editAction === null || editAction.event !== undefined) return;
       // A button does what Enter does to it.
       if (key === "Enter" && event.target instanceof HTMLButtonElement) return;
-      // What an edit action takes is also kept from the browser while the action has nothing to do.
+      // The keys of an edit action are kept from the browser also while the action has nothing to do.
       event.preventDefault();
       if (isEnabled(editAction, now.current)) editAction.run(now.current);
       else if (editAction.idle && !event.repeat) sayIdle(editAction, now.current);

@@ -51,7 +51,7 @@ export interface NewAction {
   readonly ofGraph?: true;
 }
 
-/** Adds an action under the lowest free number of its name and answers its key. */
+/** Adds an action under the lowest free number of its name and returns its key. */
 export function addAction(doc: Y.Doc, action: NewAction): Key {
   return asOneEdit(doc, () => {
     const key = newAid();
@@ -152,7 +152,7 @@ function around(graph: Graph, key: Key): { before: Relation[]; next: Relation[] 
   };
 }
 
-/** Renames; keeps the number unless another action of the new name has it. */
+/** Renames an action; it keeps its number unless another action of the new name has it. */
 export function rename(doc: Y.Doc, key: Key, name: string): boolean {
   if (!hasAction(doc, key)) return false;
   asOneEdit(doc, () => {

@@ -91,7 +91,7 @@ test("pasting is one step of undo", () => {
   expect(graphOf(doc)).toEqual(before);
 });
 
-test("everything pasted into an empty graph means the same there, ends and all", () => {
+test("a paste into an empty graph means the same there, with both ends", () => {
   const { doc } = drawn();
   const whole = {
     actions: Object.fromEntries(mapsOf(doc).actions),
@@ -139,7 +139,7 @@ test("the text of a piece is UMRF with the values as they were spelled", () => {
   ]);
 });
 
-test("whatever a clip holds, pasting never fails and what it adds can be deleted again", () => {
+test("pasting never fails and its additions can be deleted again, whatever the clip holds", () => {
   const key = fc.oneof(
     fc.constantFrom("AAAAAAAAAAAA", "BBBBBBBBBBBB", "entry", "exit"),
     fc.string({ maxLength: 6 }),

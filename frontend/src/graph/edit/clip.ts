@@ -71,8 +71,8 @@ export function isEmpty(clip: Clip): boolean {
 }
 
 /**
- * Adds the pieces as one edit and answers the keys of what is new. Arrows from the entry and to the
- * exit come along only into a graph that has no action yet: elsewhere nobody drew them.
+ * Adds the pieces as one edit and returns the keys of the new things. Arrows from the entry and to the exit are
+ * added only to a graph without actions.
  */
 export function paste(doc: Y.Doc, clip: Clip, landing: PastePosition): string[] {
   return asOneEdit(doc, () => {
@@ -210,7 +210,7 @@ function noteAt(value: unknown): { at: Position; fields: Record<string, unknown>
   }
 }
 
-/** "valves v11", "valves v11 2" …: the first that no graph is called. */
+/** Returns the first free name for a copy: "valves v11", "valves v11 2" … */
 export function copyNameOf(graph: string, version: string, taken: readonly string[]): string {
   const stem = `${graph || "untitled"} ${version}`.trim();
   for (let n = 1; ; n += 1) {

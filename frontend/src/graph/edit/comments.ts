@@ -20,7 +20,7 @@ interface CommentAuthor {
 interface CommentMessage {
   readonly id: string;
   readonly author: CommentAuthor;
-  /** Milliseconds since 1970, by the clock of whoever wrote it. */
+  /** The time, in milliseconds since 1970 by the clock of the writer. */
   readonly at: number;
   readonly text: string;
 }
@@ -113,7 +113,7 @@ interface Words {
   readonly text: string;
 }
 
-/** Begins a thread about an action, or one of its parameters. Answers its id. */
+/** Begins a thread about an action, or one of its parameters. Returns its id. */
 export function beginThread(
   doc: Y.Doc,
   about: Key,

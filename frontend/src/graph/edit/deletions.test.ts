@@ -62,7 +62,7 @@ test("an action that is deleted while it is renamed is deleted whole, and the pe
   expect(bob.told).toEqual([{ key: drive, name: "DriveFast 0" }]);
 });
 
-test("it can be restored whole, under its new name", () => {
+test("a deleted and renamed action can be restored whole, under its new name", () => {
   const { ada, drive, say } = drawn();
   const before = graphIn(ada.doc);
   const bob = page(ada.doc);
@@ -87,7 +87,7 @@ test("it can be restored whole, under its new name", () => {
   expect(graphIn(bob.doc).relations.map(({ child }) => child)).toEqual([drive]);
 });
 
-test("where the page that renamed it has gone, another page clears what is left and tells", () => {
+test("another page clears and tells the leftovers where the page that renamed has gone", () => {
   const { ada, drive } = drawn();
   const bob = page(ada.doc);
   removeActions(ada.doc, [drive]);
@@ -135,7 +135,7 @@ test("undoing the deletion afterwards brings all of it back, under the newest na
   expect(names(ada)).toEqual(["Say"]);
 });
 
-test("who may only look clears nothing", () => {
+test("a viewer clears nothing", () => {
   const { ada, drive } = drawn();
   const viewer = page(ada.doc, false);
   const bob = page(ada.doc);
@@ -163,7 +163,7 @@ test("an undone deletion, and an action of an old document without order, stay",
   expect(names(carl)).toEqual(["Older"]);
 });
 
-test("whoever deletes, renames and hears of it when, all pages show the same, and nothing half", () => {
+test("all pages show the same and no half action, in whatever order people delete, rename and receive", () => {
   const step = fc.record({
     who: fc.nat(2),
     what: fc.constantFrom("delete", "rename", "undo", "hear", "wait", "restore"),

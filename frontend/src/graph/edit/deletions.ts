@@ -176,7 +176,10 @@ export class Deletions {
     }
   }
 
-  /** Undo of a deletion leaves a name alone that others wrote or cleared since: all of it comes back. */
+  /**
+   * Handles an undo of a deletion that left out the name, since others wrote or cleared it: restores all of the
+   * action.
+   */
   private nameAgain(key: Key): void {
     const entry = this.known.get(key)?.find((each) => isExistence(each, key));
     if (entry === undefined || this.isThere(key)) return;

@@ -30,8 +30,8 @@ import { UndoHistory } from "./undo-history";
 const OWN_EDITS: unique symbol = Symbol("the person at this page");
 
 /**
- * Several edits as one: one transaction, one update for the others, one step of undo. With a value that no
- * message could hold nothing is changed, see `onTooLarge`.
+ * Runs several edits as one: one transaction, one update for the others, one step of undo. An edit with a value
+ * that no message could hold changes nothing, see `onTooLarge`.
  */
 export function asOneEdit<T>(doc: Y.Doc, work: () => T): T {
   if (doc._transaction !== null) return work(); // a part of the edit around it
@@ -42,7 +42,7 @@ export function asOneEdit<T>(doc: Y.Doc, work: () => T): T {
   }, OWN_EDITS);
 }
 
-/** Undo and redo of the person's own edits; one edit (or one `asOneEdit`) is one step. */
+/** Returns the undo and redo of the person's own edits; one edit (or one `asOneEdit`) is one step. */
 export function undoOf(doc: Y.Doc): UndoHistory {
   return new UndoHistory(doc, OWN_EDITS);
 }
@@ -52,7 +52,7 @@ export function writeKey(doc: Y.Doc, root: Root, key: string, value: unknown): v
   if (!map.has(key) || map.get(key) !== value) map.set(key, value);
 }
 
-/** A shared type, which no page of ours writes, stays: undo could not bring it back. */
+/** Erases keys. A shared type, which no page of ours writes, stays: undo could not bring it back. */
 export function eraseKeys(doc: Y.Doc, root: Root, ...keys: readonly string[]): void {
   const map = rootOf(doc, root);
   for (const key of keys) {
@@ -60,7 +60,7 @@ export function eraseKeys(doc: Y.Doc, root: Root, ...keys: readonly string[]): v
   }
 }
 
-/** The keys of an owner, `<head>` itself included. */
+/** Returns the keys of an owner, with `<head>` itself. */
 function keysOfOwner(doc: Y.Doc, root: Root, head: string): string[] {
   const prefix = `${head}|`;
   return [...rootOf(doc, root).keys()].filter((key) => key === head || key.startsWith(prefix));
@@ -162,8 +162,8 @@ export function keepingWaypoints(doc: Y.Doc, id: string, write: () => void): voi
 }
 
 /**
- * Writes down what the reader shows already: arrows of ghosts whose name a real action has taken up
- * become that action's own, so that renaming it later does not leave them behind.
+ * Stores what the reader shows already: arrows of ghosts whose name a real action has become that action's own, so
+ * that renaming it later does not leave them behind.
  */
 export function numberGhosts(doc: Y.Doc): void {
   const actions = rootOf(doc, "actions");
@@ -176,7 +176,7 @@ export function numberGhosts(doc: Y.Doc): void {
   }
 }
 
-/** A relation as the document has it now. */
+/** Returns the present relation of the document; undefined when it is missing. */
 export function relationNow(doc: Y.Doc, id: string): Relation | undefined {
   const ends = endsOf(id);
   if (ends === null) return undefined;

@@ -55,7 +55,7 @@ test("drawing the ends first and the decision then says the same", () => {
   expect(waitedFor(doc)).toEqual([]);
 });
 
-test("what runs side by side is waited for, whatever was drawn first", () => {
+test("the end waits for actions that run side by side, whichever was drawn first", () => {
   const fork = docWith("A", "B", "C") as Three;
   setEntry(fork[0], fork[1]);
   connect(fork[0], fork[1], fork[2]);
@@ -82,7 +82,7 @@ test("a second start runs beside the first one", () => {
   expect(waitedFor(doc)).toEqual(["B", "C", "D"]);
 });
 
-test("what a person says of things that run side by side stays", () => {
+test("a person's own choice about actions that run side by side stays", () => {
   const [doc, a, b, c] = docWith("A", "B", "C") as Three;
   setEntry(doc, a);
   setEntry(doc, b);

@@ -153,7 +153,7 @@ test("every example is taken at once and undone at once, and never along with th
   expect(undo.canUndo()).toBe(false);
 });
 
-test("everything that loses nothing is mended at once and undone at once", () => {
+test("all fixes that lose nothing are applied together and undone together", () => {
   const { doc, arrow, a } = broken();
   rootOf(doc, "relations").set(`${arrow}|only`, "parents");
   setField(doc, a, "type", "");
@@ -173,7 +173,7 @@ test("everything that loses nothing is mended at once and undone at once", () =>
   expect(undo.canUndo()).toBe(false);
 });
 
-test("what removes something that was drawn, or makes a value, is never done unread", () => {
+test("a fix that removes something drawn, or makes a value, is never applied unread", () => {
   expect(FIXES.filter((fix) => !ABOUT[fix].safe)).toEqual(["remove-relation", "take-example"]);
 });
 

@@ -327,7 +327,7 @@ function act(doc: Y.Doc, undo: UndoHistory, [, edit, x, y]: Step): void {
   edits[edit % edits.length]?.();
 }
 
-test("whatever people do at once, all see the same graph, with names that differ and ends that exist", () => {
+test("all see the same graph, with distinct names and existing ends, whatever people do at once", () => {
   const steps = fc.tuple(fc.nat(1), fc.nat(15), fc.nat(5), fc.nat(5));
   fc.assert(
     fc.property(fc.array(fc.array(steps, { maxLength: 8 }), { maxLength: 5 }), (rounds) => {

@@ -68,7 +68,7 @@ export function moveActions(doc: Y.Doc, positions: Iterable<readonly [Key, Posit
   });
 }
 
-/** The origin of what the page places by itself: no step of anybody's undo. */
+/** The origin of places that the page sets by itself: they are no step of undo. */
 const FIRST_LAYOUT: unique symbol = Symbol("places that nobody has asked for");
 
 /** Places actions like `moveActions`, in a graph that nobody has placed yet: undo does not take it back. */
@@ -81,7 +81,7 @@ export function isUndrawn(doc: Y.Doc): boolean {
   return rootOf(doc, "actions").size === 0 && rootOf(doc, "relations").size === 0;
 }
 
-/** Adds a note or frame; `text` is its JSON. Answers its id. */
+/** Adds a note or frame; `text` is its JSON. Returns its id. */
 export function addNote(doc: Y.Doc, text: JsonText): string {
   const id = newAid();
   asOneEdit(doc, () => writeKey(doc, "positions", noteKey(id), text));

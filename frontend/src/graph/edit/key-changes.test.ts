@@ -45,7 +45,7 @@ test("one edit takes the actions away, and one undo brings all back", () => {
   expect(plain(doc)).toBe(before);
 });
 
-test("what was done to the actions meanwhile is told, and nothing else", () => {
+test("changes of the actions meanwhile are told, and no others", () => {
   const told = (edit: (doc: Y.Doc, keys: Key[]) => void) => {
     const { doc, keys, changes } = folded();
     edit(doc, keys);
@@ -71,7 +71,7 @@ test("what was done to the actions meanwhile is told, and nothing else", () => {
   expect(told((doc, [, grip]) => moveActions(doc, new Map([[grip as Key, [7, 7]]])))).toBe(0);
 });
 
-test("what somebody moved meanwhile stays where it is", () => {
+test("things that somebody moved meanwhile stay where they are", () => {
   const { doc, keys } = folded();
   const place = keys[2] as Key;
   const away = { root: "positions", key: place, before: [0, 400], after: [0, 600] };

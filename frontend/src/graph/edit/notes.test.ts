@@ -29,7 +29,7 @@ test("moving a note that a page shows as it was keeps what others wrote into it 
   expect(notesOf(graphOf(doc))).toMatchObject([{ at: [5, 6], text: "theirs" }]);
 });
 
-test("what is no note is read as none, whatever it is", () => {
+test("any text that is no note is read as none", () => {
   fc.assert(
     fc.property(fc.oneof(fc.string(), fc.json()), (text) => {
       const note = readNote("g/1", text);

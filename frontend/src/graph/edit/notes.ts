@@ -58,7 +58,7 @@ export function readNote(key: string, text: JsonText): Note | null {
 
 let last: { readonly notes: Graph["notes"]; readonly read: readonly Note[] } | null = null;
 
-/** The notes and frames of a graph. The same list as long as nothing of them changes. */
+/** Returns the notes and frames of a graph: the same list while none of them changes. */
 export function notesOf(graph: Graph): readonly Note[] {
   if (last !== null && last.notes === graph.notes) return last.read;
   const read = graph.notes.flatMap(([id, text]) => readNote(noteKey(id), text) ?? []);
@@ -66,7 +66,7 @@ export function notesOf(graph: Graph): readonly Note[] {
   return read;
 }
 
-/** Adds one and answers its key. */
+/** Adds one and returns its key. */
 export function writeNote(doc: Y.Doc, note: NewNote): string {
   return noteKey(addNote(doc, textOf(note, {})));
 }

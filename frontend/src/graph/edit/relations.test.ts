@@ -69,7 +69,7 @@ test("drawing clears leftovers of a relation that was there before", () => {
   expect(relationIn(doc, id)).toMatchObject({ required: true, remap: [] });
 });
 
-test("both of two people who connect the same pair are heard", () => {
+test("two people who connect the same pair both take effect", () => {
   const [doc, a, b] = docWith("A", "B") as [Y.Doc, Key, Key];
   const colleague = copyOf(doc);
   const id = connect(doc, a, b, "on_true");
@@ -79,7 +79,7 @@ test("both of two people who connect the same pair are heard", () => {
   expect(graphIn(doc)).toEqual(graphIn(colleague));
 });
 
-test("nothing leads into the entry, out of the exit, from one to the other, or to nobody", () => {
+test("no arrow leads into the entry, out of the exit, from one to the other, or to a missing action", () => {
   const [doc, a] = docWith("A") as [Y.Doc, Key];
   for (const [parent, child] of [
     [a, ENTRY],

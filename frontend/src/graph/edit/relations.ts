@@ -22,7 +22,7 @@ import { keepingEnds } from "./ends";
 /**
  * Draws an arrow that says what was drawn: after `outcome` the child runs. Between two that are
  * connected already it adds that response. What the end of the graph waits for follows (`ends.ts`).
- * Answers the relation's id, or null when the ends do not fit: nothing leads into the entry or out
+ * Returns the relation's id, or null when the ends do not fit: nothing leads into the entry or out
  * of the exit, nor from one to the other.
  */
 export function connect(
@@ -166,7 +166,7 @@ export function removeRelations(doc: Y.Doc, ids: Iterable<string>): void {
   });
 }
 
-/** Leads an arrow from or to somewhere else, with everything it says. Null when that is taken. */
+/** Moves an end of an arrow, with all that it says. Null when that arrow exists already. */
 export function moveRelation(
   doc: Y.Doc,
   id: string,

@@ -34,7 +34,7 @@ test("an arrow that says one thing goes with all it says", () => {
   expect(said()).toEqual([{ id: arrow, on_true: "stop" }]);
 });
 
-test("of a relation that says more only what was led moves", () => {
+test("only the redirected outcome of a relation with several moves", () => {
   const { doc, a, b, c, arrow, said } = drawn();
   connect(doc, a, b, "on_false");
   expect(retarget(doc, arrow, "on_true", { child: c })).toBe(`${a}>${c}`);
@@ -59,7 +59,7 @@ test("between the entry and actions an arrow says what such an arrow can say", (
   expect(said().map(({ id }) => id)).toEqual([`${ENTRY}>${b}`, `${ENTRY}>${c}`].sort());
 });
 
-test("what a colleague has deleted cannot be led anywhere", () => {
+test("an arrow that a colleague deleted cannot be redirected", () => {
   const { doc, c, arrow } = drawn();
   expect(retarget(doc, `${c}>${EXIT}`, "on_true", { parent: c })).toBeNull();
   expect(retarget(doc, arrow, "on_true", { child: "AAAAAAAAAAAA" })).toBeNull();

@@ -120,7 +120,7 @@ describe("whose value won takes it back, and the value of the other is there", (
   });
 });
 
-test("of several values that lost, the newest comes back", () => {
+test("the newest of several values that lost comes back", () => {
   const [doc, a] = docWith("A") as [Y.Doc, Key];
   const { ann, ben, meet, undo } = apart(doc);
   setField(ann, a, "actor", "mine");
@@ -134,7 +134,7 @@ test("of several values that lost, the newest comes back", () => {
   expect(actionIn(ann, a)?.actor).toBe("theirs again");
 });
 
-test("what both have added stays when one takes it back, also if the other's value is not known any more", () => {
+test("a key that two people added stays when one takes it back, also if the other's value is unknown", () => {
   const [doc, a] = docWith("A") as [Y.Doc, Key];
   const { ann, ben, undo } = apart(doc);
   addParameter(ann, a, "in", "x", "1");
@@ -147,7 +147,7 @@ test("what both have added stays when one takes it back, also if the other's val
 
 // -- one after the other ----------------------------------------------------------------------
 
-test("what somebody has deleted since stays deleted when an older change of it is taken back", () => {
+test("a key that somebody deleted since stays deleted when an older change of it is taken back", () => {
   const [doc, a] = docWith("A") as [Y.Doc, Key];
   const { ann, ben, meet, undo } = apart(doc);
   rename(ann, a, "Mine");

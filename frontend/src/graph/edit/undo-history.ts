@@ -41,7 +41,7 @@ export class UndoStep {
 
 interface StepEvent {
   readonly stackItem: UndoStep;
-  /** The stack that has it now. */
+  /** The stack that holds it now. */
   readonly type: "undo" | "redo";
 }
 
@@ -84,12 +84,12 @@ export class UndoHistory extends ObservableV2<{
     return this.redoStack.length > 0;
   }
 
-  /** Takes back the newest step that something is left of. Answers it; null when there is none. */
+  /** Undoes the newest step of which something is left. Returns it; null when there is none. */
   undo(): UndoStep | null {
     return this.takeBack(this.undoStack, this.redoStack, "undo");
   }
 
-  /** Makes the step anew that was taken back last. */
+  /** Makes the step again that was undone last. */
   redo(): UndoStep | null {
     return this.takeBack(this.redoStack, this.undoStack, "redo");
   }

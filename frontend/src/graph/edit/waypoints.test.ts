@@ -57,7 +57,7 @@ test("a bend is one edit, on whole pixels, and undo takes it back", () => {
   expect(keys(doc)).toEqual([]);
 });
 
-test("nothing is bent that is not there, nor more than eight times", () => {
+test("only existing lines can be bent, and at most eight times", () => {
   const { doc, a, b, id } = bent();
   const nine = Array.from({ length: 9 }, (_, i): Position => [i, i]);
   expect(setWaypoints(doc, `${id}|run`, nine)).toBe(false);

@@ -8,7 +8,7 @@ import { shown } from "./values";
 
 export interface CardRow {
   readonly name: string;
-  /** `seen`: what the engine reported in a run. `open`: nobody has written or gives it. */
+  /** `seen`: the engine reported it in a run. `open`: it has no value and no giver. */
   readonly kind: "value" | "from" | "open" | "seen";
   /** The value, or who gives it: `IsValveClosed`, with the output where that is called otherwise. */
   readonly text: string;

@@ -66,7 +66,7 @@ test("an output reaches the input of its name, unless the arrow ignores every en
   expect(dataFlowOf(graph()).size).toBe(0);
 });
 
-test("what reaches an action stays the same object while nothing of it changes", () => {
+test("the givers of an action stay the same object while none of them changes", () => {
   const { grip, graph } = drawn();
   const now = graph();
   expect(dataFlowOf(now).get(grip)).toBe(dataFlowOf({ ...now }).get(grip));

@@ -25,7 +25,7 @@ export interface InputGiver {
   readonly misfit: string | null;
 }
 
-/** The givers of each input, by the input's path; inputs that nobody gives are left out. */
+/** The givers of each input, by the input's path; inputs without a giver are left out. */
 export type InputGivers = ReadonlyMap<string, readonly InputGiver[]>;
 /** The givers of inputs, by action, for every action that has any. */
 export type DataFlow = ReadonlyMap<Key, InputGivers>;
@@ -130,7 +130,7 @@ function flowOf(actions: Graph["actions"], relations: Graph["relations"]): DataF
   return flow;
 }
 
-/** The givers of an input whose output the engine takes. */
+/** Returns the givers of an input whose output the engine takes. */
 export function takenGivers(givers: readonly InputGiver[] | undefined): readonly InputGiver[] {
   return givers?.filter(({ misfit }) => misfit === null) ?? [];
 }

@@ -8,7 +8,7 @@ import { parameterValueOf } from "./values";
 /** A parameter of the graph, and the actions inside whose it is. */
 export interface InterfaceParameter {
   readonly path: string;
-  /** Null where no type is told. */
+  /** The type; null where the file names none. */
   readonly type: string | null;
   readonly required: boolean;
   readonly of: readonly { readonly key: Key; readonly text: string }[];

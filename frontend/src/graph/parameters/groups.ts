@@ -75,7 +75,7 @@ function runsOf(list: readonly Parameter[]): Neighbours[] {
   return runs;
 }
 
-/** A pose has its rows one level below what it is called. */
+/** Returns the prefix of the whole that a row belongs to: a pose has its rows one level deeper. */
 function ownerOf({ prefix }: NumberRow): string {
   const path = prefix.slice(0, -1);
   const last = segmentsOf(path).at(-1) ?? "";

@@ -35,7 +35,7 @@ export interface Tie {
   readonly input: string;
 }
 
-/** The renamings of an arrow after which each output arrives as its input. */
+/** Returns the renamings of an arrow with which each output arrives as its input. */
 export function remapFor(remap: readonly Remap[], ties: readonly Tie[]): Remap[] {
   const outputs = new Set(ties.map(({ output }) => output));
   const inputs = new Set(ties.map(({ input }) => input));
@@ -142,7 +142,7 @@ function choiceOf(
   };
 }
 
-/** Every output of the graph for one input, those that can be taken first. */
+/** Returns every output of the graph as a choice for one input, the possible ones first. */
 export function outputChoices(
   graph: Graph,
   action: Action,
@@ -161,7 +161,7 @@ export function outputChoices(
   return choices.sort((a, b) => rankOf(a) - rankOf(b));
 }
 
-/** The groups of outputs that have all members of a group of inputs, such as poses for a pose. */
+/** Returns the groups of outputs that have all members of a group of inputs, such as poses for a pose. */
 export function groupChoices(
   graph: Graph,
   action: Action,

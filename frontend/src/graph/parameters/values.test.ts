@@ -19,7 +19,7 @@ test("a number keeps the spelling in which it was typed", () => {
   expect(shown(parameterValueOf(text))).toBe("5.0");
 });
 
-test("what is no number is explained and not written", () => {
+test("a text that is no number is explained and not written", () => {
   const field = parameterValueOf('{"pvf_type": "number", "pvf_value": 30}');
   expect(complaint(field, "abc")).toBe("“abc” is no number.");
   expect(complaint(field, "-.5")).toBeNull();
@@ -76,7 +76,7 @@ test("allowed values are of the type, one a line, and none allows all", () => {
   expect(withAllowed(some.ok ?? "", "")).toEqual({ ok: text });
 });
 
-test("what the engine assumes anyway is not written down", () => {
+test("defaults of the engine are not written", () => {
   const text = '{"pvf_type": "bool"}';
   expect(parameterValueOf(withRequired(text, false)).required).toBe(false);
   expect(withRequired(withRequired(text, false), true)).toBe(text);

@@ -25,7 +25,7 @@ function json(text: string | null): unknown {
   }
 }
 
-/** The items of a list as they are spelled; none when it is no list. */
+/** Returns the items of a list as they are spelled; empty when it is no list. */
 function itemsOf(text: string | null): string[] {
   const list = json(text);
   if (text === null || !Array.isArray(list)) return [];
@@ -50,12 +50,12 @@ export function parameterValueOf(text: string): ParameterValue {
   };
 }
 
-/** The parameter with this JSON text as its value, or without one. */
+/** Returns the parameter with this JSON text as its value; without a value for null. */
 export function withValue(text: string, value: string | null): string {
   return withMember(text, "pvf_value", value);
 }
 
-/** The parameter under another type; a value that does not fit it is taken away. */
+/** Returns the parameter with another type; a value that does not fit the type is removed. */
 export function withType(text: string, type: string): string {
   const next = withMember(text, "pvf_type", JSON.stringify(type));
   const field = parameterValueOf(next);
@@ -80,7 +80,7 @@ function fitsType(type: PvfType, value: unknown): boolean {
   }
 }
 
-/** The parameter with other allowed values, one on each line; with none, everything is allowed. */
+/** Returns the parameter with other allowed values, one on each line of `draft`; with none, everything is allowed. */
 export function withAllowed(text: string, draft: string): Typed {
   const field = parameterValueOf(text);
   const item = field.native?.replace(/s$/, "");

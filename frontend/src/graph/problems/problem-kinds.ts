@@ -57,7 +57,7 @@ const MISTAKES: ReadonlySet<string> = new Set([
   "wrong-side",
 ]);
 
-/** Warnings that come with the engine's own defaults: told once and not counted, so that warnings are read. */
+/** Warnings about the engine's own defaults: shown once and not counted, so that other warnings are read. */
 const QUIET: ReadonlySet<string> = new Set(["H3"]);
 
 /** An input to which the check asks for a value: its path; null for any other problem. */

@@ -69,7 +69,7 @@ test("an input that gets what it cannot take is wrong, not just to fill in", () 
   expect(told?.kind).toBe("wrong");
 });
 
-test("the same said twice of one place is told once, what is wrong first", () => {
+test("two equal problems of one place are told once, and errors come first", () => {
   const risk = problem("H3", "/actions/0/parents/0", { severity: "warning", message: "may abort" });
   const again = { ...risk, where: { path: "/actions/0/parents/1", aid: "a" } };
   const told = toldProblems([risk, again, problem("no-exit"), problem("H2")], EMPTY);

@@ -1,4 +1,4 @@
-/** Problems as people are told them: one thing once, however many fields it has. Pure. */
+/** Groups checked problems for people: one thing is shown once, however many fields it has. Pure. */
 
 import type { Graph, Key } from "../model";
 import { type DataFlow, dataFlowOf } from "../parameters/data-flow";
@@ -19,7 +19,7 @@ export interface ToldProblem<P extends CheckedProblem = CheckedProblem> {
   readonly place: string | null;
   /** The path of the inputs to fill in, as a whole; null for any other problem. */
   readonly group: string | null;
-  /** Inputs without a value, by path: they can be written where it is told. */
+  /** The inputs without a value, by path; they can be filled in where the problem is shown. */
   readonly inputs: readonly string[];
   /** All checked problems that it stands for, at least one. */
   readonly problems: readonly [P, ...P[]];
@@ -44,7 +44,7 @@ const ORDER: Readonly<Record<ProblemKind, number>> = {
   note: 3,
 };
 
-/** "x", "x and y", "x, y and z". */
+/** Joins words: "x", "x and y", "x, y and z". */
 function listed(words: readonly string[]): string {
   return words.length < 2 ? words.join("") : `${words.slice(0, -1).join(", ")} and ${words.at(-1)}`;
 }
@@ -106,7 +106,7 @@ export function toldProblems<P extends CheckedProblem>(
     const input = kind === "fill-in" && aid !== undefined ? inputOf(problem) : null;
     const list = actions.get(aid ?? "")?.inputs ?? [];
     const group = input === null ? null : groupOf(list, input);
-    // What has the same words at the same place is one thing, whichever lines of the file it is in.
+    // Problems with the same words at the same place are one, whichever lines of the file they are in.
     const what = group === null ? problem.message : `in/${group}`;
     const id = `${kind} ${problem.code} ${placeOf(problem) ?? ""} ${what}`;
     const known = found.get(id);
@@ -117,7 +117,7 @@ export function toldProblems<P extends CheckedProblem>(
   return [...found.values()].map(told).sort((a, b) => rank(a) - rank(b));
 }
 
-/** Places other than its own of which the same is said. */
+/** Returns the other places that have the same problem. */
 export function otherPlaces(problem: Pick<CheckedProblem, "also">): string[] {
   return (problem.also ?? []).flatMap((where) => placeOf({ where }) ?? []);
 }

@@ -34,7 +34,7 @@ test("a field has the problems of its own thing only, errors first", () => {
   expect(toldAt(told(problem("/graph_name")), "graph", "name")).toHaveLength(1);
 });
 
-test("what is to fill in leads to the first field that has no value", () => {
+test("a problem about missing values leads to the first field without one", () => {
   const path = "/actions/0/input_parameters/at/x";
   const [first] = told({ ...problem(path, { aid: "a" }), code: "H8" });
   expect(first && firstField(first)).toBe("in/at/x");

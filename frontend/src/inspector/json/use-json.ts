@@ -61,7 +61,7 @@ export function useJson(graph: string, seq: number) {
   const newest = query.data;
   const [draft, keepDraft] = useJsonDraft(graph);
   const [verdict, setVerdict] = useState<Verdict>(CHECKING);
-  // What was applied is shown until the server's text says it too.
+  // The applied text is shown until the server's text has it, too.
   const [applied, setApplied] = useState<JsonSnapshot | null>(null);
   const arrived = newest !== undefined && applied !== null && newest.seq > applied.seq;
   useEffect(() => {

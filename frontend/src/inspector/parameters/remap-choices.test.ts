@@ -59,7 +59,7 @@ test("a renaming that does nothing, or worse, says what the engine makes of it",
   expect(says("pose::x", "fixed")).toContain("locked");
 });
 
-test("what is called and typed the same is carried over by itself", () => {
+test("an output with the same name and type is carried over by itself", () => {
   const [look, grip] = two();
   expect(passed(look, grip, [])).toEqual(["colour"]);
   expect(passed(look, grip, [{ source: "colour", target: "n" }])).toEqual([]);

@@ -4,7 +4,7 @@ import { frameScheduler } from "./frame-scheduler";
 
 const nextFrame = () => new Promise((done) => requestAnimationFrame(done));
 
-test("whatever comes between two frames is told once", async () => {
+test("changes between two frames are told once", async () => {
   const { soon } = frameScheduler();
   const tell = vi.fn();
   for (let n = 0; n < 40; n += 1) soon(tell);
@@ -16,7 +16,7 @@ test("whatever comes between two frames is told once", async () => {
   expect(tell).toHaveBeenCalledTimes(2);
 });
 
-test("what has been told rests for a while", async () => {
+test("a listener is not called again for a while", async () => {
   const { soon } = frameScheduler(100);
   const times: number[] = [];
   const tell = () => times.push(performance.now());

@@ -20,7 +20,7 @@ export interface FrameScheduler {
 /** In a page without frames, such as a hidden one, listeners are called after this time, ms. */
 const UNSEEN_MS = 100;
 
-/** `gap`: what is told rests so long, ms, before it is told again. */
+/** Returns a scheduler. A listener that was called is not called again for `gap` ms. */
 export function frameScheduler(gap = 0): FrameScheduler {
   const waiting = new Set<() => void>();
   let frame: number | undefined;

@@ -48,7 +48,7 @@ test("others are listed by name with what the server says of them, and oneself i
   ]);
 });
 
-test("what another page claims is taken only as far as it fits", () => {
+test("the state that another page claims is read only where it is well formed", () => {
   other({});
   other({ user: { id: 3, name: "x" } });
   other({ ...ada, cursor: ["a", 1], selection: [1, "a"], editing: {}, drag: { ids: 5, dx: 1 } });
@@ -112,7 +112,7 @@ test("a field is taken back with undefined, and saying the same again is not sen
   expect(sent).toBe(0);
 });
 
-test("where another page looks is known, and nonsense is not followed", () => {
+test("the view of another page is known, and an impossible view is not followed", () => {
   const page = other({ ...ada, view: { x: 10, y: -20, zoom: 0.5 } });
   expect(presence.people()[0]?.presence.view).toEqual({ x: 10, y: -20, zoom: 0.5 });
   for (const view of [{ x: 1, y: 2 }, { x: 1, y: 2, zoom: 0 }, { x: "1", y: 2, zoom: 1 }, null]) {

@@ -50,7 +50,10 @@ export interface Participant {
 type PresenceChange = { readonly [F in keyof Presence]?: Presence[F] | undefined };
 
 export interface PresenceSource {
-  /** The others, by name; the same list until something of it changes, unchanged people likewise. */
+  /**
+   * Returns the others, by name: the same list until a part of it changes, and the same objects for unchanged
+   * people.
+   */
   people(): readonly Participant[];
   onPeople(listener: () => void): () => void;
   /** Tells the others, at most 20 times a second; `undefined` takes a field back. */
