@@ -15,13 +15,13 @@ import { useMay } from "../api/people";
 import { redo, undo } from "../edit-actions/all";
 import { editActionFor, isEnabled } from "../edit-actions/edit-action";
 import { type EditorContext, EditorReactContext } from "../edit-actions/editor-context";
-import { useToldProblems } from "../editor/problem-count";
+import { useProblemGroups } from "../editor/problem-count";
 import { RoomNotices } from "../editor/room-notices";
 import { SaveStatus } from "../editor/save-status";
 import { useEditor } from "../editor/use-editor";
 import type { Action } from "../graph/model";
 import { type RobotAction, type RobotsKnowledge, robotDifferences } from "../home/robot-actions";
-import { fieldOfTold } from "../inspector/fields/field-problems";
+import { fieldOfGroup } from "../inspector/fields/field-problems";
 import { graphLabels } from "../inspector/labels";
 import { LibraryActionForm } from "../inspector/library-action-form";
 import { People } from "../people/people";
@@ -166,8 +166,8 @@ const noPanel = () => {};
 
 /** Return the problems of the action without missing values: values belong to its uses in graphs. */
 function useTold({ id, graph }: EditorContext, seq: number) {
-  const { told } = useToldProblems(id, seq, graph);
-  return told.filter((each) => each.kind !== "fill-in" && fieldOfTold(each) !== null);
+  const { told } = useProblemGroups(id, seq, graph);
+  return told.filter((each) => each.kind !== "fill-in" && fieldOfGroup(each) !== null);
 }
 
 /** Refreshes the library as soon as an edit of this action is stored. */

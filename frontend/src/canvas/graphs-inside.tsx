@@ -2,7 +2,7 @@
 import type { ComponentType } from "react";
 import type { LibraryAction } from "../api/library";
 import type { Action, Key } from "../graph/model";
-import type { ToldProblem } from "../graph/problems/told-problems";
+import type { ProblemGroup } from "../graph/problems/problem-groups";
 import type { Progress } from "../status/progress";
 import { useWatched, Watched } from "../ui/watched";
 import type { Size, Sizes } from "./geometry/arrange";
@@ -113,4 +113,4 @@ export function useExpandedCard(key: Key): { size: Size; Frame: ExpandedGraphs["
 }
 
 /** Problems of the graph on the canvas, including those of its inner graphs. */
-export const toldOnCanvas = new Watched<readonly ToldProblem[]>([]);
+export const toldOnCanvas = new Watched<readonly ProblemGroup[]>([]);

@@ -33,7 +33,7 @@ import { useRenameGraph } from "../edit-actions/rename-graph";
 import type { NewAction } from "../graph/edit";
 import type { Graph, Key } from "../graph/model";
 import { linkableNames, linkedAction } from "../graph/note-links";
-import type { ToldProblem } from "../graph/problems/told-problems";
+import type { ProblemGroup } from "../graph/problems/problem-groups";
 import { endName } from "../graph/relation-words";
 import { People } from "../people/people";
 import type { Progress } from "../status/progress";
@@ -47,7 +47,7 @@ import { CanvasPane } from "./canvas-pane";
 import { Overlays } from "./menus/overlays";
 import { DesktopLayout, DryRunButton, PhoneLayout } from "./panels/layouts";
 import { usePanels } from "./panels/use-panels";
-import { blockWords, ProblemCount, useToldProblems } from "./problem-count";
+import { blockWords, ProblemCount, useProblemGroups } from "./problem-count";
 import { RoomNotices } from "./room-notices";
 import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
@@ -201,7 +201,7 @@ interface Props {
 /** The result of the check of one moment (`seq`). */
 interface Checked {
   readonly seq: number | undefined;
-  readonly told: readonly ToldProblem[];
+  readonly told: readonly ProblemGroup[];
 }
 
 function obstacleOf(context: EditorContext, link: RoomLink, checked: Checked, placing: boolean) {
@@ -322,7 +322,7 @@ function barParts(
   { me, status, start }: Props,
   context: EditorContext,
   summary: EditorSummary,
-  told: readonly ToldProblem[],
+  told: readonly ProblemGroup[],
   search: string,
   rename: (name: string) => boolean,
 ): EditorBarParts {
@@ -389,7 +389,7 @@ export function Editor(props: Props) {
   const link = useThrottledLink();
   const search = useSearch();
   const rename = useRenameGraph(context);
-  const { problems, told, marks } = useToldProblems(id, link.seq, context.graph);
+  const { problems, told, marks } = useProblemGroups(id, link.seq, context.graph);
   const threads = useThreads();
   useOpenThreadsOnCards(threads);
   useRemoteEditAnnouncements(context.graph, link.seq > 0);

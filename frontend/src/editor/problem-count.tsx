@@ -6,20 +6,20 @@ import { toldOnCanvas } from "../canvas/graphs-inside";
 import { problemMarksOf } from "../canvas/marks/problem-marks";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
+import { type ProblemGroup, problemGroups } from "../graph/problems/problem-groups";
 import { countsOf } from "../graph/problems/problem-kinds";
-import { type ToldProblem, toldProblems } from "../graph/problems/told-problems";
 import style from "./problem-count.module.css";
 
 /**
  * Return the problems of a moment with the graph's names, as a list and as marks. Problems of an
  * older moment are described with the graph of their arrival.
  */
-export function useToldProblems(id: string, seq: number, graph: Graph) {
+export function useProblemGroups(id: string, seq: number, graph: Graph) {
   const problems = useProblems(id, seq).data;
   const now = useRef(graph);
   now.current = graph;
   const found = problems?.problems;
-  const told = useMemo(() => toldProblems(found ?? [], now.current), [found]);
+  const told = useMemo(() => problemGroups(found ?? [], now.current), [found]);
   const marks = useMemo(() => problemMarksOf(told), [told]);
   useEffect(() => {
     toldOnCanvas.set(told);
@@ -29,7 +29,7 @@ export function useToldProblems(id: string, seq: number, graph: Graph) {
 }
 
 /** Return the counts of problems that block a start, in words; empty if none does. */
-export function blockWords(told: readonly ToldProblem[]): string {
+export function blockWords(told: readonly ProblemGroup[]): string {
   const { wrong, fillIn } = countsOf(told.filter(({ blocks }) => blocks));
   return [
     ...(wrong > 0 ? [`${wrong} wrong`] : []),
@@ -37,7 +37,7 @@ export function blockWords(told: readonly ToldProblem[]): string {
   ].join(", ");
 }
 
-export function ProblemCount({ told }: { told: readonly ToldProblem[] }) {
+export function ProblemCount({ told }: { told: readonly ProblemGroup[] }) {
   const { setPanel } = useEditorContext();
   const { wrong, fillIn, warnings } = countsOf(told);
   if (wrong + fillIn + warnings === 0) return null;

@@ -3,7 +3,7 @@ import type { Problem } from "../api/graphs";
 import type { PartOnCard } from "../canvas/graphs-inside";
 import { relationId } from "../graph/document-keys";
 import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS } from "../graph/model";
-import { placeOf } from "../graph/problems/told-problems";
+import { placeOf } from "../graph/problems/problem-groups";
 import { pathWords, valueText } from "../graph/value-text";
 import { isolated } from "../words/isolated";
 

@@ -16,7 +16,7 @@ import { EXIT } from "../graph/model";
 import { countsOf } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
 import { lazyPart, PartBoundary } from "../ui/lazy-part";
-import { ProblemsContext, type Told } from "./fields/field-problems";
+import { type CheckedGroup, ProblemsContext } from "./fields/field-problems";
 import { SharedField } from "./fields/shared-field";
 import { ViewOnly } from "./fields/view-only";
 import style from "./inspector.module.css";
@@ -41,7 +41,7 @@ interface Props {
   panel: Panel;
   problems: Problems | undefined;
   /** The problems as they are shown to people. */
-  told: readonly Told[];
+  told: readonly CheckedGroup[];
   threads: readonly Thread[];
 }
 
@@ -94,7 +94,7 @@ function Properties() {
 }
 
 /** The two numbers of the top bar; warnings where there is nothing else. */
-function ProblemsTab({ told }: { told: readonly Told[] }) {
+function ProblemsTab({ told }: { told: readonly CheckedGroup[] }) {
   const { wrong, fillIn, warnings } = countsOf(told);
   return (
     <span className={style.tabWords}>

@@ -4,7 +4,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { renameDocument } from "../graph/edit";
 import type { Action } from "../graph/model";
 import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
-import { ProblemsContext, type Told } from "./fields/field-problems";
+import { type CheckedGroup, ProblemsContext } from "./fields/field-problems";
 import { InLibraryContext, ViewOnly } from "./fields/view-only";
 import style from "./inspector.module.css";
 import { LabelsField } from "./labels";
@@ -14,7 +14,7 @@ interface Props {
   action: Action;
   /** Fields that follow from its name. */
   names: ReactNode;
-  told: readonly Told[];
+  told: readonly CheckedGroup[];
 }
 
 export function LibraryActionForm({ action, names, told }: Props) {

@@ -18,7 +18,7 @@ import { INTO, spaced } from "../status/level-places";
 import { focusField } from "../ui/focus-field";
 import { Tooltip } from "../ui/tooltip";
 import { isolated } from "../words/isolated";
-import { fieldOfTold, firstField, type Told } from "./fields/field-problems";
+import { type CheckedGroup, fieldOfGroup, firstField } from "./fields/field-problems";
 import { ProblemNote, tellNothingLeft } from "./fields/problem-note";
 import { DataFlowContext } from "./parameters/data-flow";
 import { NumberField } from "./parameters/number-rows";
@@ -36,7 +36,7 @@ function placeWords(graph: Graph, place: string | null): string {
 }
 
 /** Shows the place of a problem on the canvas and goes to its field; to its card where it has none. */
-function jump(context: EditorContext, told: Told, place: string): void {
+function jump(context: EditorContext, told: CheckedGroup, place: string): void {
   context.select([place]);
   context.view.show(place.split(">").map((end) => end.split(";")[0] ?? end));
   const field = firstField(told);
@@ -46,7 +46,7 @@ function jump(context: EditorContext, told: Told, place: string): void {
 }
 
 /** Fields for the missing values of a problem; numbers of one thing stand in a row. */
-function Values({ told }: { told: Told }) {
+function Values({ told }: { told: CheckedGroup }) {
   const { graph, mayEdit } = useEditorContext();
   const action = graph.actions.find(({ key }) => key === told.place);
   if (!action || !mayEdit || told.kind !== "fill-in") return null;
@@ -95,11 +95,11 @@ function WayInside({ inside }: { inside: CheckedPlaceInside | undefined }) {
   );
 }
 
-function ProblemItem({ told }: { told: Told }) {
+function ProblemItem({ told }: { told: CheckedGroup }) {
   const context = useEditorContext();
   const { place } = told;
   const words = placeWords(context.graph, place);
-  const field = fieldOfTold(told);
+  const field = fieldOfGroup(told);
   return (
     <li className={style.problem} data-kind={told.kind} data-code={told.code}>
       <div className={style.head}>
@@ -141,7 +141,7 @@ const TITLES: Readonly<Record<ProblemKind, string>> = {
   note: "Known of this engine",
 };
 
-function Part({ kind, told }: { kind: ProblemKind; told: readonly Told[] }) {
+function Part({ kind, told }: { kind: ProblemKind; told: readonly CheckedGroup[] }) {
   const here = told.filter((each) => each.kind === kind);
   if (here.length === 0) return null;
   return (
@@ -159,7 +159,7 @@ function Part({ kind, told }: { kind: ProblemKind; told: readonly Told[] }) {
 }
 
 /** The problems of what is selected that have no field of their own in its form. */
-export function ProblemsHere({ told }: { told: readonly Told[] }) {
+export function ProblemsHere({ told }: { told: readonly CheckedGroup[] }) {
   const { selection, graph } = useEditorContext();
   const [place, ...others] = selection;
   const action = graph.actions.find(({ key }) => key === place);
@@ -170,7 +170,7 @@ export function ProblemsHere({ told }: { told: readonly Told[] }) {
     const list = side === "in" ? action?.inputs : action?.outputs;
     return list?.some((each) => `${each.path}/`.startsWith(`${path}/`)) ?? false;
   };
-  const here = told.filter((each) => each.place === place && !shown(fieldOfTold(each)));
+  const here = told.filter((each) => each.place === place && !shown(fieldOfGroup(each)));
   if (place === undefined || here.length === 0 || others.length > 0) return null;
   return (
     <section className={style.here} aria-label="Problems of what is selected">
@@ -221,7 +221,7 @@ function FixAll({ problems }: { problems: Problems["problems"] }) {
 
 interface Props {
   problems: Problems | undefined;
-  told: readonly Told[];
+  told: readonly CheckedGroup[];
   seq: number;
 }
 

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Problem } from "../api/graphs";
-import { toldProblems } from "../graph/problems/told-problems";
+import { problemGroups } from "../graph/problems/problem-groups";
 import { marksInside } from "./level-frame";
 
 const inside = (aids: string[], aid?: string): Problem => ({
@@ -15,7 +15,7 @@ const inside = (aids: string[], aid?: string): Problem => ({
 });
 
 const marksOf = (...problems: Problem[]) =>
-  marksInside(toldProblems(problems, { actions: [], relations: [] }));
+  marksInside(problemGroups(problems, { actions: [], relations: [] }));
 
 test("a problem in an inner graph marks its card and each level above it, except the outermost", () => {
   const marks = marksOf(inside(["a", "b"], "c"), inside(["a", "b"]), inside(["a"], "d"));

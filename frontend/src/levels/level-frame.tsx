@@ -26,7 +26,7 @@ import type { DryRun } from "../dry-run/use-dry-run";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { type Action, type Direction, fullName, type Key, type Precondition } from "../graph/model";
 import { cardRows } from "../graph/parameters/card-rows";
-import type { ToldProblem } from "../graph/problems/told-problems";
+import type { ProblemGroup } from "../graph/problems/problem-groups";
 import type { Progress } from "../status/progress";
 import { progressBelow, type RunOnCanvas, runOnCanvas } from "../status/progress-inside";
 import { StateLabel } from "../status/state-label";
@@ -76,13 +76,13 @@ function useLevelProgress(level: LevelGraph): ReadonlyMap<Key, Progress> {
   );
 }
 
-let last: { told: readonly ToldProblem[]; marks: ProblemMarks } | null = null;
+let last: { told: readonly ProblemGroup[]; marks: ProblemMarks } | null = null;
 
 /**
  * Return the marks of problems in inner graphs, by the keys of the actions down to each, joined by
  * "/". Each level shows all problems below it.
  */
-export function marksInside(told: readonly ToldProblem[]): ProblemMarks {
+export function marksInside(told: readonly ProblemGroup[]): ProblemMarks {
   if (last?.told === told) return last.marks;
   const each = told.flatMap((one) => {
     const { inside } = one.problems[0];

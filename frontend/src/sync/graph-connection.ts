@@ -71,7 +71,7 @@ export class GraphConnection {
   private readonly options: GraphConnectionOptions;
   private readonly listeners = new Set<() => void>();
   private opened: ClosableRoom;
-  private asides: readonly StrandedEpoch[] = [];
+  private strandedEpochs: readonly StrandedEpoch[] = [];
   private notice: ConnectionNotice | null = null;
   private current: GraphConnectionState;
   private unfollow: () => void = () => undefined;
@@ -112,11 +112,11 @@ export class GraphConnection {
 
   /** Drops these edits. */
   async drop(stranded: StrandedEdits): Promise<void> {
-    const aside = this.asides.find((each) => each.stranded === stranded);
+    const aside = this.strandedEpochs.find((each) => each.stranded === stranded);
     await aside?.forget();
-    this.asides = this.asides.filter((each) => each !== aside);
+    this.strandedEpochs = this.strandedEpochs.filter((each) => each !== aside);
     this.say();
-    await this.lookAside(); // another page may have left some on the same history
+    await this.loadStrandedEpochs(); // another page may have left some on the same history
   }
 
   /** Hides the notice that the person has read. */
@@ -128,7 +128,7 @@ export class GraphConnection {
   /** Returns true if closing the page now would lose edits. */
   wouldLose(): boolean {
     const rooms = [this.opened.room, ...this.refusedRooms];
-    return rooms.some(isAtRisk) || this.asides.some((aside) => !aside.isKept());
+    return rooms.some(isAtRisk) || this.strandedEpochs.some((aside) => !aside.isKept());
   }
 
   /** Leaves the graph. If waiting edits exist only here, the room stays open until they are stored. */
@@ -167,7 +167,7 @@ export class GraphConnection {
 
   private follow({ state, why }: RoomLink): void {
     if (state === "refused" && why !== undefined) this.succeed(why);
-    else if (state === "live" && !this.looked) void this.lookAside();
+    else if (state === "live" && !this.looked) void this.loadStrandedEpochs();
   }
 
   /** Opens the next room, if this one ended for a reason that the next one has not. */
@@ -179,14 +179,14 @@ export class GraphConnection {
     const aside = stranded && { epoch, stranded, isKept, forget: () => room.forget() };
     switch (why) {
       case "other-epoch":
-        if (aside !== null) this.asides = [...this.asides, aside];
+        if (aside !== null) this.strandedEpochs = [...this.strandedEpochs, aside];
         else this.notice = "went-back";
         this.follower(otherEpoch(room));
         break;
       case "other-client":
         this.follower(newEpoch(room.histories().theirs));
         if (aside === null) void room.forget();
-        else void this.again(aside);
+        else void this.makeUnderOtherClient(aside);
         break;
       case "differs":
         this.differences += 1;
@@ -269,7 +269,7 @@ export class GraphConnection {
       isKept: () => room.link().kept === true,
       forget: () => room.forget(),
     };
-    this.asides = [...this.asides, aside];
+    this.strandedEpochs = [...this.strandedEpochs, aside];
     this.say();
   }
 
@@ -298,15 +298,15 @@ export class GraphConnection {
   }
 
   /** Makes the waiting edits anew under another client id, in the same history and without asking. */
-  private async again(aside: StrandedEpoch): Promise<void> {
-    this.asides = [...this.asides, aside];
+  private async makeUnderOtherClient(aside: StrandedEpoch): Promise<void> {
+    this.strandedEpochs = [...this.strandedEpochs, aside];
     await this.apply(aside.stranded, aside.stranded.difference).catch((error: unknown) => {
       console.warn("Changes wait for a decision, since they could not be made again:", error);
     });
   }
 
   /** Looks for edits that were laid aside when this graph was open here before. */
-  private async lookAside(): Promise<void> {
+  private async loadStrandedEpochs(): Promise<void> {
     this.looked = true;
     const { keep } = this.options;
     if (keep === undefined) return;
@@ -315,24 +315,24 @@ export class GraphConnection {
     const all = await device.read(keep).catch(() => []); // a device that keeps nothing
     if (this.left) return;
     const busy = [...this.refusedRooms].map((room) => room.histories().here);
-    const known = new Set([here, ...busy, ...this.asides.map(({ epoch }) => epoch)]);
+    const known = new Set([here, ...busy, ...this.strandedEpochs.map(({ epoch }) => epoch)]);
     const found = all
       .filter(({ epoch, waiting }) => !known.has(epoch) && waiting.length > 0)
-      .map((kept) => asideOf(device, keep, kept, here));
+      .map((kept) => strandedEpochOf(device, keep, kept, here));
     if (found.length === 0) return;
-    this.asides = [...found, ...this.asides];
+    this.strandedEpochs = [...found, ...this.strandedEpochs];
     this.say();
   }
 
   private say(): void {
-    const stranded = this.asides.map((aside) => aside.stranded);
+    const stranded = this.strandedEpochs.map((aside) => aside.stranded);
     this.current = { open: this.opened, stranded, notice: this.notice };
     for (const listener of [...this.listeners]) listener();
   }
 }
 
 /** `here`: the history that is shown now. Where the server calls both the same, it refused the edits. */
-function asideOf(
+function strandedEpochOf(
   device: EditStore,
   keep: PersistenceOptions,
   kept: StoredCopy,

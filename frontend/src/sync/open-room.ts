@@ -27,13 +27,13 @@ export interface OpenRoom {
 
 export type ClosableRoom = OpenRoom & { leave(): void };
 
-const CALM_MS = 250;
+const THROTTLE_MS = 250;
 
 /** Opens a room; `leave` closes all of it. */
 export function openRoom(options: RoomOptions): ClosableRoom {
   const room = connectRoom(options);
   const scheduler = frameScheduler();
-  const calm = frameScheduler(CALM_MS);
+  const slowScheduler = frameScheduler(THROTTLE_MS);
   const source = followGraph(room.doc, scheduler.soon);
   const presence = presenceOf(room.awareness, scheduler.soon);
   const following = new FollowedPerson(presence);
@@ -50,7 +50,8 @@ export function openRoom(options: RoomOptions): ClosableRoom {
       return room.onLink(() => scheduler.soon(tell));
     },
     throttled: {
-      onGraph: (listener) => source.subscribe((own) => (own ? listener() : calm.soon(listener))),
+      onGraph: (listener) =>
+        source.subscribe((own) => (own ? listener() : slowScheduler.soon(listener))),
       onLink(listener) {
         let last = room.link();
         return room.onLink(() => {
@@ -58,7 +59,7 @@ export function openRoom(options: RoomOptions): ClosableRoom {
           // Each edit of anybody has a place in the log; all else is news.
           const named = isEqual({ ...last, seq: 0 }, { ...link, seq: 0 });
           last = link;
-          (named ? calm : scheduler).soon(listener);
+          (named ? slowScheduler : scheduler).soon(listener);
         });
       },
     },
@@ -69,7 +70,7 @@ export function openRoom(options: RoomOptions): ClosableRoom {
       undo.destroy();
       room.close();
       scheduler.close();
-      calm.close();
+      slowScheduler.close();
     },
   };
 }

@@ -2,8 +2,8 @@
 import { Button, Group, Modal, Text } from "@mantine/core";
 import { useSyncExternalStore } from "react";
 import type { ProblemPlace } from "../../api/graphs";
+import { problemGroups } from "../../graph/problems/problem-groups";
 import { countsOf, countWords } from "../../graph/problems/problem-kinds";
-import { toldProblems } from "../../graph/problems/told-problems";
 import { type ImportUnderReview, importReviews } from "./import-review";
 import style from "./import-review-dialog.module.css";
 import { dialectWords } from "./take-files";
@@ -18,7 +18,7 @@ function Line({ where }: { where: ProblemPlace }) {
 function Problems({ waiting }: { waiting: ImportUnderReview }) {
   // That it is an old form is solved by keeping it.
   const left = waiting.preview.problems.filter(({ code }) => code !== "dialect-old");
-  const problems = toldProblems(left, { actions: [], relations: [] });
+  const problems = problemGroups(left, { actions: [], relations: [] });
   if (problems.length === 0) return null;
   const more = problems.length - MOST_PROBLEMS;
   return (

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { Problem } from "../../api/graphs";
-import { toldProblems } from "../../graph/problems/told-problems";
+import { problemGroups } from "../../graph/problems/problem-groups";
 import { problemMarksOf, problemMarkWords } from "./problem-marks";
 
 const problem = (
@@ -15,7 +15,7 @@ const problem = (
 });
 
 const marksOf = (problems: readonly Problem[]) =>
-  problemMarksOf(toldProblems(problems, { actions: [], relations: [] }));
+  problemMarksOf(problemGroups(problems, { actions: [], relations: [] }));
 
 test("a problem of an arrow marks the arrow, one of an action its card, one of the graph nothing", () => {
   const marks = marksOf([

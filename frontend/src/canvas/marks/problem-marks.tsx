@@ -1,8 +1,8 @@
 /** Problems by the card or arrow at which they are drawn, and the badge that shows their counts. */
 
 import { IconAlertTriangleFilled } from "@tabler/icons-react";
+import { otherPlaces, type ProblemGroup } from "../../graph/problems/problem-groups";
 import { countsOf, countWords, type ProblemCounts } from "../../graph/problems/problem-kinds";
-import { otherPlaces, type ToldProblem } from "../../graph/problems/told-problems";
 import style from "./problem-marks.module.css";
 
 /** The counted problems of one card or arrow. */
@@ -17,8 +17,8 @@ export type ProblemMarks = ReadonlyMap<string, ProblemMark>;
 export const NO_PROBLEM_MARKS: ProblemMarks = new Map();
 
 /** Return the marks of all places on the canvas to which problems refer. */
-export function problemMarksOf(told: readonly ToldProblem[]): ProblemMarks {
-  const places = new Map<string, ToldProblem[]>();
+export function problemMarksOf(told: readonly ProblemGroup[]): ProblemMarks {
+  const places = new Map<string, ProblemGroup[]>();
   for (const each of told) {
     if (each.kind === "note") continue; // it would mark the arrows of nearly every graph
     const others = each.problems.flatMap((problem) => otherPlaces(problem));

@@ -11,7 +11,7 @@ import { actionDrag } from "../../canvas/action-drag";
 import { dryRun } from "../../edit-actions/dry-run-actions";
 import { isEnabled } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import type { ToldProblem } from "../../graph/problems/told-problems";
+import type { ProblemGroup } from "../../graph/problems/problem-groups";
 import { whenThere } from "../../ui/focus-field";
 import { type ListTab, useListTab } from "../../ui/hooks";
 import { lazyPart, PartBoundary } from "../../ui/lazy-part";
@@ -170,7 +170,7 @@ function FoldButton({ fold }: { fold: Panels["fold"] }) {
 
 interface DesktopParts extends Parts {
   wide: boolean;
-  told: readonly ToldProblem[];
+  told: readonly ProblemGroup[];
   list: () => ReactNode;
 }
 

@@ -10,8 +10,8 @@ import {
 } from "@tabler/icons-react";
 import { type MouseEvent, type ReactNode, useEffect, useRef } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
+import type { ProblemGroup } from "../../graph/problems/problem-groups";
 import { countsOf, countWords } from "../../graph/problems/problem-kinds";
-import type { ToldProblem } from "../../graph/problems/told-problems";
 import { whenThere } from "../../ui/focus-field";
 import { type ListTab, useListTab } from "../../ui/hooks";
 import { keyOf } from "../../ui/keys";
@@ -105,7 +105,7 @@ function RailButton({ name, icon, open, more, onPress }: RailButtonProps) {
   );
 }
 
-function ProblemsButton({ told }: { told: readonly ToldProblem[] }) {
+function ProblemsButton({ told }: { told: readonly ProblemGroup[] }) {
   const { setPanel } = useEditorContext();
   const counts = countsOf(told);
   const { wrong, fillIn } = counts;
@@ -131,7 +131,7 @@ function ProblemsButton({ told }: { told: readonly ToldProblem[] }) {
 
 interface Props {
   panels: Panels;
-  told: readonly ToldProblem[];
+  told: readonly ProblemGroup[];
 }
 
 export function ListRail({ panels, told }: Props) {

@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { Problem } from "../../api/graphs";
-import { toldProblems } from "../../graph/problems/told-problems";
-import { fieldOfProblem, firstField, toldAt } from "./field-problems";
+import { problemGroups } from "../../graph/problems/problem-groups";
+import { fieldOfProblem, firstField, groupsAt } from "./field-problems";
 
 const problem = (path: string, where: object = {}): Problem => ({
   code: "P1",
@@ -9,7 +9,7 @@ const problem = (path: string, where: object = {}): Problem => ({
   message: "",
   where: { path, ...where },
 });
-const told = (...problems: Problem[]) => toldProblems(problems, { actions: [], relations: [] });
+const told = (...problems: Problem[]) => problemGroups(problems, { actions: [], relations: [] });
 
 test.each([
   ["/graph_name", "name"],
@@ -29,9 +29,9 @@ test("a field has the problems of its own thing only, errors first", () => {
   const mild = problem("/actions/0/name", { aid: "a" });
   const bad: Problem = { ...mild, severity: "error" };
   const other = problem("/actions/1/name", { aid: "b" });
-  const found = toldAt(told(mild, other, bad), "a", "name");
+  const found = groupsAt(told(mild, other, bad), "a", "name");
   expect(found.flatMap(({ problems }) => problems)).toEqual([bad, mild]);
-  expect(toldAt(told(problem("/graph_name")), "graph", "name")).toHaveLength(1);
+  expect(groupsAt(told(problem("/graph_name")), "graph", "name")).toHaveLength(1);
 });
 
 test("a problem about missing values leads to the first field without one", () => {

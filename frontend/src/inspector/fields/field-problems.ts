@@ -1,12 +1,12 @@
 /** Finds the field of a form that a problem is about, so that the problem is shown there. */
 import { createContext } from "react";
 import type { Problem } from "../../api/graphs";
-import type { ToldProblem } from "../../graph/problems/told-problems";
+import type { ProblemGroup } from "../../graph/problems/problem-groups";
 
-export type Told = ToldProblem<Problem>;
+export type CheckedGroup = ProblemGroup<Problem>;
 
 /** The problems of the open graph, for the fields of its forms. */
-export const ProblemsContext = createContext<readonly Told[]>([]);
+export const ProblemsContext = createContext<readonly CheckedGroup[]>([]);
 
 const MEMBERS: Readonly<Record<string, string>> = {
   name: "name",
@@ -37,17 +37,17 @@ export function fieldOfProblem({ where }: Pick<Problem, "where">): string | null
 }
 
 /** The field under which it is said: that of the whole where it is about several of one thing. */
-export function fieldOfTold({ group, problems }: Told): string | null {
+export function fieldOfGroup({ group, problems }: CheckedGroup): string | null {
   return group === null ? fieldOfProblem(problems[0]) : `in/${group}`;
 }
 
 /** Returns the problems of one field of one thing. */
-export function toldAt(told: readonly Told[], of: string, field: string): Told[] {
-  return told.filter((each) => (each.place ?? "graph") === of && fieldOfTold(each) === field);
+export function groupsAt(told: readonly CheckedGroup[], of: string, field: string): CheckedGroup[] {
+  return told.filter((each) => (each.place ?? "graph") === of && fieldOfGroup(each) === field);
 }
 
 /** Returns the field at which a problem shows: the first one; null where only the thing itself is marked. */
-export function firstField(told: Told): string | null {
+export function firstField(told: CheckedGroup): string | null {
   const [input] = told.inputs;
-  return input === undefined ? fieldOfTold(told) : `in/${input}`;
+  return input === undefined ? fieldOfGroup(told) : `in/${input}`;
 }

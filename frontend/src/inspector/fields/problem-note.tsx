@@ -3,7 +3,7 @@ import { notifications } from "@mantine/notifications";
 import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { ABOUT, applyFix, fixOf } from "../../graph/edit/fixes";
-import type { Told } from "./field-problems";
+import type { CheckedGroup } from "./field-problems";
 import style from "./problem-note.module.css";
 
 export function tellNothingLeft(): void {
@@ -11,7 +11,7 @@ export function tellNothingLeft(): void {
 }
 
 /** A button that applies the fix of the first of its problems that has one, to all that have one. */
-function FixLink({ told }: { told: Told }) {
+function FixLink({ told }: { told: CheckedGroup }) {
   const { doc, mayEdit } = useEditorContext();
   const mended = told.problems.filter((problem) => fixOf(problem) !== null);
   const fix = mended[0] && fixOf(mended[0]);
@@ -31,7 +31,7 @@ function FixLink({ told }: { told: Told }) {
   );
 }
 
-export function ProblemNote({ told, id }: { told: Told; id?: string }) {
+export function ProblemNote({ told, id }: { told: CheckedGroup; id?: string }) {
   const Sign = told.kind === "fill-in" ? IconPencil : IconAlertTriangle;
   return (
     <p className={style.note} data-kind={told.kind} data-code={told.code} id={id}>

@@ -3,7 +3,7 @@ import { type FocusEvent, type ReactNode, use, useEffect, useRef } from "react";
 import { onePerId, PersonSign } from "../../people/people";
 import { useEditors, usePersonColors, useRoom } from "../../sync/use-room";
 import { DraftOwnerContext } from "../../ui/drafts";
-import { ProblemsContext, toldAt } from "./field-problems";
+import { groupsAt, ProblemsContext } from "./field-problems";
 import { ProblemNote } from "./problem-note";
 import style from "./shared-field.module.css";
 
@@ -19,7 +19,7 @@ const WRITABLE = "input, textarea, [contenteditable=true]";
 export function SharedField({ of, field, children }: Props) {
   const { presence } = useRoom();
   const id = `${of}|${field}`;
-  const told = toldAt(use(ProblemsContext), of, field);
+  const told = groupsAt(use(ProblemsContext), of, field);
   const here = useRef(false);
   const leave = useRef(() => {});
   leave.current = () => {

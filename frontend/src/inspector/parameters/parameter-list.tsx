@@ -14,7 +14,7 @@ import { fresh, GROUPS, TYPES } from "../../graph/parameters/values";
 import { countsOf } from "../../graph/problems/problem-kinds";
 import { pathWords } from "../../graph/value-text";
 import { usePendingText } from "../../ui/drafts";
-import { fieldOfTold, ProblemsContext } from "../fields/field-problems";
+import { fieldOfGroup, ProblemsContext } from "../fields/field-problems";
 import { SharedField } from "../fields/shared-field";
 import style from "../inspector.module.css";
 import { DataFlowContext } from "./data-flow";
@@ -23,7 +23,7 @@ import { ParameterField } from "./parameter-field";
 
 function SectionCounts({ of, side }: { of: Key; side: ParameterSide }) {
   const here = use(ProblemsContext).filter(
-    (told) => told.place === of && fieldOfTold(told)?.startsWith(`${side}/`),
+    (told) => told.place === of && fieldOfGroup(told)?.startsWith(`${side}/`),
   );
   const { wrong, fillIn } = countsOf(here);
   if (wrong + fillIn === 0) return null;

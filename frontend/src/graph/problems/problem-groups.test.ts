@@ -5,8 +5,8 @@ import * as Y from "yjs";
 import { mapsFrom, mapsOf } from "../document-keys";
 import { addAction, connect } from "../edit";
 import { readGraph } from "../read";
+import { problemGroups } from "./problem-groups";
 import { type CheckedProblem, countsOf, countWords, kindOf } from "./problem-kinds";
-import { toldProblems } from "./told-problems";
 
 const problem = (code: string, path = "", more: Partial<CheckedProblem> = {}): CheckedProblem => ({
   code,
@@ -52,7 +52,7 @@ test("a pose that is not written is one thing to fill in, and says what of it", 
         aid: key,
       },
     });
-  const told = toldProblems([at("x"), at("z")], graph);
+  const told = problemGroups([at("x"), at("z")], graph);
   expect(told.map(({ kind, message, inputs }) => [kind, message, inputs])).toEqual([
     [
       "fill-in",
@@ -65,14 +65,14 @@ test("a pose that is not written is one thing to fill in, and says what of it", 
 test("an input that gets what it cannot take is wrong, not just to fill in", () => {
   const { key, graph } = grip();
   const path = "/actions/1/input_parameters/colour";
-  const [told] = toldProblems([problem("H8", path, { where: { path, aid: key } })], graph);
+  const [told] = problemGroups([problem("H8", path, { where: { path, aid: key } })], graph);
   expect(told?.kind).toBe("wrong");
 });
 
 test("two equal problems of one place are told once, and errors come first", () => {
   const risk = problem("H3", "/actions/0/parents/0", { severity: "warning", message: "may abort" });
   const again = { ...risk, where: { path: "/actions/0/parents/1", aid: "a" } };
-  const told = toldProblems([risk, again, problem("no-exit"), problem("H2")], EMPTY);
+  const told = problemGroups([risk, again, problem("no-exit"), problem("H2")], EMPTY);
   expect(told.map(({ code, problems }) => [code, problems.length])).toEqual([
     ["H2", 1],
     ["no-exit", 1],
@@ -101,7 +101,7 @@ test.each(vectors.kinds)("as the vectors say, %s, %s at %s: %s", (code, severity
 });
 
 test.each(vectors.graphs)("as many of each as the vectors say: $about", (vector) => {
-  const told = toldProblems(vector.problems, readGraph(mapsFrom(vector.maps)));
+  const told = problemGroups(vector.problems, readGraph(mapsFrom(vector.maps)));
   const { wrong, fillIn } = countsOf(told);
   expect({ wrong, to_fill_in: fillIn }).toEqual({
     wrong: vector.wrong,

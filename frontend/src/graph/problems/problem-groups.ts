@@ -6,7 +6,7 @@ import { groupOf } from "../parameters/groups";
 import { pathWords } from "../value-text";
 import { type CheckedProblem, inputOf, kindOf, type ProblemKind } from "./problem-kinds";
 
-export interface ToldProblem<P extends CheckedProblem = CheckedProblem> {
+export interface ProblemGroup<P extends CheckedProblem = CheckedProblem> {
   /** An id that stays the same for the same thing, however often it is checked. */
   readonly id: string;
   readonly kind: ProblemKind;
@@ -64,7 +64,7 @@ function told<P extends CheckedProblem>({
   kind,
   group,
   problems,
-}: Gathered<P>): ToldProblem<P> {
+}: Gathered<P>): ProblemGroup<P> {
   const [first] = problems;
   const inputs = group === null ? [] : problems.flatMap((each) => inputOf(each) ?? []);
   return {
@@ -92,11 +92,11 @@ function misfitsIn(flow: DataFlow) {
  * Returns the problems to show: first what is wrong, then what to fill in, then what may go wrong, then notes; in
  * each kind what blocks a start comes first.
  */
-export function toldProblems<P extends CheckedProblem>(
+export function problemGroups<P extends CheckedProblem>(
   problems: readonly P[],
   graph: Pick<Graph, "actions" | "relations">,
   flow: DataFlow = dataFlowOf(graph),
-): ToldProblem<P>[] {
+): ProblemGroup<P>[] {
   const misfits = misfitsIn(flow);
   const actions = new Map(graph.actions.map((action) => [action.key, action]));
   const found = new Map<string, Gathered<P>>();
@@ -113,7 +113,7 @@ export function toldProblems<P extends CheckedProblem>(
     if (known) known.problems.push(problem);
     else found.set(id, { id, kind, group, problems: [problem] });
   }
-  const rank = ({ kind, blocks }: ToldProblem) => 2 * ORDER[kind] + (blocks ? 0 : 1);
+  const rank = ({ kind, blocks }: ProblemGroup) => 2 * ORDER[kind] + (blocks ? 0 : 1);
   return [...found.values()].map(told).sort((a, b) => rank(a) - rank(b));
 }
 
