@@ -86,7 +86,7 @@ class EmulatedEngine:
         self._view = PublishedGraphs(self._engine, index, quirks, random.Random(seed), epoch_ms)
         self._drains = False
         self._inbox = Inbox(quirks.depth)
-        self._works = False  # a turn of its thread is planned
+        self._works = False  # True while a turn of the thread is planned
         self._under_way: list[Callable[[], None]] = []
         self._lingers = 0
         self._frozen, self._frozen_ms = False, born_ms

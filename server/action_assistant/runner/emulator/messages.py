@@ -287,7 +287,7 @@ def active(name: str, state: str) -> str:
 def refusal(why: str, message: Start) -> str:
     """Return the log line for a start that the engine refuses."""
     by_name = not message.graph_json
-    if why == "map::at":  # no error of its own
+    if why == "map::at":  # an exception of C++ without a text of the engine
         return why
     if "Could not resolve" in why:
         if by_name:  # it then stops what it does not hold, and says only that

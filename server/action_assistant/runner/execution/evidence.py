@@ -63,7 +63,7 @@ class SubGraphs:
     """
 
     def __init__(self) -> None:
-        self._begun: set[str] = set()  # parts whose node was seen going on in an earlier look
+        self._begun: set[str] = set()  # sub-graphs whose node was seen begun in an earlier look
         self._last = LastLook()  # the newest look so far
         self._passed_over: dict[
             str, LastLook
@@ -94,13 +94,13 @@ class SubGraphs:
     ) -> Literal["ours", "others", "unsure"]:
         above, _, number = part.graph.rpartition("__")
         above, _, name = above.rpartition("__")
-        while above and above not in held:  # names may have such a mark inside
+        while above and above not in held:  # names may contain `__`
             above, _, more = above.rpartition("__")
             name = f"{more}__{name}"
         if above not in held:
             return "unsure"
         state = held[above].nodes.get(f"{name}_{number}")
-        if state is None:  # it stands below one that is not held itself
+        if state is None:  # the graph around it is not held
             return "unsure"
         if state in NEVER_BEGAN:
             return "others"

@@ -42,10 +42,10 @@ log: Final = logging.getLogger(__name__)
 _POLL_S: Final = 1.0
 _STOP_POLL_S: Final = 0.1
 _SILENT_S: Final = 3.0
-_APPEAR_S: Final = 3.0  # until a started graph must show in answers
-_ABSENT_S: Final = 1.0  # for which answers must lack what the engine has said it refused
+_APPEAR_S: Final = 3.0  # after a start until its graph must show in answers
+_ABSENT_S: Final = 1.0  # for which answers must lack a graph whose start the engine has refused
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
-_LOADING_TOLD_S: Final = 1.5  # what feedback has still to tell has come by then
+_LOADING_TOLD_S: Final = 1.5  # by then feedback that may rule loading out has come
 _NO_PROOF: Final = "{doubt}, so that no answer proves anything"
 
 
@@ -59,7 +59,7 @@ class Finding(NamedTuple):
     asks: bool = False
 
 
-#: Work that no look waits for. It may raise Refused, then it is given up.
+#: Work that no look waits for. It may raise Refused, and is given up then.
 Job: TypeAlias = Callable[[RunInWorker], Awaitable[Finding]]
 
 
@@ -99,19 +99,19 @@ class Monitor:
         self._order = itertools.count(1)
         self._stop_sent: int | None = None
         self._disturbed = 0
-        self._begun = 0  # when feedback was the first to show it
+        self._begun = 0  # order of the feedback that showed the run first
         self._sent: str | None = None  # until it was compared with what the engine shows
         self._sent_order = 0
         self._start = refusals.StartLog(run)
         self._absent: float | None = None  # since when answers lack a start that was refused
         self._standstill = stall.Standstill()
-        self._stalled_as: object = None  # the actions at which that was told
+        self._stalled_as: object = None  # the actions when a standstill was told last
         self._lacking: str | None = None  # what the graph that was sent lacks to begin
         self._parts = SubGraphs()
         self._loading = LoadingWatch(run.graph_name, meddled=run.reshaped)
         self._loading_times = loading_times
         self._threads = EngineThreads()
-        self._reads = False  # the arrows of graphs, for that
+        self._reads = False  # while a job reads arrows of graphs
         self._loads_since: float | None = None
         self._loading_told_at = 0.0  # seconds of loading at which that is told again
         self._answered = False  # by a get, since the last feedback
@@ -212,7 +212,7 @@ class Monitor:
     def pace(self, run: Run) -> float:
         """Return after how many seconds the engine is to be asked again, at the least."""
         hurry = run.desired == "stopped" or self._rest.pending
-        hurry = hurry and not run.loading  # feedback tells when it begins
+        hurry = hurry and not run.loading  # feedback tells when a loading action begins
         return _STOP_POLL_S if hurry else _POLL_S
 
     def take_jobs(self) -> list[Job]:
@@ -370,7 +370,7 @@ class Monitor:
             going = ", ".join(run.active)
             self.trouble = f"{going} has not stopped yet" if going else run.unconfirmed
             if self._exact and at_rest:
-                changes.engine_ended()  # a simulated one is switched off, and nothing has moved
+                changes.engine_ended()  # a simulated engine is switched off then
             elif at_rest and self._threads.have_ended(run.process):
                 changes.threads_ended()
             return
@@ -459,7 +459,7 @@ class Monitor:
     ) -> Finding:
         try:
             await self._loading.read(graphs, answer.texts, run_in_worker)
-        except Refused as why:  # whoever has not begun counts as loading then
+        except Refused as why:  # every action that has not begun counts as loading then
             log.warning("the arrows of %s cannot be read: %s", ", ".join(graphs), why.detail)
         finally:
             self._reads = False

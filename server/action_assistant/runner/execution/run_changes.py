@@ -22,7 +22,9 @@ from action_assistant.runner.runs.run import Run
 #: The end of every alarm about a Stop that nothing proves.
 LOOK_AT_IT: Final = "Look at the robot; its hardware stop is the one to use."
 
-_TOLD: Final = frozenset({"H7", "H8"})  # the run goes nowhere, and the engine says nothing
+_TOLD: Final = frozenset(
+    {"H7", "H8"}
+)  # hazards after which a run goes nowhere, although the engine goes on
 _RESULTS: Final = {"HALTED": "on_halted", "STOPPED": "on_stopped", "ERROR": "on_error"}
 
 

@@ -100,7 +100,7 @@ class OpenRun:
         self._run_in_worker = run_in_worker
         self._doubts = DoubtfulErrors(
             reached=seq > 1 and not owns_link
-        )  # what came before is not known
+        )  # what a stop reached before is not known
         self._loading_times = loading_times or LoadingTimes()
         self.watch = self._watched()
         self._asks = anyio.Event()
@@ -386,7 +386,7 @@ class OpenRun:
 
     async def _publish(self, order: Order, incarnation: str) -> None:
         """Send the one start message. Whatever happens, it is never sent again."""
-        if self.run.end is not None:  # refused since it was written down
+        if self.run.end is not None:  # refused after it was stored
             return
         at = self._clock_us()
         self.watch.starts(order.umrf, self._link.standing.process)

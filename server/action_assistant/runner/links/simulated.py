@@ -50,14 +50,14 @@ from action_assistant.umrf.facts import EngineFacts
 log: Final = logging.getLogger(__name__)
 
 _HEAD: Final = 4  # bytes of a length
-_CHANGES: Final = 100  # of one report; the runner does nothing else while it takes one in
+_CHANGES: Final = 100  # in one report, which the runner takes in without a pause
 #: Simulated runs at a time; each takes 15 MB, and its part of the processors.
 MOST: Final = 64
 #: Of these, runs with behaviours; each may have many processes.
 MOST_WITH_BEHAVIOURS: Final = 8
 _WAITING: Final = 16_384  # bytes on the way; an answer comes after what was said before it
 _NICE: Final = 10
-_REST: Final = 3  # for so many times as long as reports took, all simulated runs wait together
+_REST: Final = 3  # simulated runs pause for so many times the time that a report took
 _START_S: Final = 4.0  # less than a start may take
 _ENDING_S: Final = 4.0  # that an engine has to end its behaviours
 _GONE: Final = "The simulated engine was switched off."
@@ -156,7 +156,7 @@ class SimulatedLink:
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Start a graph now; the first start also starts the process. Raises NotSent, EngineRefused."""
         leaves()
-        with anyio.CancelScope(shield=True):  # a Stop that comes meanwhile finds something to stop
+        with anyio.CancelScope(shield=True):  # so that a Stop that comes meanwhile finds an engine
             if self._process is None and not self._why:
                 await self._begin()
             await self._told("start", order)

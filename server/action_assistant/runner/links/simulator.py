@@ -52,7 +52,7 @@ from action_assistant.umrf.semantics import Script
 _QUICKEST_S: Final = 0.01
 
 
-_GRAIN_MS: Final = 0.01  # clocks are not finer: what is due so soon is due now
+_GRAIN_MS: Final = 0.01  # what is due within this time is due now
 _SLICE: Final = 50  # engine steps between two turns of the event loop
 
 

@@ -42,7 +42,9 @@ class DoubtfulErrors:
             for node in failed:
                 self._judge(each, node)
             if each.state == "ERROR" and not any(graph == each.graph for graph, _ in self._open):
-                for node in failed or [each.graph]:  # one of these did not stop; which is not said
+                for node in failed or [
+                    each.graph
+                ]:  # one of these did not stop; the engine does not say which
                     self._open[each.graph, node] = None
         if not self._open:
             return ""

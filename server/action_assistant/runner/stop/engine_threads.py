@@ -11,7 +11,7 @@ from typing import Final
 
 from action_assistant.runner.links.engine_process import EngineProcess, Thread, threads
 
-_SCANS: Final = 2  # a list of threads is no picture of one moment
+_SCANS: Final = 2  # since the threads are not listed at one moment
 
 ThreadsOf = Callable[[EngineProcess], frozenset[Thread] | None]
 

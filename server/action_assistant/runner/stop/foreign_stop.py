@@ -67,7 +67,7 @@ class _ForeignStop:
         self.life = life
         self.why = why
         self.patience = anyio.CancelScope(deadline=anyio.current_time() + _PATIENCE_S)
-        self.disturbed = False  # since the last answer
+        self.disturbed = False  # by a command of somebody else since the last answer
         self.rest = RestProof(exact=False)
         self.loading = LoadingWatch(graph)
         self.doubts = DoubtfulErrors(reached=True)
@@ -245,7 +245,7 @@ class ForeignStopLoop:
         try:
             unread = it.loading.unread(shown)
             await it.loading.read(unread, answer.texts, self._run_in_worker)
-        except Refused:  # no worker can be had: whoever has not begun counts then
+        except Refused:  # no worker is free: every action that has not begun counts then
             pass
         return in_words(it.loading.actions(shown))
 

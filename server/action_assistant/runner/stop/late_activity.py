@@ -27,10 +27,10 @@ from action_assistant.web.auth.caller import BackgroundTasks
 log: Final = logging.getLogger(__name__)
 
 _GET_S: Final = 1.0
-_PATIENCE_S: Final = 3.0  # until feedback counts although no answer has said the same
+_PATIENCE_S: Final = 3.0  # after which feedback counts although no answer confirms it
 _AGAIN_S: Final = 0.5
 _KEPT: Final = 200
-_TOLD: Final = 500  # newest entries of a flight record
+_TOLD: Final = 500  # newest entries of a robot's log
 
 K = TypeVar("K")
 T = TypeVar("T")
@@ -82,7 +82,7 @@ class LateActivity:
         self._news = anyio.Event()
         self._ended: OrderedDict[str, tuple[Run, int]] = OrderedDict()
         self._others: OrderedDict[str, None] = OrderedDict()
-        #: What a robot shows that is none of its runs. One engine may be registered under two names.
+        #: Runs that a robot shows and that are not its own: one engine may be registered under two names.
         self._elsewhere: OrderedDict[tuple[str, str], None] = OrderedDict()
 
     def ended(self, run: Run, seq: int) -> None:
@@ -151,7 +151,7 @@ class LateActivity:
         found = await self._known(run, robot)
         if found is None or not _is_of(found[0], engine):
             _put(self._elsewhere, (robot, run), None)
-        elif found[0].end is not None:  # else it is being taken up after a restart
+        elif found[0].end is not None:  # else it is being adopted after a restart
             self._reopen(*found, self._told(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:

@@ -28,9 +28,9 @@ from action_assistant.umrf.triggers import (
 from action_assistant.web.workers.lanes import RunInWorker
 
 _NAMED: Final = 3
-_LEARNT: Final = 20  # newest begins of one action that a usual time is taken of,
-_ENOUGH: Final = 3  # and how many it takes at least
-_EXACT_US: Final = 2_000_000  # a begin that is known less exactly tells no time
+_LEARNT: Final = 20  # newest loading times of one action that are kept
+_ENOUGH: Final = 3  # loading times from which on a usual one is told
+_EXACT_US: Final = 2_000_000  # a begin that is known less exactly gives no loading time
 _DRAINED: Final = frozenset({"FINISHED", "HALTED"})
 
 
@@ -76,7 +76,7 @@ class LoadingWatch:
         self._after: dict[str, tuple[int, SeenAfter]] = {}
         self._read: dict[str, Triggers | None] = {}
         self._known: set[str] = {main}  # running names
-        self._age = 0  # counts how often it was forgotten
+        self._age = 0  # number of calls of `forget`
 
     def see(self, shown: Sequence[Snapshot]) -> None:
         """Take in one answer, or feedback of one engine that serves alone. A sub-graph may be begun
@@ -235,7 +235,7 @@ def _named(
     seen: SeenAfter,
     parts: Sequence[str],
 ) -> list[LoadingAction]:
-    if known is None:  # whoever has not begun may have been triggered
+    if known is None:  # any action that has not begun may have been triggered
         names = tuple(node for node, state in shown.nodes.items() if state in NEVER_BEGAN)
         first: set[str] = set()
     else:

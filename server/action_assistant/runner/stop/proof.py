@@ -17,9 +17,9 @@ log: Final = logging.getLogger(__name__)
 _STARTING_S: Final = (
     0.3  # an action that has run before is not loaded again: it begins within this time
 )
-_AGAIN_S: Final = 2.0  # one that begins again by itself is FINISHED for a moment in between
+_AGAIN_S: Final = 2.0  # a spontaneous action is FINISHED for a moment between two visits
 _SEND_S: Final = 1.0
-#: Commands after which a graph may move that was at rest.
+#: Commands after which a graph that was at rest may move.
 SET_GOING: Final = frozenset({"start", "resume", "modify"})
 
 
@@ -32,7 +32,7 @@ async def send_stop(link: Link, graph: str) -> str:
         return str(why) or "not sent"
     except TimeoutError:
         return "the message could not be handed over within a second"
-    except Exception as error:  # whatever breaks in a link, the next message has to be tried
+    except Exception as error:  # whatever fails in a link, the next stop has to be sent
         log.exception("a stop of %s may or may not have left", graph)
         return f"the link failed: {error!r}"
     return ""

@@ -16,7 +16,7 @@ from action_assistant.runner.runs.run import Run
 
 _FIRST_GAP_S: Final = 0.1
 _GAP_S: Final = 1.0
-_VAIN_GAP_S: Final = 30.0  # between two stops that can bring nothing more
+_VAIN_GAP_S: Final = 30.0  # between stops that the engine has obeyed as far as it will
 _ONE_PRESS_S: Final = 1.0
 
 
@@ -38,7 +38,7 @@ class StopLoop:
         self._wanted = anyio.Event()
         self._pressed = anyio.Event()
         self._news = anyio.Event()
-        self._vain = False  # the last message could bring nothing more
+        self._vain = False  # the engine had obeyed the last message as far as it will
         self._ids: set[str] = {""}
         self._asked: tuple[str, float] = ("", 0.0)
         if run.desired == "stopped":

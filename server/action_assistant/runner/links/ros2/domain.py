@@ -46,8 +46,8 @@ from action_assistant.runner.links.ros2.ros_values import (
 
 log: Final = logging.getLogger(__name__)
 
-#: Seconds until who has joined a domain sees everybody there: Fast DDS announces itself every three,
-#: and of two engines the second was seen up to two seconds after the first (measured, loaded machine).
+#: Seconds after joining a domain until every participant is seen. Fast DDS announces itself every 3 s, and the
+#: second of two engines was seen up to 2 s after the first (measured on a loaded computer).
 DISCOVERY_S: Final = 3.5
 _PROCESS: Final = 12  # bytes of a gid that all endpoints of one process share
 _KIND: Final = "temoto_msgs/srv/UmrfGraphGet"
@@ -97,7 +97,9 @@ class Domain:
     def leave(self) -> None:
         """End the thread, then destroy the node. Waits for both, so it is called in a thread."""
         self._leaving = True
-        self._executor.create_task(lambda: None)  # a mere wake-up would be slept through
+        self._executor.create_task(
+            lambda: None
+        )  # `wake` alone is lost while the executor is not waiting
         self._thread.join()
         self._executor.shutdown()
         self._node.destroy_node()

@@ -243,7 +243,7 @@ class Ros2Link:
             try:
                 await self.get()
             except NoAnswer:
-                return  # the standing says so
+                return  # the standing tells that
         self._look()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:

@@ -12,7 +12,7 @@ from typing import Final, NamedTuple, TypeAlias
 
 from action_assistant.runner.links.ros2.ros_values import OverheardCommand, RosValue
 
-_KEPT: Final = 512  # of each; then the oldest goes
+_KEPT: Final = 512  # values of each kind; a further one drops the oldest
 
 _Numbered: TypeAlias = tuple[int, RosValue]
 

@@ -153,7 +153,7 @@ class Outlets:
         stops.targets.append(target)
 
         def gathered() -> UmrfGraphStop | None:
-            if stops.left:  # a message before this one has taken the target along
+            if stops.left:  # an earlier message has had this target, too
                 return None
             self._close(graph, stops)
             return UmrfGraphStop(umrf_graph_name=graph, targets=sorted(set(stops.targets)))
@@ -161,7 +161,7 @@ class Outlets:
         try:
             await self.stop.send(gathered)
         except anyio.get_cancelled_exc_class():
-            stops.targets.remove(target)  # it would hit a later run of that name
+            stops.targets.remove(target)  # a late stop would hit a later run of that name
             if not stops.targets:
                 self._close(graph, stops)
             raise

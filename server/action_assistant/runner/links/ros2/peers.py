@@ -12,7 +12,7 @@ OLDER: Final = (
     "its temoto_msgs are another generation than the ones here, so it would misread what is sent; "
     "build the engine with temoto_msgs of March 2025 or later"
 )
-#: Who made a middleware, by the first bytes of its gids (a number of the DDS standard's registry).
+#: Vendors of middlewares, by the first two bytes of their gids (the vendor id of the DDS standard).
 _VENDORS: Final = {"010f": "Fast DDS", "0110": "Cyclone DDS", "0101": "Connext"}
 
 
