@@ -131,7 +131,9 @@ test("who stayed is told what an edit from offline replaced, and both lists surv
   await expect(ada.page.getByText(/Offline with 1 change/i).first()).toBeVisible();
   await put(mari.page, "by Mari", "Lift");
   await saved(mari.page);
-  await mari.page.waitForTimeout(2_100); // what comes sooner may be an edit of the same moment
+  // An edit that comes sooner may be one of the same moment.
+  const written = await mari.page.evaluate(() => Date.now());
+  await mari.page.waitForFunction((before) => Date.now() > before + 2_100, written);
   await ada.context.setOffline(false);
   await saved(ada.page);
 
