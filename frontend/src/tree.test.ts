@@ -184,6 +184,12 @@ test("nothing is put where the browser lets nobody press STOP: above every layer
   expect(modules.filter((file) => above.test(textOf(file)))).toEqual([]);
 });
 
+test("browser tests wait for events, not for a time", () => {
+  const specs = readdirSync(join(SRC, "../e2e")).filter((file) => file.endsWith(".ts"));
+  const waits = specs.filter((file) => textOf(`../e2e/${file}`).includes(".waitForTimeout("));
+  expect(waits).toEqual([]);
+});
+
 /** An alarm, not a limit to split by: a function with more statements needs a reason. */
 const MOST_STATEMENTS = 60;
 const MOST_STATEMENTS_OF_A_STORY = 90; // a test in a browser: what people do, step after step
