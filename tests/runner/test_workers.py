@@ -14,7 +14,7 @@ import pytest
 from action_assistant.errors import BadInput, Conflict, TooLarge, TooMany, Unavailable
 from action_assistant.runner.workers import Crashed, Lane, RunnerWorkers
 from action_assistant.web.auth import caller
-from action_assistant.web.auth.caller import BackgroundTasks, Caller, done_for_nobody
+from action_assistant.web.auth.caller import BackgroundTasks, Caller, detach_from_request
 from runner.worker_tasks import devour, die, pid, refuse, spin, standing, stumble
 
 
@@ -31,11 +31,11 @@ async def lane() -> AsyncIterator[Lane]:
 
 @asynccontextmanager
 async def asked_by(person: str, receive: Callable[[], Any] | None = None) -> AsyncIterator[None]:
-    caller.asked_by(Caller(person, receive))
+    caller.set_caller(Caller(person, receive))
     try:
         yield
     finally:
-        done_for_nobody()
+        detach_from_request()
 
 
 pytestmark = pytest.mark.anyio

@@ -60,7 +60,7 @@ class EditorServices:
         self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
         self.change_index = ChangeIndex(journal, workers.graphs)
         self.history = GraphHistory(self.change_index)
-        self.going_back = Restoring(
+        self.restoring = Restoring(
             journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
         )
         self.course_search = CourseSearch(self.change_index, people, self.graph_checks)

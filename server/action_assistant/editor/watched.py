@@ -1,4 +1,4 @@
-"""The editor as those see it who look after it: rooms, sockets, acknowledgements."""
+"""Metrics and status of the editor: rooms, sockets, acknowledgements."""
 
 from collections.abc import Iterator
 

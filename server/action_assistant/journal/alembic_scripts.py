@@ -1,4 +1,4 @@
-"""Alembic, with the scripts of this program: from one revision of a database to another."""
+"""Runs Alembic with this program's scripts, from one revision of a database to another."""
 
 from alembic import command
 from alembic.config import Config

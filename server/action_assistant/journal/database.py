@@ -1,4 +1,4 @@
-"""What a journal needs of a database: the seam behind which SQLite and Postgres stand."""
+"""The interface between a journal and its database, SQLite or Postgres."""
 
 import os
 from collections.abc import Callable, Sequence

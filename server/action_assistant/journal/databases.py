@@ -1,4 +1,4 @@
-"""Which database a URL names, SQLite or Postgres, and bringing it to this version."""
+"""Chooses SQLite or Postgres by the URL of a database, and upgrades its tables."""
 
 import asyncio
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What a journal keeps: events in streams, and caches of what a stream adds up to."""
+"""The events of a journal, and the snapshots of its streams."""
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, TypeAlias

@@ -1,4 +1,4 @@
-"""Who hears of events as they are committed."""
+"""Queues committed events for one reader that follows the journal."""
 
 import asyncio
 from collections import deque

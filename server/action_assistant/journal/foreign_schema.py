@@ -1,4 +1,4 @@
-"""What stands in the schema of a SQLite journal that this program did not make.
+"""Finds parts of the schema of a SQLite journal that this program did not make.
 
 A trigger may change what is stored, and a view or a table may stand for one of ours. What this program
 makes is known: the schema is compared with that of an empty journal of the same revision.

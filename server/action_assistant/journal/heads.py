@@ -1,4 +1,4 @@
-"""Where each stream of a log ended at an earlier moment, and one digest of all of that.
+"""The ends of all streams at an earlier moment, and one digest of them.
 
 Whoever can write into a database can alter an event and make the chain anew from there: the log is then
 sound in itself. It has other heads, which a digest that is kept elsewhere shows.

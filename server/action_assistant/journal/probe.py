@@ -1,4 +1,4 @@
-"""Whether a journal can be written and read now: tried, in a bounded time."""
+"""Tries, in a bounded time, whether a journal can be written and read now."""
 
 from collections.abc import Awaitable, Callable
 from typing import Any, Final, TypeAlias

@@ -1,4 +1,4 @@
-"""Which versions of this program have written to a database: its last lines say who made it what it is."""
+"""Records which versions of this program have written to a database."""
 
 from typing import Final, NamedTuple
 

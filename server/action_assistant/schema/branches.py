@@ -1,4 +1,4 @@
-"""Whose database has which tables."""
+"""The tables of each database, by the process that owns it."""
 
 from collections.abc import Mapping
 from typing import Final

@@ -22,7 +22,7 @@ from action_assistant.runner.start.approvals import (
     Approvals,
 )
 from action_assistant.umrf.facts import BadProfile, facts_of
-from action_assistant.web.auth.caller import Caller, asked_by
+from action_assistant.web.auth.caller import Caller, set_caller
 from runner.harness import ANN, BEN, Harness, clock_us, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, change, fleet, group, verdicts
 from support.product import TOKEN, running
@@ -150,7 +150,7 @@ async def test_a_yes_from_the_same_browser_under_another_name_is_no_second_perso
     david, graph = Open(NEVER), sequence()
 
     def asks(author: Author, device: str) -> None:
-        asked_by(Caller(author.id, device=device))
+        set_caller(Caller(author.id, device=device))
 
     async with careful(Harness(), david) as control:
         asked = order(graph, engine="David")

@@ -1,4 +1,4 @@
-"""What `action-assistant doctor` finds, for the page of whoever looks after the installation."""
+"""Routes that run `action-assistant doctor` and return what it finds, for owners."""
 
 import os
 import subprocess

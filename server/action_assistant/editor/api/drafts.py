@@ -1,4 +1,4 @@
-"""Routes of drafts: made, compared, proposed, merged."""
+"""Routes of drafts: make, list, compare, propose, answer and merge them."""
 
 from typing import Any
 

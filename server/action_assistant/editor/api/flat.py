@@ -1,4 +1,4 @@
-"""Routes of a graph and those inside of it, made into one graph."""
+"""Routes that flatten a graph with its sub-graphs into one graph."""
 
 from typing import Any
 

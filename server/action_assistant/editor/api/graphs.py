@@ -1,4 +1,4 @@
-"""Routes of graphs: the catalogue, what a graph is or was, what is wrong with it."""
+"""Routes of graphs: the list, the content of one now or earlier, and its problems."""
 
 from typing import Annotated, Any, Final
 

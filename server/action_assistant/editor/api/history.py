@@ -1,4 +1,4 @@
-"""Routes of a graph's past: what was done, by whom, what it was, what differs, and the ways back."""
+"""Routes of a graph's history: changes and their authors, earlier states, differences, and going back."""
 
 from typing import Annotated, Any, Final
 
@@ -186,9 +186,9 @@ def _going(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id)
         await services.people.seen(person)
         if data.of is None:
-            await services.going_back.restore(graph_id, person.id, data.seq)
+            await services.restoring.restore(graph_id, person.id, data.seq)
         else:
-            await services.going_back.restore_one(graph_id, person.id, data.seq, data.of)
+            await services.restoring.restore_one(graph_id, person.id, data.seq, data.of)
         return await services.catalogue.get(graph_id)
 
     @post(
@@ -203,6 +203,6 @@ def _going(app_state: EditorState) -> list[ControllerRouterHandler]:
         services, person = app_state.services, person_of(request)
         await services.catalogue.require(graph_id)
         await services.people.seen(person)
-        return await services.going_back.revert(graph_id, person.id, data)
+        return await services.restoring.revert(graph_id, person.id, data)
 
     return [restore_graph, revert_graph]

@@ -1,4 +1,4 @@
-"""Routes of the action library: its actions, what graphs make of them, and taking over either way."""
+"""Routes of the action library: its actions, the graphs that use them, and updates in both directions."""
 
 from datetime import datetime
 from typing import Annotated, Any

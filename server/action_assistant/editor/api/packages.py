@@ -1,4 +1,4 @@
-"""Routes of C++ packages: which a graph's actions have, what is in them, and all of them as a file."""
+"""Routes of C++ packages: list those of a graph's actions, read one, download all."""
 
 from typing import Annotated
 

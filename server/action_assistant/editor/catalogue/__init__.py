@@ -1,1 +1,1 @@
-"""Graphs, versions, people and invitations, as the tables and rooms know them."""
+"""Graphs and their versions: listed, read, checked and changed."""

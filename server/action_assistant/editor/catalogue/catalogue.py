@@ -1,4 +1,4 @@
-"""The graphs that there are, and the documents of the library's actions: made, imported, named, deleted and brought back."""
+"""Makes, imports, lists, renames, deletes and recovers graphs, and makes the documents of library actions."""
 
 from collections.abc import Collection, Sequence
 from datetime import datetime

@@ -1,4 +1,4 @@
-"""What is wrong with graphs, and what lists say of them: with the graphs that their actions stand for."""
+"""Checks graphs together with the graphs inside of them, and returns what lists show of each."""
 
 import logging
 import sys

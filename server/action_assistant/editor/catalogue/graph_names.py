@@ -1,4 +1,4 @@
-"""Which graph of this server an action's name stands for: names as documents have them, kept up with the log.
+"""Resolves the names of actions to graphs of this server; follows the names in documents as the log grows.
 
 See docs/decisions/070-one-truth-for-sub-graphs.md.
 """
@@ -19,7 +19,7 @@ from action_assistant.errors import NotFound, Refused, TooLarge
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.schema.editor_tables import editor_event, editor_head
-from action_assistant.web.auth.caller import Caller, asked_by
+from action_assistant.web.auth.caller import Caller, set_caller
 from action_assistant.web.workers.lanes import GaveUp
 
 _AT_ONCE: Final = 4  # documents that are read
@@ -118,7 +118,7 @@ class GraphNames:
             task.exception()
 
     async def _refresh(self) -> None:
-        asked_by(
+        set_caller(
             _OURSELVES
         )  # it goes on when whoever came first has left, or has others work for them
         async with self._refreshing:

@@ -1,4 +1,4 @@
-"""Edits that the server makes itself: on a copy, entering the room as the difference (rule R9)."""
+"""Edits that the server makes itself: made on a copy, then submitted to the room as one update (rule R9)."""
 
 from action_assistant.editor.interchange.document_edits import calling_actions, renaming, restoring
 from action_assistant.editor.log.graph_events import DocumentKind

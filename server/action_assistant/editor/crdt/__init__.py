@@ -1,1 +1,1 @@
-"""Yjs updates: messages, what an update brings, replicas, loading from the log."""
+"""Yjs documents: messages, reading and applying updates, replicas, loading from the log."""

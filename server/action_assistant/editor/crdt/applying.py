@@ -1,4 +1,4 @@
-"""Calls of the CRDT library with foreign bytes: their failures, and a short way for updates."""
+"""Calls of the CRDT library with foreign bytes: translates its errors, and applies updates with less overhead."""
 
 from contextlib import AbstractContextManager
 from typing import Any, Final

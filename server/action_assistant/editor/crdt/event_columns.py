@@ -11,7 +11,7 @@ import msgspec
 from action_assistant.journal.events import Event
 
 #: Kind, author and body of an event.
-Told: TypeAlias = tuple[str, str, bytes]
+EventRow: TypeAlias = tuple[str, str, bytes]
 
 
 class EventColumns(msgspec.Struct, frozen=True):
@@ -36,7 +36,7 @@ class EventColumns(msgspec.Struct, frozen=True):
     def __len__(self) -> int:
         return len(self.kinds)
 
-    def __iter__(self) -> Iterator[Told]:
+    def __iter__(self) -> Iterator[EventRow]:
         return zip(self.kinds, self.authors, self.bodies, strict=True)
 
     @property

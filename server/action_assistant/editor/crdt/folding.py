@@ -1,4 +1,4 @@
-"""Events put together into a document, which travels as the bytes of a snapshot. For workers."""
+"""Folds events into a document, which is returned as the bytes of a snapshot. For workers."""
 
 import msgspec
 

@@ -1,4 +1,4 @@
-"""The events of a stream as they were written, up to the first that is not."""
+"""Reads the events of a stream in order, up to the first one that is damaged."""
 
 import asyncio
 import itertools

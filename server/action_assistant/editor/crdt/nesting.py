@@ -1,4 +1,4 @@
-"""How deep shared types lie in one another: deleting a deep chain recurses, and ends the process."""
+"""Limits how deep shared types may lie in one another: deleting a deep chain recurses, and ends the process."""
 
 from bisect import bisect_right, insort
 from collections.abc import Mapping

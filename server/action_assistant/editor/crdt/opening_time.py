@@ -1,4 +1,4 @@
-"""How long a document may take to be opened: measured, since it does not follow from its size.
+"""Limits the time that a document takes to be opened. It is measured, since it does not follow from the size.
 
 The CRDT library looks for the place of what was written at the same time as other things through all of
 those. Updates that are harmless one by one can so become a document that holds the event loop up

@@ -1,4 +1,4 @@
-"""A document in memory that says what each update brought."""
+"""A Yjs document in memory that checks each update and tells its effect."""
 
 import asyncio
 import logging
@@ -13,7 +13,7 @@ from pycrdt import Doc
 
 from action_assistant.editor.crdt.applying import Panicked, apply_updates, applying
 from action_assistant.editor.crdt.document_quota import DocumentQuota
-from action_assistant.editor.crdt.event_columns import EventColumns, Told
+from action_assistant.editor.crdt.event_columns import EventColumns, EventRow
 from action_assistant.editor.crdt.messages import NO_CLOCKS, NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
@@ -250,7 +250,7 @@ class Replica:
             self._state = state
         return state
 
-    def _replay_one_by_one(self, events: Iterable[Told]) -> None:
+    def _replay_one_by_one(self, events: Iterable[EventRow]) -> None:
         together: list[bytes] = []
         for kind, author, body in events:
             read = stored_outline(body)

@@ -1,4 +1,4 @@
-"""Reads of updates that are what a room took only what a document has to know of them besides.
+"""Reads updates that rooms have accepted only as far as a document needs it.
 
 A room reads every update as a whole before it is stored, and the chain proves that it is still the same.
 Opening a graph need not do that again: it asks whose the clients are, whether anything may lie deeper

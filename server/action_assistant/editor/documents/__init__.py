@@ -1,1 +1,1 @@
-"""The shared document: its layout, what it means, what can be said of it."""
+"""The shared document: its layout, the graph that it holds, and what is derived from it."""

@@ -1,4 +1,4 @@
-"""From the maps of the document to a graph: total, derives and never repairs (docs/contracts.md 1).
+"""Reads a graph from the maps of a document. Total: it derives and never repairs (docs/contracts.md 1).
 
 Twin of `frontend/src/graph/read.ts` and `assemble.ts`; the vectors in `tests/vectors/document` hold
 for both.

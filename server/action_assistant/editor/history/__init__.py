@@ -1,1 +1,1 @@
-"""What was done to a document, key by key: an index of its log, and what follows from it."""
+"""The history of documents: an index of their changes key by key, and everything derived from it."""

@@ -1,4 +1,4 @@
-"""Who gave each field of an action, an arrow or the graph the value that it has, and when."""
+"""Finds the author and the time of the current value of each field."""
 
 from collections.abc import Iterable, Sequence, Set
 from datetime import datetime

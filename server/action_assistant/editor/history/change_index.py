@@ -1,4 +1,4 @@
-"""The index of key changes: brought up to the log when somebody asks and now and then, and asked in workers.
+"""The index of key changes: updated from the log on demand and periodically, and read by workers.
 
 Nothing here reads or makes what grows with a graph: a worker reads the log and the index from the database itself,
 and hands back rows that are stored slice by slice (decision 108).

@@ -1,4 +1,4 @@
-"""What sessions changed, as differences that people know: of actions, arrows, notes. For workers."""
+"""Summarises the changes of edit sessions as differences of actions, arrows and notes. For workers."""
 
 from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, Final, TypeAlias

@@ -1,4 +1,4 @@
-"""Since when a graph takes another course: past moments simulated under one script. For workers."""
+"""Finds the changes that altered the course of a graph, by simulating earlier moments. For workers."""
 
 import time
 from collections.abc import Iterator, Mapping, Sequence

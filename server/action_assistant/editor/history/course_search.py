@@ -1,4 +1,4 @@
-"""Since when a graph goes another way: a question to the index, answered by simulating past moments."""
+"""Answers since when a graph takes another course, by the index and simulations in workers."""
 
 from datetime import datetime
 from typing import Annotated, Any, Final

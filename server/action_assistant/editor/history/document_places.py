@@ -1,4 +1,4 @@
-"""The keys of a document by what they speak of: actions, arrows, notes. For workers."""
+"""Maps the keys of a document to the actions, arrows and notes that they belong to. For workers."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping

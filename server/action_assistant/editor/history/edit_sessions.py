@@ -1,4 +1,4 @@
-"""Groups what was done to a document: the edits of one person in one go are one session. Pure."""
+"""Groups the edits of a document into sessions: the edits of one person with short pauses. Pure."""
 
 from collections.abc import Iterable
 from datetime import datetime

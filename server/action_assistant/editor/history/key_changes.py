@@ -1,4 +1,4 @@
-"""Which keys of a document each event of its log changed, from what to what. For workers."""
+"""Observes which keys of a document each event of its log changed. For workers."""
 
 from collections.abc import Sequence
 from functools import partial

@@ -1,4 +1,4 @@
-"""Where changes come from that entered a graph from another one: by a merge, or with the making of a draft.
+"""Finds the origin of changes that came from another graph, by a merge or when a draft was made.
 
 Such a change is the merger's edit in the log of the graph, and somebody else's in the log of the other.
 Whoever asks who set a value is told the latter. Questions over a connection: for workers.

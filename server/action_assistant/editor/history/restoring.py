@@ -1,4 +1,4 @@
-"""Going back: a whole graph, one action of it, or what one person did; each as an edit of its own."""
+"""Restores a graph or one action of it, or reverts the edits of one person; each by a new edit."""
 
 from typing import Final
 

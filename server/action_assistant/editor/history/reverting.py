@@ -1,4 +1,4 @@
-"""Edits that take something back: what one person did in a session, or one action as it was. For workers."""
+"""Makes the updates that revert the edits of one person, or restore one action. For workers."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any

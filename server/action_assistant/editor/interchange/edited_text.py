@@ -1,4 +1,4 @@
-"""The edited text of a graph as changes of its document: action by action, and nothing else touched.
+"""Compares the edited text of a graph with its document, key by key, and merges it.
 
 A person edits the canonical text of one moment. Here it is read, its actions are told apart from
 those of the moment, and what differs is answered key by key. The page applies it, so that it is an

@@ -1,4 +1,4 @@
-"""Files that people bring, read into what a document would hold. For workers."""
+"""Reads files that people import into the content of a document. For workers."""
 
 from typing import Any
 

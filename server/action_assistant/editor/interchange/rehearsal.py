@@ -1,4 +1,4 @@
-"""Rehearsals: what a graph would do, played by the engine's rules, and recorded nowhere."""
+"""Simulates a graph by the engine's rules, without recording anything."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal

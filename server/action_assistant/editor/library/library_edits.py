@@ -1,4 +1,4 @@
-"""What people do with the library: actions made and brought, and taken over either way."""
+"""Makes and imports library actions, and updates them from graphs and graphs from them."""
 
 from collections.abc import Sequence
 from contextlib import AsyncExitStack

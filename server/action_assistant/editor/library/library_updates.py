@@ -1,4 +1,4 @@
-"""What the library's documents and the graphs that use them would make of each other. For workers."""
+"""Computes how library actions and the graphs that use them would update each other. For workers."""
 
 from collections.abc import Callable, Sequence
 

@@ -1,4 +1,4 @@
-"""Which database holds the graphs of a data folder, as the folder remembers it.
+"""Remembers which database holds the graphs of a data folder.
 
 Most hold them themselves, in `editor.db`, and remember nothing. A folder that is served with
 `--database` keeps the URL, without its password, in `editor.database`, so that no command overlooks

@@ -1,4 +1,4 @@
-"""Epochs: which history the log holds. One ends when the log goes back, as after a restore.
+"""Epochs of the log. A new one begins when the log goes back, as after a restore.
 
 Pages name the epoch they know, so that nobody's edits are merged into a history that they were not
 made on. `action-assistant restore` begins an epoch itself. Files that somebody copied back by hand

@@ -1,4 +1,4 @@
-"""Links by which people come in without the token: made, used, revoked.
+"""Invitation links, by which people come in without the token: made, used, revoked.
 
 A link carries the id of an invitation and its secret. The secret follows from the id and the token
 (`Keys.secret_of`), so that the log alone lets nobody in.

@@ -1,4 +1,4 @@
-"""Who acted here, under the name they last gave."""
+"""The people who have acted on this server, by the name that they gave last."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""When rooms act: a millisecond after the first edit, then once per window for all that came since.
+"""Decides when rooms act: a millisecond after the first edit, then once per window for all edits since.
 
 One window for all rooms of a process: what happens within it becomes one transaction, one broadcast
 of each room, and one write to each socket. How long it is follows from how busy the event loop is: short

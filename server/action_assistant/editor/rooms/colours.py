@@ -1,4 +1,4 @@
-"""A colour for each person that nobody else has who is here (decision 57)."""
+"""Assigns each person a colour that no other connected person has (decision 57)."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -19,7 +19,7 @@ from action_assistant.editor.rooms.batch import ComparisonRequest
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
 from action_assistant.logs.context import begin
-from action_assistant.web.auth.caller import done_for_nobody
+from action_assistant.web.auth.caller import detach_from_request
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -33,7 +33,7 @@ _MEASURING_SHARE: Final = 20  # a measurement is not repeated for so many times 
 def begin_room_task(stream: str) -> None:
     """Detach the current task from the request that began it, and label its log lines with the graph of
     this stream. Without this the task would be cancelled when that client disconnects."""
-    done_for_nobody()
+    detach_from_request()
     begin({"graph": graph_of(stream) or stream})
 
 

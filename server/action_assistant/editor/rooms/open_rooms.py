@@ -12,7 +12,7 @@ from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.rooms.room_metrics import RoomMetrics
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.web.auth.caller import done_for_person
+from action_assistant.web.auth.caller import outlive_connection
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
@@ -138,7 +138,7 @@ class Rooms:
         return await asyncio.shield(loading)  # others may wait for it too
 
     async def _load(self, stream: str) -> Room:
-        done_for_person()  # others may wait for it too, when whoever came first has left
+        outlive_connection()  # others may wait for it too, when whoever came first has left
         try:
             loaded = await load(self._journal, stream, run_in_worker=self._run_in_worker)
             room = self._rooms[stream] = Room(

@@ -1,4 +1,4 @@
-"""What is known of the backups of a data folder: kept in a small file in it, for everybody who asks.
+"""Stores the state of the backups of a data folder in a small file in it.
 
 Whoever makes or rehearses a backup writes it down; doctor, metrics and pages read it. Nothing here
 fails a backup: what cannot be written down is logged.

@@ -24,7 +24,7 @@ from action_assistant.errors import (
     WrongOrigin,
 )
 from action_assistant.logs.context import request_id
-from action_assistant.web.auth.caller import Caller, asked_by
+from action_assistant.web.auth.caller import Caller, set_caller
 from action_assistant.web.auth.keys import Keys, Person, Session
 from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
 from action_assistant.web.auth.roles import OWNER, Permission, allowed, may
@@ -179,7 +179,7 @@ class Access:
         asked = receive if scope["type"] == ScopeType.HTTP else None
         if known is not None:
             scope["state"].get(KNOWN, _nobody)(known.id)
-        asked_by(None if known is None else Caller(known.id, asked, scope["state"]["device"]))
+        set_caller(None if known is None else Caller(known.id, asked, scope["state"]["device"]))
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return

@@ -1,4 +1,4 @@
-"""For whom something is done: whoever asked, so that it ends when they have gone.
+"""Tracks the client for whom a task works, so that the work can be cancelled when the client disconnects.
 
 Imported by workers too, so it imports little.
 """
@@ -55,13 +55,13 @@ def device() -> str:
     return "" if asking is None else asking.device
 
 
-def asked_by(asking: Caller | None) -> None:
+def set_caller(asking: Caller | None) -> None:
     """Set the client for whom this task works from now on."""
     _CALLER.set(asking)
 
 
-def done_for_person() -> None:
-    """From here on this task goes on also when the connection ends that it was begun for."""
+def outlive_connection() -> None:
+    """Let this task go on when the connection ends for which it was started. It still counts for its person."""
     asking = _CALLER.get()
     _CALLER.set(None if asking is None else asking._replace(receive=None))
 
@@ -76,8 +76,8 @@ def acting_for(person: str) -> Iterator[None]:
         _CALLER.reset(token)
 
 
-def done_for_nobody() -> None:
-    """From here on this task, and those that it begins, go on for themselves."""
+def detach_from_request() -> None:
+    """Detach this task, and those that it starts, from the request in which it was started."""
     _CALLER.set(None)
 
 

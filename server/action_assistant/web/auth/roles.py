@@ -1,4 +1,4 @@
-"""What each role may do: the one table that both processes and the page follow."""
+"""The permissions of each role: the one table that both processes and the page follow."""
 
 from collections.abc import Mapping
 from typing import Final, Literal, TypeAlias, get_args

@@ -1,4 +1,4 @@
-"""How refusals look on the wire: RFC 9457 problem details, one shape for every route."""
+"""Errors as RFC 9457 problem details, in one shape for every route."""
 
 import logging
 from http import HTTPStatus

@@ -1,4 +1,4 @@
-"""Each request gets an id, by which its answer, a problem and the lines of the log belong together."""
+"""Gives each request an id that its answer, its problem and its log lines share."""
 
 import logging
 import re

@@ -1,1 +1,1 @@
-"""How a process tells others how it is: metrics, readiness, status."""
+"""The state of a process for operators: metrics, readiness, status."""

@@ -1,4 +1,4 @@
-"""Backups as those see them who look after the installation: how old the last good one is."""
+"""Metrics of backups, such as the age of the last good one."""
 
 import time
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""Numbers that are looked up when somebody asks for them: nothing is counted meanwhile."""
+"""Gauges whose values are looked up when they are asked for."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Final, NamedTuple, TypeAlias

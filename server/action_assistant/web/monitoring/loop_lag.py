@@ -1,4 +1,4 @@
-"""How late the event loop is: everybody of a process waits for so long, a Stop too."""
+"""Measures how late the event loop is, which delays everybody, also a Stop."""
 
 import asyncio
 from collections import deque

@@ -1,4 +1,4 @@
-"""What a process tells of itself, put together: once its services are open, until it ends."""
+"""Puts together the metrics, the readiness and the status of one process."""
 
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager

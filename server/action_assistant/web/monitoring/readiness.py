@@ -1,4 +1,4 @@
-"""Whether a process can do its work, part by part. Alive is another question: it answers at all."""
+"""Checks whether each part of a process can do its work."""
 
 import shutil
 from collections.abc import Awaitable, Callable, Mapping

@@ -1,4 +1,4 @@
-"""How a process is, for whoever looks after it: what `GET /api/status` answers, and its page shows."""
+"""The answer of `GET /api/status`: the state of a process for owners."""
 
 import os
 import platform

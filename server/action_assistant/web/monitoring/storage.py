@@ -1,4 +1,4 @@
-"""How much room there is, and what takes it: looked up now and then, so that nobody waits for a disk."""
+"""Measures disk space in the background, so that nobody waits for a disk."""
 
 import logging
 import os

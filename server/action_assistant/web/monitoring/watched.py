@@ -1,4 +1,4 @@
-"""What each process lets be looked at, once it is open."""
+"""The interface by which a process gives its metrics and status once it is open."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path

@@ -54,7 +54,7 @@ class Editor:
         self.drafts = Drafts(journal, reader, self.catalogue, people, index)
         self.merges = DraftMerges(journal, rooms, self.drafts, index, people, checks)
         self.blame = Blame(index)
-        self.going_back = Restoring(journal, rooms, reader, index)
+        self.restoring = Restoring(journal, rooms, reader, index)
         self.history = GraphHistory(index)
         self.origin = ""
         self.wrote: dict[tuple[str, str, bytes], set[str]] = defaultdict(set)
@@ -236,7 +236,7 @@ async def test_a_merge_that_is_taken_back_leaves_the_origin_as_it_was(
     before = await editor.now(editor.origin)
     merged = await editor.merge(made.id, "zoe", dice)
     if merged.changed:
-        gone = await editor.going_back.revert(
+        gone = await editor.restoring.revert(
             editor.origin, "ada", EditsOfOne("zoe", merged.seq, merged.seq)
         )
         assert gone.left == ()

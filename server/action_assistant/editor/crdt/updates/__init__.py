@@ -1,1 +1,1 @@
-"""Updates of documents: what they consist of, and what of that neither a room nor a page could bear."""
+"""Reads Yjs updates before they are applied, and refuses what a room or a page could not bear."""

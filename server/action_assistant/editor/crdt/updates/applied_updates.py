@@ -1,4 +1,4 @@
-"""What an update does to a document beyond what its bytes say, where a page and the library differ."""
+"""Checks a document after an update was applied, where the library and Yjs in a page differ."""
 
 from collections.abc import Mapping
 from typing import Any, Final

@@ -1,4 +1,4 @@
-"""Texts with characters of two clocks, between which nothing may come.
+"""Texts with characters of two clocks, which no change may split.
 
 Yjs counts text in UTF-16 units, and such a character has two. Where a deletion or a struct parts the two, the
 CRDT library counts one of its own texts otherwise than it says, and gives out a document at which every page

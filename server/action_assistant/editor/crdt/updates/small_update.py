@@ -1,4 +1,4 @@
-"""Reads the updates that people make all day: some keys of one client set, typed text, deletions.
+"""Reads small ordinary updates quickly: a few keys of one client, typed text, deletions.
 
 Several times quicker than the scanner, with which it always agrees (a property of the tests): it says
 the same, or None where the scanner has to read. So it never says why something cannot be read.

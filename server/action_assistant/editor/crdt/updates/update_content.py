@@ -1,4 +1,4 @@
-"""Reads what a struct of an update holds, within bounds, and refuses what Yjs in a page fails at.
+"""Reads the content of a struct of an update, within bounds, and refuses what Yjs in a page fails at.
 
 The CRDT library takes some of that and gives it out again to every page that comes, so that nobody could
 open the graph any more. Clients never write it. Yjs update format, version 1.

@@ -1,4 +1,4 @@
-"""What an update consists of, as it was read (rule R4)."""
+"""The outline of an update: the structs that it brings and builds on (rule R4)."""
 
 from typing import Final
 

@@ -1,4 +1,4 @@
-"""Reads what an update consists of, without the CRDT library and within bounds (rule R4).
+"""Reads the outline of an update without the CRDT library and within bounds (rule R4).
 
 The library allocates by declared counts, recurses by nesting, and loses edits when it is given
 several updates that wait for an earlier one. So nothing reaches it that was not read here first. It

@@ -1,4 +1,4 @@
-"""Merges of drafts: what one would do, and doing it as an edit of the server's own."""
+"""Previews merges of drafts, and merges them by an edit of the server."""
 
 import msgspec
 

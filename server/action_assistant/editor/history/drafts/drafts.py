@@ -1,4 +1,4 @@
-"""The drafts of graphs: made, told of, proposed, and answered."""
+"""Makes and lists drafts of graphs, with their proposals and answers."""
 
 from collections.abc import Sequence
 from datetime import datetime

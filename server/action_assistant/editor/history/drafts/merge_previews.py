@@ -1,4 +1,4 @@
-"""What a merge would do, told as differences that people know, and the update that does it. For workers."""
+"""Previews a merge as differences of actions, arrows and notes, and makes its update. For workers."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any, Final, Literal, TypeAlias
