@@ -16,7 +16,7 @@ const vendors: { name: string; test: RegExp; tags?: "$initial"[] }[] = [
   // STOP needs nothing but this and React: see `app/stop-main.ts`.
   {
     name: "stop",
-    test: /src\/(app\/stop-main|clock\/|words\/|runs\/stop\/(stop-|outside-)|api\/(live-socket|page-link|http|page-url|run-stop|session)|graph\/(values|document-keys)|status\/help-link|ui\/(keys|times|tokens|watched|use-root-mark))/,
+    test: /src\/(app\/stop-main|clock\/|words\/|runs\/stop\/(stop-|outside-)|api\/(live-socket|page-link|http|page-url|run-stop|session)|graph\/stop-basics|status\/help-link|ui\/(keys|times|tokens|watched|use-root-mark))/,
   },
   // What every page loads comes in one piece: it is smaller than in many, and asked for once.
   { name: "ui", test: /node_modules\//, tags: ["$initial"] },

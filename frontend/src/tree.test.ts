@@ -78,8 +78,8 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   review: ["clock", "words", "graph", "ui", "api", "status", "canvas", "differences"],
   robots: ["clock", "words", "ui", "api", "status"],
   home: ["words", "graph", "ui", "api", "status", "canvas"],
-  // The page of actions is an editor of its own, with the same forms and rooms.
-  actions: [...BELOW_EDITOR, "people", "comments", "differences", "history"].concat([
+  // The page of the library is an editor of its own, with the same forms and rooms.
+  library: [...BELOW_EDITOR, "people", "comments", "differences", "history"].concat([
     "inspector",
     "packages",
     "editor",
@@ -99,7 +99,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "sync",
     "dry-run",
     "editor",
-  ].concat(["runs", "review", "robots", "home", "actions", "account", "administration"]),
+  ].concat(["runs", "review", "robots", "home", "library", "account", "administration"]),
 };
 
 test("folders import only what lies below them", () => {
@@ -346,8 +346,8 @@ const UNDRAFTED: Readonly<Record<string, string>> = {
   "account/share-dialog.tsx ShareLink": "read only: a link to copy",
   "account/sign-in.tsx SignInBar": "a secret: never kept",
   "account/sign-in.tsx SignIn": "a secret: never kept",
-  "actions/action-list.tsx ActionList": "a search",
-  "actions/actions-page.tsx NewActionForm": DIALOG,
+  "library/action-list.tsx ActionList": "a search",
+  "library/actions-page.tsx NewActionForm": DIALOG,
   "courses/keep-dry-run.tsx NameField": DIALOG,
   "drafts/drafts-here.tsx NewDraftDialog": DIALOG,
   "editor/canvas/quick-add.tsx QuickAdd": "a search: what it finds is added at once",

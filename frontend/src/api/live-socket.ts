@@ -1,7 +1,6 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { hearStamp, tick } from "../clock/server-clock";
-import { newAid } from "../graph/document-keys";
-import { isEqual } from "../graph/values";
+import { isEqual, newAid } from "../graph/stop-basics";
 import { errorText, isFinal, isSignedIn, sessionEnd } from "./http";
 import { pageUrl } from "./page-url";
 import type { HeldGraph, Robot } from "./robots";

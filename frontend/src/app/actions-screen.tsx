@@ -1,8 +1,8 @@
 /** The screen of actions: the bar stays as it is while one action after the other is opened. */
 import { useState } from "react";
-import { ActionsPage } from "../actions/actions-page";
 import { useLibrary } from "../api/library";
 import { usePerson } from "../api/people";
+import { ActionsPage } from "../library/actions-page";
 import { useNewGraphs } from "./imports/new-graphs";
 import { PageBar, PageFrame, useTitle } from "./page-frame";
 

@@ -9,6 +9,8 @@
 import type * as Y from "yjs";
 import { ENTRY, EXIT, type Key } from "./model";
 
+export { newAid } from "./stop-basics";
+
 export const ROOTS = ["meta", "actions", "relations", "positions", "comments"] as const;
 export type Root = (typeof ROOTS)[number];
 
@@ -100,24 +102,8 @@ export const pathOf = (segments: readonly string[]): string =>
 /** The flat name that the engine and remaps use: `pose::position::x`. */
 export const flatName = (path: string): string => segmentsOf(path).join("::");
 
-const LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789";
-const LENGTH = 12;
-// Bytes from here on would make the first letters likelier than the others.
-const FAIR = 256 - (256 % LETTERS.length);
-
 const AID = /^[A-Za-z0-9]{12}$/;
 
 export function isAid(text: string): boolean {
   return AID.test(text);
-}
-
-/** Returns a new random id of 12 letters and digits (71 bits). Works without a secure context (plain http on a LAN), unlike `crypto.randomUUID`. */
-export function newAid(): string {
-  let id = "";
-  while (id.length < LENGTH) {
-    for (const byte of crypto.getRandomValues(new Uint8Array(LENGTH))) {
-      if (byte < FAIR && id.length < LENGTH) id += LETTERS.charAt(byte % LETTERS.length);
-    }
-  }
-  return id;
 }

@@ -7,6 +7,8 @@
 
 import { type Direction, type Position, RESPONSES, type Response } from "./model";
 
+export { isEqual } from "./stop-basics";
+
 const MAX_INSTANCE_ID = 0xffffffff;
 const MAX_DEPTH = 64;
 
@@ -73,17 +75,3 @@ function depth(value: unknown, above: number): number {
 
 /** Order of texts by UTF-16 code units, on both sides of the wire. */
 export const byText = (a: string, b: string): number => (a < b ? -1 : a > b ? 1 : 0);
-
-/** Returns true if two plain values (objects, arrays, primitives) are equal. */
-export function isEqual(a: unknown, b: unknown): boolean {
-  if (Object.is(a, b)) return true;
-  if (typeof a !== "object" || typeof b !== "object" || a === null || b === null) return false;
-  if (Array.isArray(a)) {
-    return Array.isArray(b) && a.length === b.length && a.every((item, i) => isEqual(item, b[i]));
-  }
-  const left = Object.entries(a);
-  return (
-    left.length === Object.keys(b).length &&
-    left.every(([key, value]) => isEqual(value, (b as Record<string, unknown>)[key]))
-  );
-}
