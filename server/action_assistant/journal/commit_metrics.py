@@ -37,7 +37,7 @@ _KNOWN: Final = 20  # of them, before anything follows from how long they took
 _SLOW_S: Final = 0.02  # of which nobody sees anything
 _MOST_SLOW: Final = 5  # of those remembered
 _FAR_TOO_SLOW_S: Final = 0.1
-#: Of the time, that commits may take: a loop that does more than that has better things to do meanwhile.
+#: The share of the time that commits on the loop may take; beyond it the thread commits.
 _SHARE: Final = 1 / 6
 
 

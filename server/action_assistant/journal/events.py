@@ -60,7 +60,7 @@ class StreamSnapshot(msgspec.Struct, frozen=True):
     state: bytes
 
 
-#: Which statements an event means for the tables. Pure; runs in the transaction of the event.
+#: Returns the statements by which an event changes the tables. Pure; they run in the transaction of the event.
 Fold: TypeAlias = "Callable[[Event], Sequence[Executable]]"
 
 

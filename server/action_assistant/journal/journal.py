@@ -295,7 +295,7 @@ class Journal(JournalReader):
                 future.set_exception(error)
 
         self._queue(Job(work, done))
-        # Whoever waits may be cancelled; the job may not: it is written or it is not.
+        # The waiting task may be cancelled; the job is not: it is written or it fails.
         return await future
 
     def _queue(self, job: Job[Any]) -> None:
@@ -309,7 +309,7 @@ class Journal(JournalReader):
         if not self._jobs:
             return
         jobs, self._jobs = self._jobs, []
-        # Whoever follows hears events in their order, so what the thread has stored is told first.
+        # Followers get events in order, so results of the thread are reported first.
         if self._at_once and not self._untold and self._writer.is_quick(jobs):
             self._tell(self._writer.commit(jobs))
         else:

@@ -16,7 +16,7 @@ from action_assistant.journal.program_version import last_writer, sign
 from action_assistant.schema.branches import BRANCHES, VERSIONS
 from action_assistant.version import described
 
-#: How our revisions are named, also those of versions to come; a script's file begins with its name.
+#: The pattern of the names of our revisions, also of later ones; a script's file begins with its name.
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
 log: Final = logging.getLogger(__name__)
 logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line

@@ -28,7 +28,7 @@ _CONNECT: Final = 5.0  # seconds for a connection to come up
 _ANSWER: Final = 30.0  # seconds for a statement; after that the connection counts as dead
 _HANDOVER: Final = 3.0  # seconds until a server has ended the connections of a process that died
 _READ_ONLY: Final = "transaction_read_only"
-#: What must hold for an acknowledged commit to survive, and what to say where it does not.
+#: Settings without which an acknowledged commit may be lost, and the error where they are missing.
 _SETTINGS: Final = {
     "fsync": ({"on"}, "it does not write commits to the disk"),
     "full_page_writes": ({"on"}, "a power cut would tear its pages"),

@@ -22,7 +22,7 @@ from action_assistant.schema import editor_tables
 log: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
-#: What became of a job: its result, or why there is none; the events it wrote.
+#: The outcome of a job: its result, or its error; and the events that it wrote.
 Outcome: TypeAlias = tuple[Any, BaseException | None, list[Event]]
 
 _AT_ONCE: Final = 50  # jobs that are committed without the thread
@@ -72,7 +72,7 @@ class Transaction:
         self._own: list[tuple[Event, bytes]] = []  # by this job
         self._weight = 0  # bytes since something was stored
         self._begun = self._entered = self._storing = False
-        #: Whether the statement was sent after which everything is stored.
+        #: True once the statement was sent that commits.
         self.committing = False
         #: The last event of this transaction, with its chain: where it is, all is.
         self.last: tuple[Event, bytes] | None = None

@@ -70,7 +70,7 @@ invitation: Final = Table(
     Column("revoked_at", BigInteger),
     Column("revoked_by", Text),
 )
-#: Who came in by which link, under which name and when that was first.
+#: The people who came in by each link: their name, and when they first came.
 guest: Final = Table(
     "guest",
     EDITOR,

@@ -73,5 +73,5 @@ def written_by_table(metadata: MetaData) -> Table:
     )
 
 
-#: What is not a fold.
+#: The tables that are no folds.
 LOG: Final = frozenset({"event", "head", "snapshot", "written_by"})

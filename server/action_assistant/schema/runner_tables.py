@@ -108,7 +108,7 @@ run_label: Final = Table(
     Column("label", Text, primary_key=True),
     Index(None, "label"),
 )
-#: What one action of a run that is over adds up to; `took` are microseconds.
+#: Totals of one action of a run that is over; `took` are microseconds.
 action_sum: Final = Table(
     "action_sum",
     RUNNER,

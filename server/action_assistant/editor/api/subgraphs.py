@@ -83,7 +83,7 @@ async def _chosen(
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Return the routes that make sub-graphs of actions, and that unpack them."""
-    # Of two people who make one of the same name at once, the other is told that it is taken.
+    # If two people make a sub-graph of the same name at once, the second is refused.
     making = asyncio.Lock()
 
     @post(

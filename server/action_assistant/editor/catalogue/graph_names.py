@@ -24,7 +24,7 @@ from action_assistant.web.workers.lanes import GaveUp
 
 _AT_ONCE: Final = 4  # documents that are read
 _ROWS: Final = 400  # that one question names
-#: Who reads names: nobody's own work waits for that, nor the other way round.
+#: The caller for whom names are read: its place in the queue of workers is its own.
 _OURSELVES: Final = Caller("graph names")
 
 #: The name of a document after a change of it, or of a later one.

@@ -51,7 +51,7 @@ class OpeningTime:
         if then < self._came_then:
             return
         counted = self._measured_at + then - self._came_then
-        # What was overwritten is put together: a document may have fewer than were ever added.
+        # Overwritten structs are merged, so a document may have fewer than were ever added.
         self._measured_at = min(max(counted, size / _STORED), size / _LEAST)
         self._came_then, self._seconds = then, seconds
         self._limit = min(_MOST, SECONDS + _PER_MIB * size / (1 << 20))

@@ -20,7 +20,7 @@ from action_assistant.editor.crdt.updates.update_scan import stored_outline
 
 #: The beginning of an update with structs of one client: how many, whose.
 _ONE_CLIENT: Final = re.compile(rb"\x01[\x01-\x7f]([\x80-\xff]*[\x00-\x7f])")
-#: Whatever a struct that lies in another one looks like: its kind, neighbours not told, then a 0.
+#: Matches every struct that lies in another one: its kind without neighbours, then a 0.
 _MAY_LIE_INSIDE: Final = re.compile(rb"[\x01-\x09\x21-\x29]\x80*\x00")
 _APART: Final = b"\xff"  # ends nothing that looks so
 _KIND: Final = b"\x01"

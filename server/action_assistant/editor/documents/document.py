@@ -47,7 +47,7 @@ __all__ = [
 Maps: TypeAlias = dict[str, dict[str, object]]
 
 SCHEMA: Final = 1.0
-#: What a key may hold; nested shared types, which no client of ours writes, are none.
+#: The types of values of a key; nested shared types, which no client of ours writes, are not among them.
 PLAIN: Final = (str, float, int, bool, list, dict, bytes, bytearray, type(None))
 
 

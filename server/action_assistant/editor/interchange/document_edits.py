@@ -20,7 +20,7 @@ from action_assistant.editor.documents.document import Maps, is_same
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.umrf.model import Graph
 
-#: Whose value counts: of those into whom is merged, of those who are merged, or that is to be asked.
+#: The sides of a merge: the side that is merged into, and the side that is merged.
 Side: TypeAlias = Literal["ours", "theirs"]
 
 

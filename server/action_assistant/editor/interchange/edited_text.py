@@ -107,7 +107,7 @@ def _worse(known: Iterable[Problem], new: Graph, inside: Inside) -> tuple[Proble
     return tuple(p for p in errors if (p.code, p.message) not in old)[:_WORSE]
 
 
-# Which action is which
+# Matching actions
 
 
 def _real(graph: Graph) -> list[Action]:
@@ -202,7 +202,7 @@ def _naming(file: object, ghost: Action) -> str:
     return ""
 
 
-# What differs
+# Comparing
 
 
 def key_changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:

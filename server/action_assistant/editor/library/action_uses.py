@@ -81,7 +81,7 @@ class FoundActions(msgspec.Struct, frozen=True):
     whole: Action | None = None
 
 
-#: Of a document that cannot be read.
+#: The entry of a document that cannot be read.
 NOTHING: Final = msgspec.msgpack.encode(FoundActions())
 
 

@@ -63,7 +63,7 @@ def brought(body: bytes) -> BroughtAction:
     importing.fitting(found)
     file = read_action(body)
     alone = check(Graph(name=file.action.name, actions=(file.action,)))
-    # What is wrong with the graph around it is not told: there is none.
+    # Problems of the graph are left out: the file has none around the action.
     own = [problem for problem in alone if problem.where.path.startswith("/actions/0")]
     told = importing.ImportReport(
         file.dialect, file.notes, (*file.problems, *file.placed(own)), file.remarks

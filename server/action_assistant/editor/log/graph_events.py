@@ -49,7 +49,7 @@ SERVER: Final = "server"
 EXAMPLES: Final = "examples"
 
 
-#: What a document is of. An action of the library is a document with that action alone.
+#: The kinds of documents. The document of a library action holds that action alone.
 DocumentKind: TypeAlias = Literal["graph", "action"]
 
 

@@ -78,14 +78,14 @@ class BatchOutcome:
         self.to_store: list[tuple[SubmittedEdit, str]] = []
         #: Updates that the members can apply.
         self.to_send: list[bytes] = []
-        #: Whether among them are earlier updates that have stopped waiting, which not even authors have sent.
+        #: True if `to_send` has updates that waited until now: they go to the author of this batch, too.
         self.authors_lack_some = False
         #: Edits to be acknowledged.
         self.handled: list[SubmittedEdit] = []
         self.sync_requests: list[SyncRequest] = []
         self.comparisons: list[ComparisonRequest] = []
         self.reads: list[ReadRequest] = []
-        #: Whether the CRDT library panicked, so that the document has to be loaded anew.
+        #: True after a panic of the CRDT library: the document has to be loaded anew.
         self.panicked = False
 
 

@@ -53,7 +53,7 @@ class BatchWindow:
         self._shortest = min(SHORTEST, longest)
         self._loop = asyncio.get_running_loop()
         self._next = 0.0
-        #: Where what a window opens for is done, and what comes of it is sent.
+        #: Runs the work of a window, and what is sent because of it.
         self.turn_end: Final = TurnEnd()
         self._waiting: list[Callable[[], None]] = []
         self._looked_at = self._loop.time()

@@ -19,7 +19,7 @@ log: Final = logging.getLogger(__name__)
 PROBLEM_JSON: Final = "application/problem+json"
 #: A key of a route's `opt`: the bytes of a body that it takes, where more may come over the wire.
 BODY_LIMIT_TOLD: Final = "body_limit_told"
-#: What most places have; some refusals tell more.
+#: The fields of most places; some errors have more.
 _PLACE: Final = msgspec.Meta(
     extra_json_schema={
         "properties": {

@@ -20,7 +20,7 @@ HEADER: Final = b"x-request-id"
 
 _CALLS: Final = frozenset({"http", "websocket"})
 _ID: Final = re.compile(rb"[\w.:/+=-]{1,64}", re.ASCII)
-#: What a path is about.
+#: The kind of thing that a path names.
 _SUBJECT: Final = re.compile(r"/api/(run|graph)s/([^/]{1,64})(?=/|$)")
 
 

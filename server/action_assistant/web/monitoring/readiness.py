@@ -10,7 +10,7 @@ from anyio import to_thread
 
 from action_assistant.kit.shared_check import SharedCheck
 
-#: What each part of a process lacks; None where it works.
+#: The fault of each part of a process; None where it works.
 Parts: TypeAlias = Mapping[str, str | None]
 Check: TypeAlias = Callable[[], Awaitable[Parts]]
 

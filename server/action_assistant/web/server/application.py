@@ -240,7 +240,7 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
         challenge: Annotated[str, Parameter(min_length=20, max_length=100)],
     ) -> Response[ServerProof]:
         host, port = request.scope.get("server") or ("", 0)
-        # Of whoever comes through a proxy the address proves nothing: anybody could pass it on.
+        # Behind a proxy the address of a request proves nothing: anybody could pass it on.
         passed_on = any(name in request.headers for name in _PASSED_ON)
         proof = keys.prove(challenge, "" if passed_on else f"{host}:{port}")
         return Response(proof, headers={"cache-control": "no-store"})

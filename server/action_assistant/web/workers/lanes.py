@@ -87,7 +87,7 @@ class GaveUp(Unavailable):
         return "unavailable"
 
 
-#: What is wrong with the work itself, so that it will not go better next time.
+#: Errors of the work itself: a second attempt would fail as well.
 HOPELESS: Final = (Crashed, GaveUp, TooLarge)
 
 

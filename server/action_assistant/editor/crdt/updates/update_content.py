@@ -18,7 +18,7 @@ _NAMED_TYPES: Final = frozenset({3, 5})
 #: Those that Yjs reads and the library gives out as they came: no hook (5), whose name it loses, and none
 #: that only the library knows (9, 15).
 _SHARED_TYPES: Final = frozenset({0, 1, 2, 3, 4, 6})
-#: What Yjs and the library write about a sub-document. Its name among them would replace the real one.
+#: The options that Yjs and the library write for a sub-document. Its name among them would replace the real one.
 _OPTIONS: Final = frozenset(
     {b"gc", b"autoLoad", b"shouldLoad", b"meta", b"collectionid", b"encoding"}
 )

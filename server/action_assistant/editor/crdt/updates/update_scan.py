@@ -61,7 +61,7 @@ def cut_items(update: bytes, known: Mapping[int, int]) -> list[int]:
 
 #: A struct that tells where this one lies, and whether inside it.
 _Reference: TypeAlias = tuple[int, int, bool]
-#: What kind of key in a root a struct may add.
+#: The kind of key that a struct may add to a root.
 _Fresh: TypeAlias = Literal["none", "field", "action"]
 _NONE: Final = "none"
 _FIELD: Final = "field"
