@@ -67,14 +67,14 @@ const NOTHING: Presence = { selection: [] };
 /** `soon` calls back for what changed among the others. */
 export function presenceOf(awareness: Awareness, soon: Schedule = immediately): PresenceSource {
   let mine: Presence = NOTHING;
-  let groupsAt = Number.NEGATIVE_INFINITY;
+  let sentAt = Number.NEGATIVE_INFINITY;
   let timer: ReturnType<typeof setTimeout> | undefined;
   let people: readonly Participant[] = peopleOf(awareness, []);
   const listeners = new Set<() => void>();
 
   const send = () => {
     timer = undefined;
-    groupsAt = tick();
+    sentAt = tick();
     awareness.setLocalState({ ...mine });
   };
   const tell = () => {
@@ -98,7 +98,7 @@ export function presenceOf(awareness: Awareness, soon: Schedule = immediately): 
       if (isEqual(mine, next)) return;
       mine = next;
       if (timer !== undefined) return;
-      const wait = groupsAt + INTERVAL_MS - tick();
+      const wait = sentAt + INTERVAL_MS - tick();
       if (wait <= 0) send();
       else timer = setTimeout(send, wait);
     },
