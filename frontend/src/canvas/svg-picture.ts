@@ -1,4 +1,4 @@
-/** Draws a graph as one SVG picture from the same elements as the canvas. Pure. */
+/** Draws a graph as one SVG or PNG picture from the same elements as the canvas. */
 
 import { type Note, notesOf } from "../graph/edit/notes";
 import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
@@ -314,4 +314,44 @@ function wrapped(text: string, width: number, letter: number): string[] {
     }
     return [...lines, line];
   });
+}
+
+const LARGEST = 8_000; // px of a PNG's longer side; browsers refuse much more
+
+/** Return the picture as PNG with two pixels per px, or fewer where it would be too large. */
+async function rasterised(svg: string, width: number, height: number): Promise<Blob> {
+  const scale = Math.min(2, LARGEST / Math.max(width, height));
+  const image = new Image();
+  const url = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+  try {
+    image.src = url;
+    await image.decode();
+    const canvas = document.createElement("canvas");
+    canvas.width = Math.ceil(width * scale);
+    canvas.height = Math.ceil(height * scale);
+    canvas.getContext("2d")?.drawImage(image, 0, 0, canvas.width, canvas.height);
+    return await new Promise((done, fail) =>
+      canvas.toBlob(
+        (blob) => (blob ? done(blob) : fail(new Error("The picture is too large."))),
+        "image/png",
+      ),
+    );
+  } finally {
+    URL.revokeObjectURL(url);
+  }
+}
+
+/** Return the picture of a graph as a file, in the colours of the page. */
+export async function graphPicture(
+  graph: Graph,
+  places: ReadonlyMap<Key, Position>,
+  sizes: Sizes,
+  format: "svg" | "png",
+): Promise<Blob> {
+  const colors = getComputedStyle(document.documentElement);
+  const { svg, width, height } = svgPictureOf(graph, places, sizes, (token) =>
+    colors.getPropertyValue(token).trim(),
+  );
+  if (format === "svg") return new Blob([svg], { type: "image/svg+xml" });
+  return rasterised(svg, width, height);
 }

@@ -36,8 +36,9 @@ export async function exportGraph(context: EditorContext, format: ExportFormat):
     return;
   }
   try {
-    const { graphPicture } = await import("./graph-picture");
-    saveBlob(await graphPicture(context, format), `${name}.${format}`);
+    const { graphPicture } = await import("../canvas/svg-picture");
+    const picture = graphPicture(context.graph, context.positions(), context.sizes(), format);
+    saveBlob(await picture, `${name}.${format}`);
   } catch (error) {
     const message = error instanceof Error ? error.message : String(error);
     notifications.show({ color: "red", title: "No picture made", message });
