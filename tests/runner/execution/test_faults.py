@@ -28,6 +28,7 @@ from runner.harness import (
     virtual,
 )
 from runner.registered_robots import NEVER, Open, fleet
+from runner.robots_in_network import RobotsInNetwork
 
 
 class Faulty(Open):
@@ -232,3 +233,19 @@ async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_no
             lambda: len([each for each in harness.journal.streams if "about/" in each]) == 2
         )
         tasks.cancel_scope.cancel()
+
+
+@virtual
+async def test_what_an_answer_shows_is_told_even_if_a_fault_ends_the_conclusions(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def fails(*_: object) -> None:
+        raise RuntimeError("a fault that nobody foresaw")
+
+    monkeypatch.setattr(Monitor, "_conclude", fails)
+    here = RobotsInNetwork(5, script=NEVER)
+    here.network.show = lambda *_: None  # all feedback is lost
+    async with here.played() as control:
+        run = (await control.start(order(sequence(), engine="David"), ANN)).run
+        await until(lambda: control.open[run.id].run.active != ())
+        assert control.open[run.id].run.state == "running"

@@ -21,8 +21,10 @@ class Seen:
         self._newcomers = Newcomers()
         self.others = frozenset(others)
 
-    def at(self, second: float, *listeners: Endpoint, served_by: str = "one") -> tuple[str, ...]:
-        servers = (end(served_by),)
+    def at(
+        self, second: float, *listeners: Endpoint, served_by: str = "one", name: str = ENGINE
+    ) -> tuple[str, ...]:
+        servers = (end(served_by, name),) if served_by else ()
         return self._newcomers.among(listeners, servers, lambda: self.others, second)
 
 
@@ -65,3 +67,13 @@ def test_an_engine_that_does_not_serve_any_more_is_a_newcomer() -> None:
     seen = Seen()
     assert seen.at(0, end("one")) == ()
     assert seen.at(1, end("one"), served_by="two") == (ENGINE,)
+
+
+@pytest.mark.parametrize(("served_by", "name"), [("", ENGINE), ("one", "_NODE_NAME_UNKNOWN_")])
+def test_a_listener_is_judged_by_its_name_only_beside_an_engine_whose_name_is_known(
+    served_by: str, name: str
+) -> None:
+    seen = Seen()
+    for second in (0, 11, WHILE):
+        assert seen.at(second, end("two"), served_by=served_by, name=name) == (ENGINE,)
+    assert seen.at(WHILE + 1, end("one"), end("two")) == (ENGINE,)

@@ -13,16 +13,25 @@ import pytest
 
 from action_assistant.runner.emulator.messages import EngineTraits
 from action_assistant.runner.execution import monitor
+from action_assistant.runner.execution.run_changes import RunChanges
 from action_assistant.runner.links import engine_process
 from action_assistant.runner.links.engine_process import EngineProcess, Thread, process, threads
+from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.links.port import Answer, Standing
+from action_assistant.runner.runs.events import Published, Requested
+from action_assistant.runner.runs.fold import begin, follow
+from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.runner.stop.engine_threads import EngineThreads
+from action_assistant.runner.stop.loading import LoadingTimes
 from runner.fake_link import FakeLink
-from runner.harness import ANN, BEN, order, sequence, until, virtual
+from runner.harness import ANN, BEN, clock_us, order, sequence, until, virtual
 from runner.robots_in_network import OTHER, STUBBORN, RobotsInNetwork, asked, shown
 
 ENGINE = EngineProcess("boot", "pid:[1]", 42, 1)
 BEFORE = frozenset({Thread(1, 10), Thread(2, 10)})
 ACTION = Thread(3, 20)
+#: One thread that waits for the graph, and one that runs an action.
+OF_THE_RUN = frozenset({Thread(4, 20), ACTION})
 _HERE = process(os.getpid())
 #: Begins a thread for each line that says so, and ends one for each other line.
 PROGRAM = """
@@ -54,7 +63,7 @@ def started() -> tuple[Kernel, EngineThreads]:
     kernel = Kernel()
     watched = EngineThreads(kernel)
     watched.starts(ENGINE)
-    kernel.threads.add(ACTION)
+    kernel.threads |= OF_THE_RUN
     watched.see_moving()
     return kernel, watched
 
@@ -62,7 +71,7 @@ def started() -> tuple[Kernel, EngineThreads]:
 def test_a_run_is_over_when_no_thread_is_left_that_began_since_its_start() -> None:
     kernel, watched = started()
     assert not watched.have_ended(ENGINE)
-    kernel.threads.discard(ACTION)
+    kernel.threads -= OF_THE_RUN
     assert watched.have_ended(ENGINE)
     kernel.threads.add(Thread(3, 30))  # the number is used again: the next action loads
     assert not watched.have_ended(ENGINE)
@@ -70,7 +79,7 @@ def test_a_run_is_over_when_no_thread_is_left_that_began_since_its_start() -> No
 
 def test_a_thread_from_before_the_start_may_end_and_its_number_be_used_again() -> None:
     kernel, watched = started()
-    kernel.threads -= {ACTION, Thread(2, 10)}
+    kernel.threads -= {*OF_THE_RUN, Thread(2, 10)}
     assert watched.have_ended(ENGINE)
     kernel.threads.add(Thread(2, 30))
     assert not watched.have_ended(ENGINE)
@@ -84,9 +93,19 @@ def test_an_engine_that_was_never_seen_to_begin_a_thread_for_an_action_proves_no
     assert not watched.have_ended(ENGINE)
 
 
+def test_the_thread_that_waits_for_a_graph_does_not_show_that_actions_have_threads() -> None:
+    kernel = Kernel()
+    watched = EngineThreads(kernel)
+    watched.starts(ENGINE)
+    kernel.threads.add(Thread(4, 20))
+    watched.see_moving()
+    kernel.threads.discard(Thread(4, 20))
+    assert not watched.have_ended(ENGINE)
+
+
 def test_a_process_that_is_not_seen_or_another_one_proves_nothing() -> None:
     kernel, watched = started()
-    kernel.threads.discard(ACTION)
+    kernel.threads -= OF_THE_RUN
     assert not watched.have_ended(None)
     assert not watched.have_ended(msgspec.structs.replace(ENGINE, started=2))
     kernel.seen = False
@@ -101,7 +120,7 @@ def test_a_process_that_is_not_seen_or_another_one_proves_nothing() -> None:
 
 def test_a_thread_that_begins_between_two_looks_at_the_list_is_seen() -> None:
     kernel, watched = started()
-    kernel.threads.discard(ACTION)
+    kernel.threads -= OF_THE_RUN
     lists = [set(BEFORE), {*BEFORE, Thread(4, 40)}]
     watched._threads_of = lambda _: frozenset(lists.pop(0))
     assert not watched.have_ended(ENGINE)
@@ -139,9 +158,9 @@ def test_threads_of_a_real_process_are_told_apart(node: subprocess.Popen[str]) -
     watched = EngineThreads()
     watched.starts(known)
     _told(node, "begin")
+    _told(node, "begin")
     watched.see_moving()
     assert not watched.have_ended(known)
-    _told(node, "begin")
     _told(node, "end")
     assert not watched.have_ended(known)
     _told(node, "end")
@@ -178,6 +197,17 @@ def test_a_list_in_which_a_thread_ends_says_nothing(
     assert len(seen) > 1
 
 
+def test_a_list_that_is_shorter_than_the_kernel_counts_says_nothing(
+    node: subprocess.Popen[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The kernel ends its list at a thread that ends right then, and lists none of those behind it."""
+    known = process(node.pid)
+    assert known is not None
+    _told(node, "begin")
+    monkeypatch.setattr(Path, "iterdir", lambda folder: iter([folder / str(node.pid)]))
+    assert threads(known) is None
+
+
 @pytest.mark.parametrize("node", ["python", "/opt/action_engine_node/python3"], indirect=True)
 def test_a_program_that_is_not_the_engines_own_node_tells_nothing(
     node: subprocess.Popen[str],
@@ -199,7 +229,7 @@ async def test_a_stop_is_proven_by_the_threads_where_an_action_may_still_be_load
     monkeypatch.setattr(FakeLink, "standing", property(_with_process(FakeLink.standing)))
     async with here.played() as control:
         started = await control.start(order(sequence("patrol", 2), engine="David"), ANN)
-        kernel.threads.add(ACTION)
+        kernel.threads |= OF_THE_RUN
         run = started.run.id
         await until(lambda: control.open[run].run.active != ())
         await anyio.sleep(1.5)
@@ -207,7 +237,7 @@ async def test_a_stop_is_proven_by_the_threads_where_an_action_may_still_be_load
         await anyio.sleep(5)
         assert shown(control, run).proof_at is None
         assert shown(control, run).unconfirmed.startswith("Work_1 may still be loading")
-        kernel.threads.discard(ACTION)
+        kernel.threads -= OF_THE_RUN
         await until(lambda: run not in control.open)
         ended = await control.find(run)
         assert (ended.state, ended.loading, ended.at_rest) == ("stopped", "", None)
@@ -224,14 +254,14 @@ async def test_an_action_that_did_not_obey_is_over_when_its_thread_has_ended(
     monkeypatch.setattr(FakeLink, "standing", property(_with_process(FakeLink.standing)))
     async with here.played() as control:
         run = (await control.start(asked(), ANN)).run.id
-        kernel.threads.add(ACTION)
+        kernel.threads |= OF_THE_RUN
         await until(lambda: control.open[run].run.active != ())
         await anyio.sleep(1.5)
         await control.stop(run, BEN)
         await until(lambda: bool(control.open[run].run.unconfirmed))
         await anyio.sleep(30)
         assert run in control.open
-        kernel.threads.discard(ACTION)
+        kernel.threads -= OF_THE_RUN
         await until(lambda: run not in control.open)
         ended = await control.find(run)
         assert (ended.state, ended.proof_at) == ("error", None)
@@ -243,3 +273,81 @@ async def test_an_action_that_did_not_obey_is_over_when_its_thread_has_ended(
 def _with_process(plain: Any) -> Any:
     """Let a link say which process of this computer its engine is."""
     return lambda link: msgspec.structs.replace(plain.fget(link), process=_HERE)
+
+
+class TwoRuns:
+    """A run of `patrol` on an engine that still holds, in ERROR, a sub-graph of an earlier run of it.
+
+    The action of that sub-graph has not obeyed a Stop, and its thread goes on. It began before the start
+    of this run.
+    """
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.kernel = Kernel()
+        monkeypatch.setattr(monitor, "EngineThreads", lambda: EngineThreads(self.kernel))
+        at = clock_us()
+        self.run = begin(
+            Requested(
+                at=at,
+                run="second",
+                number=2,
+                request_id="request",
+                author=ANN,
+                graph="graph",
+                graph_name="patrol",
+                version="version",
+                digest="digest",
+                engine="David",
+                simulated=False,
+                actions={"Work_0": "aaaaaaaaaaaa", "Sub_0": "bbbbbbbbbbbb"},
+                umrf="{}",
+                laps=None,
+            )
+        )
+        doubts = DoubtfulErrors(reached=False)
+        times = LoadingTimes()
+        self.monitor = monitor.Monitor(
+            self.run, exact=False, clock_us=clock_us, doubts=doubts, loading_times=times
+        )
+        self.monitor.starts("{}", ENGINE)
+        self.kernel.threads |= OF_THE_RUN
+        self.run = follow(self.run, Published(at, "life", ENGINE))
+
+    def look(self, state: str, work: str) -> None:
+        """Take in one answer of the engine."""
+        asked_at = clock_us()
+
+        def snapshot(graph: str, state: str, nodes: dict[str, str], run: str | None) -> Snapshot:
+            return Snapshot(
+                at=clock_us(), asked_at=asked_at, graph=graph, state=state, nodes=nodes, run=run
+            )
+
+        own = snapshot("patrol", state, {"Work_0": work, "Sub_0": "UNINITIALIZED"}, "second")
+        left = snapshot("patrol__Sub__0", "ERROR", {"Reach_0": "ERROR"}, None)
+        answer = Answer(
+            asked_at=asked_at,
+            at=clock_us(),
+            incarnation="life",
+            graphs=(own, left),
+            texts={},
+            known_actions=(),
+            known_graphs=(),
+        )
+        standing = Standing(state="answering", incarnation="life", servers=1, process=ENGINE)
+        changes = RunChanges(self.run, clock_us)
+        self.monitor.answered(changes, standing, answer, self.monitor.begin_query())
+        self.run = changes.run
+
+
+@virtual
+async def test_threads_say_nothing_of_a_graph_that_an_earlier_run_has_left_in_error(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    two = TwoRuns(monkeypatch)
+    two.look("RUNNING", "RUNNING")
+    assert two.run.unconfirmed
+    two.kernel.threads -= OF_THE_RUN
+    for _ in range(8):
+        two.look("STOPPED", "FINISHED")
+        await anyio.sleep(0.5)
+    assert two.run.end is None

@@ -74,8 +74,8 @@ class EngineQuery(NamedTuple):
 class Monitor:
     """Decides what the messages and answers of an engine mean for one run.
 
-    Each method that takes one in returns the changes of the run that follow from it; it gets the run as
-    it is now. `jobs` are left to be worked on beside. `trouble` says why the Stop of the run is not
+    Each method that takes one in adds the changes that follow from it to those of the run; so they are
+    told even if a fault keeps it from drawing further conclusions. `jobs` are left to be worked on beside. `trouble` says why the Stop of the run is not
     proven yet; `seen_at` when its engine last showed it (µs UTC); `umrf` is what the engine has been
     given last, where that is known. `rested_at` is when the run was last seen to be over, for one that
     moves again; `exact` an engine that hides nothing.
@@ -135,6 +135,8 @@ class Monitor:
         """Note that this graph is handed over: the next answer is compared with it. `beside`: an action
         of it is started beside those that go on."""
         self._loading.sends(umrf, beside=beside)
+        if beside:  # what begins when that arrives has no thread yet
+            self._threads = EngineThreads()
         self._sent = self.umrf = umrf
         self._sent_order = next(self._order)
 
@@ -160,30 +162,30 @@ class Monitor:
         self._rest.forget()
         if meddles:
             self._loading.meddle()
+            self._threads = EngineThreads()
 
     # --- what is heard ------------------------------------------------------------------------
 
-    def hear(self, run: Run, line: str) -> RunChanges:
+    def hear(self, changes: RunChanges, line: str) -> None:
         """Take in a line of the engine's log."""
-        changes = RunChanges(run, self._clock_us)
         if self._start.hear(line):
-            changes.alarm(refusals.REFUSED, refusals.in_words(run.engine, self._start.words))
-        return changes
+            words = refusals.in_words(changes.run.engine, self._start.words)
+            changes.alarm(refusals.REFUSED, words)
 
     def feed(
         self,
-        run: Run,
+        changes: RunChanges,
         standing: Standing,
         ours: tuple[Snapshot, ...],
         parts: tuple[Snapshot, ...] = (),
-    ) -> RunChanges:
+    ) -> None:
         """Take in feedback of this run, oldest first, and of graphs that have the names of its sub-graphs.
         Feedback of others says nothing about an answer to us."""
-        changes = RunChanges(run, self._clock_us)
+        run = changes.run
         if self._is_alone(run, standing):
             self._loading.see((*ours, *parts))
         if not ours:
-            return changes
+            return
         if run.graph_state is None:
             self._begun = next(self._order)
         overtaken, self._answered = self._answered, False
@@ -191,7 +193,6 @@ class Monitor:
         if news := newer_than_answers(run, ours) if overtaken else ours:
             asked = self._seen_asked
             changes.observe(tuple(replace(each, since_asked=asked) for each in news))
-        return changes
 
     def _is_alone(self, run: Run, standing: Standing) -> bool:
         """Return whether one engine alone can have taken up starts, in the life that the run was sent to.
@@ -220,21 +221,17 @@ class Monitor:
         jobs, self._jobs = self._jobs, []
         return jobs
 
-    def unanswered(self, run: Run, standing: Standing, why: str) -> RunChanges:
+    def unanswered(self, changes: RunChanges, standing: Standing, why: str) -> None:
         """Take in that the engine has not answered, and why, if that is known."""
-        changes = RunChanges(run, self._clock_us)
-        self._is_alone(run, standing)
+        self._is_alone(changes.run, standing)
         self._hear_nothing(changes, why)
-        return changes
 
     def answered(
-        self, run: Run, standing: Standing, answer: Answer, look: EngineQuery
-    ) -> RunChanges:
+        self, changes: RunChanges, standing: Standing, answer: Answer, look: EngineQuery
+    ) -> None:
         """Take in the answer to one look, and `standing` as it is after that."""
-        changes = RunChanges(run, self._clock_us)
         self._take(changes, standing, answer, look)
         self._compare(changes.run, answer, look.order)
-        return changes
 
     def _hear_nothing(self, changes: RunChanges, why: str) -> None:
         silent = anyio.current_time() - self._heard_at
@@ -371,7 +368,7 @@ class Monitor:
             self.trouble = f"{going} has not stopped yet" if going else run.unconfirmed
             if self._exact and at_rest:
                 changes.engine_ended()  # a simulated engine is switched off then
-            elif at_rest and self._threads.have_ended(run.process):
+            elif at_rest and self._threads_explain(ours, run.process):
                 changes.threads_ended()
             return
         if _never_began(own) and self.umrf is not None and self._lacking is None:
@@ -405,6 +402,15 @@ class Monitor:
             )
         else:
             self.trouble = f"{', '.join(run.active) or own.graph} has not stopped yet"
+
+    def _threads_explain(self, ours: Sequence[Snapshot], process: EngineProcess | None) -> bool:
+        """Return whether the threads of the engine show that the code of all doubtful actions has ended.
+
+        They show it for the graphs that this run has begun. A graph of an earlier run may be shown as well,
+        and its hanging thread began before the start of this one.
+        """
+        begun = {each.graph for each in ours}
+        return self._doubts.open_graphs <= begun and self._threads.have_ended(process)
 
     def _still_loading(
         self, changes: RunChanges, ours: list[Snapshot], answer: Answer

@@ -7,7 +7,8 @@ and everything goes on while the journal is down.
 """
 
 import logging
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
 import anyio
@@ -214,6 +215,16 @@ class OpenRun:
     def _changes(self) -> RunChanges:
         return RunChanges(self.run, self._clock_us)
 
+    @contextmanager
+    def _changing(self) -> Iterator[RunChanges]:
+        """Collect changes and apply them at the end, also when a fault ends the block: what an engine has
+        shown is told first."""
+        changes = self._changes()
+        try:
+            yield changes
+        finally:
+            self._apply(changes)
+
     def _apply(self, changes: RunChanges) -> None:
         """Show and store changes that were made of the run as it is now."""
         for event, author, self.run in changes:
@@ -343,10 +354,11 @@ class OpenRun:
                     with anyio.fail_after(_GET_S):
                         answer = await self._link.get()
                 except (NoAnswer, TimeoutError) as why:
-                    changes = self.watch.unanswered(self.run, self._link.standing, str(why))
+                    with self._changing() as changes:
+                        self.watch.unanswered(changes, self._link.standing, str(why))
                 else:
-                    changes = self.watch.answered(self.run, self._link.standing, answer, look)
-                self._apply(changes)
+                    with self._changing() as changes:
+                        self.watch.answered(changes, self._link.standing, answer, look)
                 for job in self.watch.take_jobs():
                     beside.start_soon(self._work_on, job)
                 if self.run.process is not None and has_ended(self.run.process):
@@ -443,7 +455,8 @@ class OpenRun:
                 inside = f"{self.run.graph_name}__"
                 others = (each for each in snapshots if each.run is None)
                 parts = tuple(each for each in others if each.graph.startswith(inside))
-                self._apply(self.watch.feed(self.run, self._link.standing, ours, parts))
+                with self._changing() as heard:
+                    self.watch.feed(heard, self._link.standing, ours, parts)
             case EngineLog():
                 self._hear_line(report)
             case EngineChanged(state="gone", why=why) if self._owns_link:
@@ -459,7 +472,8 @@ class OpenRun:
         if self._is_ours(line.graph) and self._lines < _LINES:
             self._lines += 1
             self.tell(EngineSaid(line.at, line.text[:_LONGEST_LINE]))
-        self._apply(self.watch.hear(self.run, line.text))
+        with self._changing() as changes:
+            self.watch.hear(changes, line.text)
 
     def _is_ours(self, graph: str | None) -> bool:
         name = self.run.graph_name

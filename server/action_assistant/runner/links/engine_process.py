@@ -16,6 +16,7 @@ _PROGRAM: Final = "action_engine_node"  # the engine's own, as ROS 2 starts it
 _FAST_DDS: Final = "010f"  # vendor id at the beginning of a GUID prefix
 _FIRST_PORT: Final = 7400  # of DDS; each domain has the next 250
 _PORTS: Final = 250
+_NUM_THREADS: Final = 17  # its place among the fields of `stat` from the state on
 _LOOKS: Final = 3  # at a list of threads of which one has just ended
 
 
@@ -98,10 +99,12 @@ def threads(known: EngineProcess) -> frozenset[Thread] | None:
 
 
 def _listed(tasks: Path) -> frozenset[Thread] | None:
-    """Return the threads in a `task` folder of /proc; None if one of them ended meanwhile."""
+    """Return the threads in a `task` folder of /proc; None if one of them ended meanwhile, or if the kernel
+    counts more of them than it has listed."""
     found = {each.name: _began(each) for each in tasks.iterdir()}
     listed = [Thread(int(name), began) for name, began in found.items() if began is not None]
-    return frozenset(listed) if len(listed) == len(found) else None
+    counted = int(_fields(tasks.parent)[_NUM_THREADS])
+    return frozenset(listed) if len(listed) == len(found) == counted else None
 
 
 def _here() -> tuple[str, str]:

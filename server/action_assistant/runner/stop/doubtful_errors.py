@@ -31,6 +31,11 @@ class DoubtfulErrors:
         """All actions in ERROR, doubtful or over, as pairs of the graph's running name and the full name."""
         return frozenset({*self._open, *self._thrown})
 
+    @property
+    def open_graphs(self) -> frozenset[str]:
+        """The running names of the graphs with an action whose code may go on."""
+        return frozenset(graph for graph, _ in self._open)
+
     def look(self, shown: Sequence[Snapshot]) -> str:
         """Take in one more answer about a graph and its sub-graphs; return why the code of an action may still
         run, "" when nothing speaks for that."""

@@ -12,6 +12,8 @@ from typing import Final
 from action_assistant.runner.links.engine_process import EngineProcess, Thread, threads
 
 _SCANS: Final = 2  # since the threads are not listed at one moment
+#: The node begins one thread to wait for the graph, and one for each action.
+_OF_A_RUN: Final = 2
 
 ThreadsOf = Callable[[EngineProcess], frozenset[Thread] | None]
 
@@ -19,8 +21,8 @@ ThreadsOf = Callable[[EngineProcess], frozenset[Thread] | None]
 class EngineThreads:
     """Compares the threads of an engine's process with those before the start of a run.
 
-    It concludes nothing of an engine whose process is not seen from here, or of which no thread of this
-    run was ever seen while an action of it moved.
+    It concludes nothing of an engine whose process is not seen from here, or of which never two threads
+    of this run were seen while an action of it moved: one only waits for the graph.
     """
 
     def __init__(self, threads_of: ThreadsOf = threads) -> None:
@@ -38,7 +40,7 @@ class EngineThreads:
     def see_moving(self) -> None:
         """Look for a thread of the run while an answer shows an action of it moving."""
         if not self._was_seen and self._before is not None:
-            self._was_seen = bool(self._since_the_start())
+            self._was_seen = len(self._since_the_start() or ()) >= _OF_A_RUN
 
     def have_ended(self, process: EngineProcess | None) -> bool:
         """Return whether no thread is left that began since the start, in the process that the run was

@@ -20,8 +20,10 @@ class Newcomers:
 
     A listener is known to be something else when its process is shown doing what an engine that comes up
     does not do (`others`). One of another node name than the engine's is also taken for something else
-    once it has served no get for 10 s. One of the engine's own node name, or of a name that is not known
-    yet, never is: no time tells how long an engine takes to come up.
+    while an engine serves the path and the listener has served no get for 10 s. One of the engine's own
+    node name, or of a name that is not known yet, never is: no time tells how long an engine takes to
+    come up. The name counts only beside an engine that serves, whose name is known, so it is judged anew
+    each time.
     """
 
     def __init__(self) -> None:
@@ -52,14 +54,16 @@ class Newcomers:
         ]
         if not unknown:
             return ()
-        engines = {_name(each) for each in servers} | {_NAMELESS}
+        serving_names = {_name(each) for each in servers}
+        knows = bool(servers) and _NAMELESS not in serving_names
+        engines = serving_names | {_NAMELESS}
         elsewhere, found = others(), set[str]()
         for each in unknown:
             age = at - self._since.setdefault(each.gid, at)
-            is_stranger = _name(each) not in engines and age >= _WATCHED_S
-            if each.process in elsewhere or is_stranger:
+            is_stranger = knows and _name(each) not in engines and age >= _WATCHED_S
+            if each.process in elsewhere:
                 self._known.add(each.gid)
-            else:
+            elif not is_stranger:
                 found.add(_name(each))
         return tuple(sorted(found))
 
