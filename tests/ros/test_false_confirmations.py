@@ -238,15 +238,19 @@ class SecondEngine(Story):
         if len(self.robots) > 1:
             return
         self.quirks = EngineTraits(loading_ms=1_500.0)
-        self.tasks.start_soon(anyio.to_thread.run_sync, self.robot, 2.5)
-        await anyio.sleep(0.5)
-        run = (
+        self.tasks.start_soon(anyio.to_thread.run_sync, self.robot, 4.0)
+        link = control.robots.link("David")
+        assert link is not None
+        with anyio.fail_after(30):
+            while not link.standing.newcomers:  # noqa: ASYNC110 - of another thread
+                await anyio.sleep(0.01)
             await control.start(order(GRAPHS["one"], engine="David", override=KNOWINGLY), ANN)
-        ).run.id
-        await anyio.sleep(0.3)
-        await control.stop(run, BEN)
-        await anyio.sleep(6)
-        assert self.moving() == {run}
+            (run,) = control.open
+            await anyio.sleep(0.3)
+            await control.stop(run, BEN)
+            while self.moving() != {run}:  # noqa: ASYNC110 - of another thread
+                await anyio.sleep(0.01)
+        await anyio.sleep(2)
         assert control.open[run].run.proof_at is None
 
 
@@ -282,7 +286,7 @@ def test_nothing_is_called_stopped_or_finished_that_moves(domains: list[int]) ->
     assert confirmed >= HISTORIES // 4, confirmed
 
 
-@pytest.mark.timeout(60)
+@pytest.mark.timeout(90)
 def test_no_stop_is_proven_while_a_second_engine_is_coming_up(domain: int) -> None:
     story = SecondEngine(1, domain)
     story.script, story.quirks = {"*": [{"never": True}]}, EngineTraits(loading_ms=1.0)

@@ -89,6 +89,9 @@ class PublishedGraphs:
                 self._node(trace, at_once)
             elif isinstance(trace, GraphStateEvent) and (held := self._of(trace.graph)):
                 held.state = trace.state
+                if trace.state == "UNINITIALIZED":  # another graph has taken the place of this name
+                    held.states.clear()
+                    held.messages.clear()
                 if trace.state in ENDED and held.running.home is None:
                     ended.append(trace.graph)
         return ended
