@@ -8,7 +8,7 @@ import { serverNow } from "../clock/server-clock";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { deleteMessage, reply, resolve, type Thread } from "../graph/edit/comments";
 import { usePersonColors } from "../sync/use-room";
-import { textScope, useWaitingTexts } from "../ui/drafts";
+import { textScope, useWaitingTexts } from "../ui/kept-texts";
 import { initials } from "../ui/name-colors";
 import { ago, useNow } from "../ui/times";
 import style from "./comments.module.css";

@@ -3,7 +3,7 @@ import { Button, Textarea } from "@mantine/core";
 import type { ReactNode } from "react";
 import { usePerson } from "../api/people";
 import { printedKeys } from "../edit-actions/edit-action";
-import { textScope, useKeptText } from "../ui/drafts";
+import { textScope, useKeptText } from "../ui/kept-texts";
 import { keyOf } from "../ui/keys";
 import style from "./comments.module.css";
 

@@ -14,7 +14,7 @@ import {
 import { usePerson } from "../api/people";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { useThrottledLink } from "../sync/use-room";
-import { textScope, useKeptText } from "../ui/drafts";
+import { textScope, useKeptText } from "../ui/kept-texts";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { answersWords, apartWords, useDraftStep } from "./draft-steps";
 import style from "./drafts.module.css";

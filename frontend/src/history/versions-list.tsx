@@ -10,7 +10,7 @@ import { usePerson } from "../api/people";
 import { CoursesAt } from "../courses/courses-told";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { useThrottledLink } from "../sync/use-room";
-import { textScope, useKeptText } from "../ui/drafts";
+import { textScope, useKeptText } from "../ui/kept-texts";
 import { useNow } from "../ui/times";
 import { momentLink, useCopyAsGraph, useGoingBack } from "./restoring";
 import type { Timeline } from "./timeline";

@@ -11,7 +11,7 @@ import { addAction, addParameter, removeActions, rename, setField } from "../../
 import { followGraph } from "../../graph/read";
 import { graphIn } from "../../testing/edited-graph";
 import { DraftInput } from "../../ui/draft-input";
-import { keptTexts, textScope } from "../../ui/drafts";
+import { keptTexts, textScope } from "../../ui/kept-texts";
 import { LostDrafts } from "./lost-drafts";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);

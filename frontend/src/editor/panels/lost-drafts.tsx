@@ -10,7 +10,8 @@ import { useEditorContext } from "../../edit-actions/editor-context";
 import { type Deleted, Deletions } from "../../graph/edit/deletions";
 import { announcer } from "../../ui/announcer";
 import { copyText } from "../../ui/copy-text";
-import { keptTexts, pendingDrafts, textScope } from "../../ui/drafts";
+import { pendingDrafts } from "../../ui/drafts";
+import { keptTexts, textScope } from "../../ui/kept-texts";
 import style from "./lost-drafts.module.css";
 
 interface OfferProps {

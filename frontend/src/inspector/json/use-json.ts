@@ -4,7 +4,7 @@ import { useEffect, useMemo, useRef, useState } from "react";
 import { graphMoment, type TextChanges, textChangesOf } from "../../api/graphs";
 import { errorText, Refusal } from "../../api/http";
 import { usePerson } from "../../api/people";
-import { textScope, useKeptText } from "../../ui/drafts";
+import { textScope, useKeptText } from "../../ui/kept-texts";
 import type { JsonError } from "./json-editor";
 import { lineOf } from "./json-positions";
 

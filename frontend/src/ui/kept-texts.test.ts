@@ -3,7 +3,7 @@ import { afterEach, expect, test, vi } from "vitest";
 
 const load = async () => {
   vi.resetModules(); // as a reload of the page does
-  const { keptTexts, textScope } = await import("./drafts");
+  const { keptTexts, textScope } = await import("./kept-texts");
   const { pendingDrafts } = await import("./drafts");
   return { keptTexts, textScope, pendingDrafts };
 };
