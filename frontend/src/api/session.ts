@@ -137,7 +137,7 @@ export type Role = EditorApi["Person"]["role"];
 /** From the least to the most; each may do what those before it may. */
 const ROLES = ["viewer", "editor", "operator", "owner"] as const satisfies readonly Role[];
 
-/** The least role that may do a thing. */
+/** The least role for each permission, as in the server's `web/auth/roles.py`; a test compares them. */
 const FROM = {
   see: "viewer",
   stop: "viewer",

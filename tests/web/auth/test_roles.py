@@ -86,7 +86,7 @@ def test_the_page_has_the_same_table() -> None:
     assert re.search(r"ROLES = \[([^\]]*)\]", text)[1] == ", ".join(f'"{role}"' for role in ROLES)  # type: ignore[index]
     table = text[text.index("FROM = {") : text.index("} as const satisfies")]
     assert dict(re.findall(r'(\w+): "(\w+)"', table)) == LEAST
-    words = text[text.index("ROLE_WORDS") :]
+    words = text[text.index("export const ROLE_WORDS") :]
     assert dict(re.findall(r'(\w+): "([^"]+)"', words)) == {role: may(role) for role in ROLES}
 
 
