@@ -57,8 +57,8 @@ dev: setup ## like run, and rebuild the page on every change
 .PHONY: check
 check: check-server check-page ## formatting, lint, types, layers and what is unused, both languages
 
-# Bounds of files, folders and functions, names, and what documents refer to: seconds, so before each commit.
-STRUCTURE := tests/test_tree.py tests/test_references.py tests/test_glossary.py
+# Alarms of size, circles, what documents refer to, and language: seconds, so before each commit.
+STRUCTURE := tests/test_tree.py tests/test_references.py tests/test_glossary.py tests/test_language.py
 
 .PHONY: check-server
 check-server: .venv/.done ## the server's half of check

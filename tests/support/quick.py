@@ -75,7 +75,8 @@ def steps(paths: list[str]) -> list[tuple[str, Path, list[str]]]:
     bin_folder = str(ROOT / ".venv/bin")
     server = any(Path(path).suffix in PYTHON_SUFFIXES for path in paths)
     page = [path for path in paths if path.startswith("frontend/")]
-    structure = ["tests/test_tree.py", "tests/test_references.py", "tests/test_glossary.py"]
+    names = ("tree", "references", "glossary", "language")
+    structure = [f"tests/test_{name}.py" for name in names]
     pytest = [f"{bin_folder}/pytest", "-q", "--numprocesses", PROCESSES, "--dist", "loadfile"]
     found = []
     if server:

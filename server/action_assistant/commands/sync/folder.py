@@ -86,7 +86,7 @@ class Folder:
         self.known: dict[str, SyncedFile] = self._remembered(path / _STATE)
 
     def close(self) -> None:
-        """Close the folder."""
+        """Close the descriptor of the folder."""
         self._at.close()
 
     def names(self) -> list[str]:

@@ -152,7 +152,7 @@ class Comparisons:
             self._task = asyncio.create_task(self._compare_all())
 
     def cancel(self) -> None:
-        """Stop answering clients."""
+        """Stop answering clients of the room."""
         if self._task is not None:
             self._task.cancel()
 

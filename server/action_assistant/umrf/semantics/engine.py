@@ -145,7 +145,7 @@ class Engine(Graphs):
         return self._on(graph_name, at_ms, self._stop_graph)
 
     def pause(self, graph_name: str, at_ms: float) -> list[Trace]:
-        """Pause a RUNNING graph."""
+        """Pause a graph that is RUNNING."""
         return self._on(graph_name, at_ms, self._pause_graph)
 
     def resume(self, graph_name: str, at_ms: float, continue_from: str = "") -> list[Trace]:

@@ -53,7 +53,7 @@ class Performer(Protocol):
         script."""
 
     def begin(self, call: Call) -> None:
-        """Begin a call."""
+        """Begin to carry out a call."""
 
     def stop(self, number: int) -> None:
         """Ask a call to end soon."""

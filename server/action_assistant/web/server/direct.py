@@ -55,10 +55,10 @@ class IgnoringReceiver:
     """Ignores the messages that come after a socket was released."""
 
     def heard(self, message: bytes | None) -> None:
-        """Ignore the message."""
+        """Ignore a message of the released socket."""
 
     def may_write(self) -> None:
-        """Write nothing more."""
+        """Write nothing more to the released socket."""
 
     def gone(self) -> None:
         """Ignore the end of the socket."""

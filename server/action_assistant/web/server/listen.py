@@ -269,7 +269,7 @@ class _Http(H11Protocol):
         super().data_received(data)
 
     def send_400_response(self, msg: str) -> None:
-        """Refuse a malformed request."""
+        """Answer a malformed request with a refusal."""
         if not self._strict.in_crumbs:
             super().send_400_response(msg)
             return

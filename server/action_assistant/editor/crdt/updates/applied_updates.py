@@ -50,6 +50,6 @@ def clocks(state: bytes) -> dict[int, int]:
 
 
 def _state(known: Mapping[int, int]) -> bytes:
-    """Encode a state vector."""
+    """Encode a state vector in the format of Yjs."""
     pairs = [number(client) + number(clock) for client, clock in known.items()]
     return number(len(pairs)) + b"".join(pairs)
