@@ -49,8 +49,13 @@ def written(time: str, heads: Mapping[Branch, LogHead], key: Ed25519PrivateKey |
 
 
 def read(text: str, key: Ed25519PublicKey | None) -> HeadLine:
-    """Read a line and prove its signature, if it has one; with a `key` it needs one by that. Raises
-    CannotStart."""
+    """Parse a line of `verify --head`, and verify its signature, if it has one, with the public key
+    that stands in the line.
+
+    With `key`, the line must be signed by exactly this key. Raises CannotStart if the text is no
+    such line, if its signature does not match, or if `key` is given and the line is unsigned or
+    signed by another key.
+    """
     found = _LINE.fullmatch(text.strip())
     if found is None:
         raise CannotStart("That is no line of `verify --head`: a part of it may be missing.")

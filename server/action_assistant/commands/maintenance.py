@@ -130,7 +130,11 @@ def _say(sentence: str, is_aside: bool) -> None:
 
 
 def _lines(given: str | None) -> list[str]:
-    """Return the lines of --against: one, or those of a file. Raises CannotStart."""
+    """Return the lines of `verify --head` that the option --against names.
+
+    `given` is one such line itself, or the path of a file of such lines; None stands for an absent
+    option and gives no lines. Raises CannotStart if the file cannot be read or has no line.
+    """
     if given is None:
         return []
     if "action-assistant-heads" in given:

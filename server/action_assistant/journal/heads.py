@@ -71,7 +71,11 @@ def digest_of(branch: Branch, position: int, heads: dict[str, Head]) -> str:
 
 
 def _end(events: Iterable[Event], position: int) -> Head:
-    """Return the head of a stream after a position."""
+    """Return the head of one stream as it was at `position` of the log.
+
+    `events`: all events of the stream, the oldest first. Those after `position` are ignored; if all
+    are after it, the head is `NOTHING`.
+    """
     head = NOTHING
     for event in events:
         if event.position > position:

@@ -28,7 +28,7 @@ _DEFINED: Final = frozenset({*_CONTRACT, "pvf_example", "pvf_unit", "pvf_descrip
 
 
 class Renames(msgspec.Struct, frozen=True):
-    """Renamed parameters: pairs of old and new path."""
+    """The parameters that a library has renamed: pairs of the old path and the new path."""
 
     inputs: tuple[tuple[str, str], ...]
     outputs: tuple[tuple[str, str], ...]
@@ -38,20 +38,21 @@ NO_RENAMES: Final = Renames((), ())
 
 
 def uses_of(graph: Graph, name: str) -> tuple[Action, ...]:
-    """Return the actions of a graph that are uses of a library's action."""
+    """Return the actions of a graph that have the name of a library action."""
     return tuple(a for a in graph.actions if a.name == name and not a.missing)
 
 
 def is_like(use: Action, known: Action) -> bool:
-    """Return whether a use has the parameters of the library, in any order and with any values."""
+    """Return whether the action `use` of a graph has the parameters of the library action `known`,
+    in any order and with any values."""
     return _shape(use.inputs) == _shape(known.inputs) and _shape(use.outputs) == _shape(
         known.outputs
     )
 
 
 def suggested(graph: Graph, known: Action) -> Renames:
-    """Return likely renames: over all uses, exactly one parameter of a type was removed and one of
-    that type added."""
+    """Return the renames that are likely because, over all uses together, exactly one parameter of
+    a type was removed and exactly one parameter of this type was added."""
     uses = uses_of(graph, known.name)
     return Renames(
         _swapped([use.inputs for use in uses], known.inputs),
@@ -60,7 +61,12 @@ def suggested(graph: Graph, known: Action) -> Renames:
 
 
 def updated(graph: Graph, known: Action, renames: Renames = NO_RENAMES) -> Graph:
-    """Return the graph with the uses of `known` as the library has it."""
+    """Return the graph in which each use of the library action `known` has the parameters of
+    `known` and keeps its own values.
+
+    `renames`: the parameters of the library that were renamed; values and arrows follow the new
+    names.
+    """
     inputs, outputs = dict(renames.inputs), dict(renames.outputs)
     paths: dict[Key, _Moves] = {}
     after: dict[Key, Action] = {}
@@ -87,8 +93,8 @@ def updated(graph: Graph, known: Action, renames: Renames = NO_RENAMES) -> Graph
 
 
 class _Moves(msgspec.Struct, frozen=True):
-    """The new names of a use's parameters by their old flat name; None for those that were
-    removed."""
+    """The new flat name of each parameter of a use, by the parameter's old flat name; None for a
+    parameter that was removed."""
 
     inputs: dict[str, str | None] = {}
     outputs: dict[str, str | None] = {}
@@ -144,7 +150,8 @@ def _swapped(
 def _sources(
     use: tuple[Parameter, ...], known: tuple[Parameter, ...], renames: Mapping[str, str]
 ) -> dict[str, Parameter]:
-    """Return the use's parameter that each of the library's parameters was before, by its path."""
+    """Return, for each path of a library parameter, the parameter of the use from which it comes;
+    new parameters of the library are absent."""
     had = {parameter.path: parameter for parameter in use}
     known_paths = {parameter.path for parameter in known}
     found = {path: parameter for path, parameter in had.items() if path in known_paths}
@@ -166,7 +173,9 @@ def _parameters(
 
 
 def _text(use: str, known: str) -> str:
-    """Return a parameter as the library has it, with the use's own members."""
+    """Return the text of a parameter with the library's type, limits and descriptions, and with all
+    other members, such as the value, of the use. A value that does not fit a new type is left
+    out."""
     mine, new = parse_small(use), parse_small(known)
     if not isinstance(mine, dict) or not isinstance(new, dict):
         return known if _defined(mine) != _defined(new) else use
@@ -194,7 +203,12 @@ def _moved(
 def _led_on(
     relation: Relation, names: Mapping[Key, _Names], moves: Mapping[Key, _Moves]
 ) -> Relation:
-    """Return the relation with renamings that hand the same values over as before."""
+    """Return the relation with renamings by which it hands over the same values as before the
+    update, under the new names.
+
+    `names`: the flat names of each action before the update; `moves`: the new names in each updated
+    action.
+    """
     outputs = moves.get(relation.parent, _Moves()).outputs
     inputs = moves.get(relation.child, _Moves()).inputs
     remap: list[Remap] = []

@@ -44,9 +44,9 @@ def check(
 ) -> list[Problem]:
     """Return every problem of a graph: errors first, then by rank. Never raises.
 
-    `library`: the actions that the engine has, by name. `graphs`: the graphs that it has indexed
-    and can run as sub-graphs, found by this `resolution`. None means unknown, and no problem is
-    reported about it.
+    `library`: the actions that the engine has, by name. `graphs`: the graphs that the engine has
+    indexed and can run as sub-graphs, by name; `resolution` tells how these names were resolved. If
+    `library` or `graphs` is None, it is unknown, and no problem is reported that depends on it.
     """
     subject = Subject(graph, facts)
     check_structure(subject)
@@ -64,8 +64,8 @@ def check_reading(
     facts: EngineFacts = PINNED,
     graphs: Mapping[str, Graph] | None = None,
 ) -> list[Problem]:
-    """Return every problem of a file with its place there: problems of the text, and of the graph
-    in it."""
+    """Return every problem of a file that was read, with its place in the file: problems of the
+    text, and problems of the graph in the text. `library` and `graphs` are as in `check`."""
     found = check(reading.graph, library, facts, graphs)
     problems = [*reading.problems, *reading.placed(found)]
     return sorted(problems, key=rank)
@@ -76,14 +76,15 @@ def check_written(
     graphs: Mapping[str, Graph] | None = None,
     resolution: Resolution = CERTAIN,
 ) -> list[Problem]:
-    """Return every problem of a graph with its place in the graph's canonical text. `graphs` and
-    `resolution`: as in `check`."""
+    """Return every problem of a graph, with its place in the text that `write` produces for this
+    graph. `graphs` and `resolution` are as in `check`."""
     found = check(graph, graphs=graphs, resolution=resolution)
     return placed(found, write(graph)) if found else []
 
 
 def check_action(reading: ActionReading) -> list[Problem]:
-    """Return every problem of the file of one action with its place there, errors first."""
+    """Return every problem of a file that describes one action, with its place in this file, errors
+    first."""
     graph = Graph(name=reading.action.name or "action", actions=(reading.action,))
     subject = Subject(graph, PINNED)
     check_structure(subject)
@@ -93,8 +94,8 @@ def check_action(reading: ActionReading) -> list[Problem]:
 
 
 def refused_by_parser(reading: Reading) -> list[Problem]:
-    """Return the reasons for which the engine's parser refuses a file. Nothing of such a file can
-    run."""
+    """Return the problems for which the engine's parser refuses a file. The engine can run nothing
+    of a refused file."""
     subject = Subject(reading.graph, PINNED)
     check_structure(subject)
     ends = {ENTRY, EXIT}
@@ -113,8 +114,11 @@ def refused_by_parser(reading: Reading) -> list[Problem]:
 
 
 def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ()) -> list[Problem]:
-    """Return the errors that forbid a start. Errors that are final are among them even if they are
-    `overridden`."""
+    """Return the errors that forbid a start.
+
+    `overridden`: codes of errors that a person accepts. A final error forbids the start even if its
+    code is overridden.
+    """
     return [
         problem
         for problem in problems
@@ -123,8 +127,8 @@ def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ())
 
 
 def is_final(problem: Problem) -> bool:
-    """Return whether nobody can override this error: its code is final, or the code of the problem
-    inside that it is about."""
+    """Return whether nobody can override this error: its own code is final, or the code of the
+    problem in a sub-graph that the error reports."""
     inner = problem.inside.code if problem.inside is not None else problem.code
     return problem.severity == "error" and not FINAL.isdisjoint({problem.code, inner})
 

@@ -15,7 +15,8 @@ Kind: TypeAlias = Literal["unreadable", "refused", "structural", "unsendable", "
 
 
 class Code(msgspec.Struct, frozen=True):
-    """One kind of problem. `fixes`: the names of its fixes in `fixes.fix`."""
+    """One kind of problem that checks report. `fixes`: the names of the fixes that `fixes.fix` can
+    apply to it."""
 
     kind: Kind
     severities: tuple[Severity, ...]
@@ -204,7 +205,8 @@ QUIET: Final = frozenset({"H3"})
 
 
 def rank(problem: Problem) -> tuple[Severity, int]:
-    """Return the sort key of a problem."""
+    """Return the key by which problems are sorted: first the severity, then the rank of the code,
+    the gravest first."""
     code = problem.code
     if code in QUIET:
         return problem.severity, len(_WORST) + 1
@@ -212,7 +214,7 @@ def rank(problem: Problem) -> tuple[Severity, int]:
 
 
 def table() -> str:
-    """Return all codes as a Markdown table."""
+    """Return the table of all codes for the documentation, as Markdown."""
     lines = [
         "| code | severity | what it is | what happens | fix |",
         "|---|---|---|---|---|",

@@ -12,9 +12,11 @@ Mask: TypeAlias = int
 
 
 def components(ways: Sequence[Iterable[int]]) -> Iterator[list[int]]:
-    """Yield each strongly connected component after all others that it leads to (Tarjan, iterative).
+    """Yield the strongly connected components of a directed graph, each after all others to which
+    it leads (Tarjan's algorithm without recursion).
 
-    The nodes of a component come in the order in which the search found them. Ends are in no component.
+    `ways[n]`: the nodes to which edges lead from node `n`. The nodes of a component come in the
+    order in which the search found them. Nodes without a row in `ways` are in no component.
     """
     index = [-1] * len(ways)
     low = [0] * len(ways)
@@ -53,7 +55,7 @@ def components(ways: Sequence[Iterable[int]]) -> Iterator[list[int]]:
 
 
 def _popped(stack: list[int], first: int, on_stack: list[bool]) -> list[int]:
-    """Take the component that begins with `first` off the stack."""
+    """Remove the nodes of the component that begins with `first` from the stack, and return them."""
     found = [stack.pop()]
     while found[-1] != first:
         found.append(stack.pop())
@@ -64,7 +66,12 @@ def _popped(stack: list[int], first: int, on_stack: list[bool]) -> list[int]:
 
 
 def reachable(ways: Sequence[Sequence[int]]) -> list[Mask]:
-    """Return for each node the nodes and ends that it can reach; itself only by a loop."""
+    """Return for each node, as a bit mask, the nodes that paths from it reach. The mask of a node
+    has the node itself only if it lies on a loop.
+
+    `ways[n]`: the nodes to which edges lead from node `n`, including nodes without a row of their
+    own.
+    """
     found = [0] * len(ways)
     for members in components(ways):
         own = sum(1 << node for node in members)
@@ -79,7 +86,7 @@ def reachable(ways: Sequence[Sequence[int]]) -> list[Mask]:
 
 
 def nodes_in(mask: Mask) -> Iterator[int]:
-    """Yield the nodes of a set, the smallest first."""
+    """Yield the numbers of the nodes that a bit mask holds, the smallest first."""
     while mask:
         lowest = mask & -mask
         yield lowest.bit_length() - 1

@@ -16,7 +16,8 @@ _NOTE_PLACE: Final = {"at", "size"}
 
 
 class Field(msgspec.Struct, frozen=True):
-    """A field with another value. None stands for no value."""
+    """A field that has another value than before. `before` or `after` is None if the field had no
+    value then."""
 
     field: str
     before: Any
@@ -24,7 +25,8 @@ class Field(msgspec.Struct, frozen=True):
 
 
 class ActionChange(msgspec.Struct, frozen=True):
-    """An action that was added, removed or changed. `name` is its full name, the newer one."""
+    """An action that was added, removed or changed. `name`: its full name after the change, or
+    before it if the action was removed."""
 
     change: Change
     aid: str
@@ -33,11 +35,11 @@ class ActionChange(msgspec.Struct, frozen=True):
 
 
 class RelationChange(msgspec.Struct, frozen=True):
-    """An arrow that was added, removed or changed, between actions by full name, or `entry` and
-    `exit`.
+    """An arrow that was added, removed or changed. `parent` and `child` are full names of actions,
+    or `entry` and `exit`.
 
-    `ends`: the same by their keys. `when`: pairs of outcome and response of an arrow that was added
-    or removed.
+    `ends`: the keys of parent and child. `when`: pairs of outcome and response of an arrow that was
+    added or removed.
     """
 
     change: Change
@@ -49,9 +51,10 @@ class RelationChange(msgspec.Struct, frozen=True):
 
 
 class NoteChange(msgspec.Struct, frozen=True):
-    """A note or frame that was added, removed or changed. `text` is its text, the newer one.
+    """A note or frame that was added, removed or changed. `text`: its text after the change, or
+    before it if the note was removed.
 
-    `moved`: only its position or size has changed.
+    `moved`: True if only its position or size has changed.
     """
 
     change: Change
@@ -61,8 +64,8 @@ class NoteChange(msgspec.Struct, frozen=True):
 
 
 class Difference(msgspec.Struct, frozen=True):
-    """The difference from the moment `before` to the moment `after`, both numbers of changes of one
-    graph's document."""
+    """The difference between two states of one graph. `before` and `after` are the numbers of the
+    document's changes at which the graph was in these states."""
 
     before: int
     after: int
@@ -73,7 +76,8 @@ class Difference(msgspec.Struct, frozen=True):
 
 
 def difference(before: tuple[int, Graph], after: tuple[int, Graph]) -> Difference:
-    """Compare a graph at two moments."""
+    """Compare two states of a graph. Each is given with the number of the change of the document at
+    which the graph was in this state."""
     (old_seq, old), (new_seq, new) = before, after
     return Difference(
         old_seq,
@@ -115,8 +119,8 @@ def _relations(old: Graph, new: Graph) -> Iterable[RelationChange]:
 
 
 def _when(relation: Relation | None) -> tuple[tuple[str, str], ...]:
-    """Return the responses of the child by outcome, without those that ignore it. Empty for an
-    arrow from the entry."""
+    """Return pairs of outcome and response of an arrow, without responses that ignore the outcome;
+    nothing for an arrow from the entry."""
     if relation is None or relation.parent == ENTRY:
         return ()
     says: dict[str, str] = msgspec.structs.asdict(relation.conditions)
@@ -133,14 +137,15 @@ def _notes(old: Graph, new: Graph) -> Iterable[NoteChange]:
 
 
 def _note_text(note: JsonText) -> str:
-    """Return the text of a note or frame; empty if it has none."""
+    """Return the text that people read in a note or frame; empty if it has none."""
     found = parse_small(note)
     text = found.get("text") if isinstance(found, dict) else None
     return text if isinstance(text, str) else ""
 
 
 def _but_place(note: JsonText) -> dict[str, Any] | JsonText:
-    """Return a note without its position and size."""
+    """Return the members of a note without its position and size; a note that is no JSON object is
+    returned unchanged."""
     found = parse_small(note)
     if not isinstance(found, dict):
         return note

@@ -23,9 +23,9 @@ _LOOKS: Final = ("position", "direction", "waypoints/", "gui_attributes")
 
 def by_name(graph: Graph) -> Graph:
     """Return the graph with the full name of each action as its key, so that it can be compared
-    with a graph read elsewhere.
+    with a graph that was read from another file.
 
-    If several actions have one name, the later ones are numbered.
+    If several actions have the same full name, the keys of the later ones get a number.
     """
     seen: Counter[str] = Counter()
     keys: dict[Key, Key] = {}
@@ -48,8 +48,8 @@ def by_name(graph: Graph) -> Graph:
 
 
 def without_looks(found: Difference) -> Difference:
-    """Return the part of a difference that matters to a robot: without positions, notes and
-    waypoints."""
+    """Return the part of a difference that can change what a robot does: without positions,
+    waypoints, notes and frames."""
     actions = (replace(a, fields=_meant(a.fields)) for a in found.actions)
     relations = (replace(r, fields=_meant(r.fields)) for r in found.relations)
     return replace(
@@ -62,13 +62,13 @@ def without_looks(found: Difference) -> Difference:
 
 
 def is_same(found: Difference) -> bool:
-    """Return whether there is no difference."""
+    """Return whether a difference is empty, so that the two states are equal."""
     return not (found.fields or found.actions or found.relations or found.notes)
 
 
 def lines(found: Difference) -> Iterator[str]:
-    """Yield the lines of a difference: first what a robot notices, then what only changes the
-    drawing."""
+    """Yield the lines of text that describe a difference: first the changes that a robot notices,
+    then the changes that only concern the drawing."""
     meant = without_looks(found)
     if meant.fields:
         yield "~ graph"
@@ -97,7 +97,8 @@ def _indented(fields: Iterable[Field]) -> Iterator[str]:
 
 
 def _members(field: Field) -> Iterator[tuple[str, Any, Any]]:
-    """Yield the members of a parameter that differ, or any other field as one."""
+    """Yield (name, before, after) for each differing member of a parameter; once for a field that
+    is no parameter, or that was added or removed."""
     name = _words(field.field)
     was, now = _parsed(field, field.before), _parsed(field, field.after)
     if not (isinstance(was, dict) and isinstance(now, dict)):
@@ -117,8 +118,8 @@ def _parsed(field: Field, value: Any) -> Any:
 
 
 def _plain(value: Any) -> Any:
-    """Return the value of a parameter that was added or removed, if it has one, else the
-    parameter."""
+    """Return the value of a parameter that was added or removed; the whole parameter if it has no
+    value. Anything else than a parameter is returned unchanged."""
     return value.get("pvf_value", value) if isinstance(value, dict) else value
 
 

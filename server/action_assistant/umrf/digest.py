@@ -37,7 +37,7 @@ def tree_digest(own: str, subgraphs: Iterable[tuple[str, str]]) -> str:
 
 
 def _plain(value: Json) -> Any:
-    """Return a value with its numbers as the doubles that the engine reads."""
+    """Return a JSON value in which numbers are the doubles that the engine reads."""
     match value:
         case dict():
             return {key: _plain(member) for key, member in value.items()}

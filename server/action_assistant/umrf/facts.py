@@ -51,9 +51,10 @@ _KNOWN: Final = {facts.commit: facts for facts in (PINNED, SIMULATED)}
 
 
 def facts_for(commit: str | None) -> EngineFacts:
-    """Return the facts of a commit (seven digits or more).
+    """Return the facts of the engine that was built from this commit (seven hex digits or more).
 
-    A commit that was not measured gets the facts of the pinned engine under its own name.
+    A commit that was not measured gets the facts of the pinned engine with its own `commit`. None
+    stands for the pinned engine.
     """
     if not commit:
         return PINNED
@@ -64,7 +65,8 @@ def facts_for(commit: str | None) -> EngineFacts:
 
 
 class BadProfile(ValueError):
-    """Raised for a profile with a wrong statement about an engine; `path` is a JSON pointer."""
+    """Raised for a robot's profile that states a wrong or unknown fact about its engine. `path` is
+    the JSON pointer of this fact in the profile."""
 
     def __init__(self, message: str, path: str) -> None:
         super().__init__(message)
@@ -77,9 +79,9 @@ SECOND_PERSON: Final = "second_person"
 
 
 def facts_of(profile: Mapping[str, object]) -> EngineFacts:
-    """Return the facts of a robot's engine: those of its `commit` (without one, of the pinned
-    engine), with the other fields of the profile, named as in `EngineFacts`. Raises `BadProfile`.
-    """
+    """Return the facts of a robot's engine: those of the `commit` in its profile, or of the pinned
+    engine if the profile has none. Other fields of the profile, named as in `EngineFacts`,
+    replace these facts. Raises `BadProfile` if a field is unknown or has a wrong type or value."""
     if not isinstance(profile.get(SECOND_PERSON, False), bool):
         raise BadProfile(f"{SECOND_PERSON} is true or false.", f"/{SECOND_PERSON}")
     profile = {key: value for key, value in profile.items() if key != SECOND_PERSON}
@@ -96,7 +98,8 @@ def facts_of(profile: Mapping[str, object]) -> EngineFacts:
 
 
 def _profile_value(key: str, value: object) -> object:
-    """Return one value of a profile with the type of its field. Raises `BadProfile`."""
+    """Return one value of a profile with the type of its field in `EngineFacts`. Raises
+    `BadProfile` if it cannot have this type."""
     try:
         fitting: EngineFacts = msgspec.convert({"commit": "", key: value}, EngineFacts)
     except msgspec.ValidationError as wrong:

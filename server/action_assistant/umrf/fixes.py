@@ -12,14 +12,15 @@ from action_assistant.umrf.relations import MAX_REFERRED_ID
 
 
 def fix(graph: Graph, problem: Problem) -> Graph:
-    """Return the graph after the problem's fix; the graph itself if there is nothing to fix."""
+    """Return the graph after the fix that `problem.fix` names. The graph is returned unchanged if
+    the problem has no fix, or the fix was applied already."""
     mend = _FIXES.get(problem.fix or "")
     return mend(graph, problem) if mend else graph
 
 
 def _mend_relation(change: Callable[[Relation], Relation | None]) -> "_Fix":
-    """Return a fix that changes the relation of the problem, or removes it if `change` returns
-    None."""
+    """Return a fix that replaces the problem's relation by the result of `change`, or removes the
+    relation if that result is None."""
 
     def mend(graph: Graph, problem: Problem) -> Graph:
         relations = (
@@ -53,7 +54,7 @@ def _without_lonely_ghosts(graph: Graph) -> Graph:
 
 
 def _renumbered(graph: Graph, problem: Problem) -> Graph:
-    """Give the action the lowest number that is free for its name."""
+    """Give the problem's action the lowest `instance_id` that no other action of its name has."""
     used: Mapping[Key, Action] = {action.key: action for action in graph.actions}
     action = used.get(problem.where.aid or "")
     if action is None:
@@ -84,14 +85,14 @@ def _optional_outputs(graph: Graph, problem: Problem) -> Graph:
 
 
 def with_optional_outputs(action: Action) -> Action:
-    """Return the action with outputs that are not required, except those that have a value
-    anyway."""
+    """Return the action in which all outputs without a value are optional (`pvf_required` is
+    false)."""
     outputs = tuple(_optional(parameter) for parameter in action.outputs)
     return msgspec.structs.replace(action, outputs=outputs)
 
 
 def _optional(parameter: Parameter) -> Parameter:
-    """Make a parameter without a value optional."""
+    """Return a parameter without a value as an optional one; any other parameter unchanged."""
     value = parse_small(parameter.text)
     if not isinstance(value, dict) or "pvf_type" not in value or "pvf_value" in value:
         return parameter
@@ -101,7 +102,7 @@ def _optional(parameter: Parameter) -> Parameter:
 
 
 def _with_example(graph: Graph, problem: Problem) -> Graph:
-    """Take the example of the input that the problem is about as its value."""
+    """Give the input that the problem is about its declared example as value, if the example fits."""
     _, found, path = problem.where.path.partition("/input_parameters/")
     for action in graph.actions:
         if found and action.key == problem.where.aid:
@@ -111,7 +112,8 @@ def _with_example(graph: Graph, problem: Problem) -> Graph:
 
 
 def with_examples(graph: Graph, problems: Iterable[Problem]) -> Graph:
-    """Take the examples of all inputs without a value that the problems are about."""
+    """Return the graph in which every input that the fix `take-example` of these problems concerns
+    has its example as value."""
     for problem in problems:
         if problem.fix == "take-example":
             graph = _with_example(graph, problem)

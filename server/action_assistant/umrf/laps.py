@@ -13,14 +13,14 @@ from action_assistant.umrf.model import ENTRY, PRECONDITIONS, Graph, Key, Precon
 
 
 class Laps(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The actions that can run once or again.
+    """Facts about how often the actions of one graph can run.
 
-    `once`: full names of actions that run at most once. `barring_errors`: those of them for which
-    this holds only until an action fails, since a failure is passed on past a join. `stops`: the
-    graph itself stops or pauses actions, or runs them over and over; then nothing is `once`.
-    `needs`: for an action that may run again and is set going by only one other one: (action, the
-    other one, how many times the entry sets it going in addition); for a graph inside, which may be
-    begun again as a whole, of all actions.
+    `once`: full names of actions that run at most once. `barring_errors`: the actions of `once` for
+    which this holds only until an action fails, since a failure is passed on past a join. `stops`:
+    True if the graph itself stops or pauses actions, or runs spontaneous ones; `once` is then
+    empty. `needs`: (action, parent, count) for each action that is not in `once` and that only this
+    parent starts; the entry starts the action `count` times in addition. For a graph inside another
+    one, which may begin again as a whole, `needs` covers the actions of `once`, too.
     """
 
     once: tuple[str, ...] = ()
@@ -30,9 +30,9 @@ class Laps(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def laps(graph: Graph, *, inside: bool = False) -> Laps:
-    """Return the actions that the arrows of a graph allow to run once or again.
+    """Return how often the actions of a graph can run, as far as its arrows tell. Never raises.
 
-    `inside`: the graph runs inside another one. Total.
+    `inside`: True for a graph that runs as a sub-graph of another one.
     """
     if _stops(graph):
         return Laps(stops=True)
@@ -50,11 +50,12 @@ def laps(graph: Graph, *, inside: bool = False) -> Laps:
 def _needs(
     graph: Graph, once: Collection[str], names: Mapping[str, int]
 ) -> Iterator[tuple[str, str, int]]:
-    """Yield the actions for which each run was started by a run of their one parent, or by the
-    entry.
+    """Yield (action, parent, count) as in `Laps.needs`: each run of the action was started by a run
+    of its parent or by the entry.
 
-    An outcome that is passed on past the parent would start it without a run of the parent, so
-    there must be none.
+    Actions of `once` are left out, and so are actions that could start without a run of the parent,
+    because the parent can be bypassed with an outcome that starts them. `names`: how many actions
+    have each full name.
     """
     called = {each.key: each.full_name for each in graph.actions if names[each.full_name] == 1}
     arriving: dict[Key, list[Relation]] = {}
@@ -78,7 +79,7 @@ def _needs(
 
 
 def _runs(arrow: Relation) -> list[Precondition]:
-    """Return the outcomes for which an arrow runs its child."""
+    """Return the outcomes of its parent to which an arrow responds by running its child."""
     if arrow.parent == ENTRY:
         return ["on_true"]
     return [each for each in PRECONDITIONS if arrow.conditions.answer(each) == "run"]
@@ -93,9 +94,10 @@ def _stops(graph: Graph) -> bool:
 
 
 def _walked(graph: Graph) -> dict[Key, bool]:
-    """Return the actions that end at most once, each with whether this needs that no action fails.
+    """Return the actions that end at most once, by key. The value tells whether this holds only as
+    long as no action fails.
 
-    Actions in a loop or after one are never reached by this walk.
+    Actions that lie on a loop, or after one, are not in the result.
     """
     arriving: dict[Key, list[Relation]] = {each.key: [] for each in graph.actions}
     leaving: dict[Key, list[Key]] = {}
@@ -119,8 +121,8 @@ def _walked(graph: Graph) -> dict[Key, bool]:
 
 
 def _joined(arrows: Sequence[Relation]) -> bool | None:
-    """Return whether an action waits for several parents; None if more than one of them can start
-    it."""
+    """Tell whether an action waits for several parents, given all arrows that lead to it; None if
+    these arrows may let it end more than once."""
     live = [each for each in arrows if any(_live(each, outcome) for outcome in PRECONDITIONS)]
     if len(live) <= 1:
         return False

@@ -33,7 +33,8 @@ RESPONSES: Final[tuple[Response, ...]] = ("run", "pause", "restart", "stop", "by
 
 
 class Conditions(msgspec.Struct, frozen=True):
-    """The child's response to each outcome of its parent. A missing answer is `ignore`."""
+    """The child's response to each outcome of its parent. The response to an outcome that is not
+    set is `ignore`."""
 
     on_true: Response = "ignore"
     on_false: Response = "ignore"
@@ -41,7 +42,7 @@ class Conditions(msgspec.Struct, frozen=True):
     on_stopped: Response = "ignore"
 
     def answer(self, outcome: Precondition) -> Response:
-        """Return the response to one outcome."""
+        """Return the child's response to this outcome of its parent."""
         answer: Response = getattr(self, outcome)
         return answer
 
@@ -211,7 +212,7 @@ class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
     @property
     def sentence(self) -> str:
-        """The message, with the number of times if there are several."""
+        """The message as a sentence, with the number of times if it applies to more than one value."""
         return f"{self.message} ({self.times} times)" if self.times > 1 else self.message
 
 

@@ -12,8 +12,8 @@ MAX_PATH: Final = 60
 
 
 def flatten(group: dict[str, Json]) -> tuple[Parameter, ...]:
-    """Return every value below `group` that is not a non-empty object without `pvf_type`, in
-    order."""
+    """Return the parameters below `group` in file order: every value that is not an object of
+    further keys, that is, without `pvf_type` and not empty."""
     return tuple(
         Parameter("/".join(map(escape, keys)), dump(value)) for keys, value in _leaves(group, ())
     )
@@ -42,17 +42,18 @@ def nest(parameters: Iterable[Parameter]) -> dict[str, Json]:
 
 
 def keys_of(path: str) -> tuple[str, ...]:
-    """Return the keys that a path joins."""
+    """Split the path of a parameter into its keys, without escapes."""
     return tuple(part.replace("~1", "/").replace("~0", "~") for part in path.split("/"))
 
 
 def escape(key: str) -> str:
-    """Return a key as one part of a path."""
+    """Escape a key so that it can be one part of a path (`~` is `~0`, `/` is `~1`)."""
     return key.replace("~", "~0").replace("/", "~1")
 
 
 def flat_name(path: str) -> str:
-    """Return the name by which the engine knows a parameter: `pose::position::x`."""
+    """Return the name by which the engine knows the parameter with this path: `pose::position::x`
+    for `pose/position/x`."""
     return "::".join(keys_of(path))
 
 
@@ -75,7 +76,8 @@ def example_of(text: JsonText) -> Json:
 
 
 def with_example(parameter: Parameter) -> Parameter:
-    """Return the parameter with its example as value, if the example fits."""
+    """Return the parameter with its declared example as value; unchanged if it has no example that
+    fits."""
     leaf, value = parse_small(parameter.text), example_of(parameter.text)
     if value is None or not isinstance(leaf, dict):
         return parameter
@@ -97,8 +99,8 @@ NATIVE: Final = ("string", "number", "bool", "strings", "numbers", "bools")
 
 
 def fits(kind: str, value: Json) -> bool:
-    """Return whether the engine can read a value of a native type. It reads no value of other
-    types."""
+    """Return whether the engine can read `value` as a parameter of type `kind`; False for every
+    type that is not native to the engine."""
     match kind:
         case "string":
             return isinstance(value, str)

@@ -56,15 +56,16 @@ _MOST_IN_ROW: Final = 4
 
 
 class ProblemCounts(msgspec.Struct, frozen=True):
-    """The number of things in a graph to mend, and the number to fill in."""
+    """The number of mistakes in a graph (`wrong`), and the number of places that still have to be
+    filled in."""
 
     wrong: int
     to_fill_in: int
 
 
 def problem_counts(problems: Iterable[Problem], graph: Graph) -> ProblemCounts:
-    """Count the problems of a graph as the page shows them: one thing once, however many fields it
-    has."""
+    """Count the mistakes of a graph and the places to fill in, as the page shows them: a pose,
+    point or vector counts once, however many of its numbers have a problem."""
     actions = {action.key: action for action in graph.actions}
     arrows: dict[Key, list[Relation]] = {}
     for relation in filter(_hands_over, graph.relations):
@@ -91,14 +92,15 @@ def problem_counts(problems: Iterable[Problem], graph: Graph) -> ProblemCounts:
 
 
 def input_of(problem: Problem) -> str | None:
-    """Return the path of an input for which the check asks a value; None for any other problem."""
+    """Return the path of the input for which this problem asks a value; None if the problem is of
+    another kind."""
     found = _INPUT.fullmatch(problem.where.path) if problem.code in {"H7", "H8"} else None
     return None if found is None else found[1]
 
 
 def kind_of(problem: Problem, *, misfit: bool = False) -> ProblemKind:
-    """Return the kind of a problem. `misfit`: arrows bring the input a value that it cannot take,
-    which is a mistake."""
+    """Return the kind of a problem. `misfit`: the input that lacks a value only gets values by
+    arrows that it cannot take, so that the problem is a mistake."""
     if input_of(problem) is not None:
         return "wrong" if misfit else "fill-in"
     if problem.code in UNWRITTEN:
@@ -111,7 +113,8 @@ def kind_of(problem: Problem, *, misfit: bool = False) -> ProblemKind:
 def _misfits(
     action: Action, arrows: Iterable[Relation], actions: Mapping[Key, Action]
 ) -> frozenset[str]:
-    """Return the paths of inputs that cannot take the value of any parent that hands one over."""
+    """Return the paths of inputs of an action to which arrows bring values, but none that the input
+    can take."""
     inputs = {flat_name(each.path): each for each in action.inputs}
     taken: dict[str, bool] = {}
     for relation in arrows:
@@ -130,25 +133,23 @@ def _misfits(
 
 
 def _hands_over(relation: Relation) -> bool:
-    """Return whether outputs are handed over along an arrow: unless it ignores or bypasses every
-    outcome."""
+    """Return whether a parent's outputs are handed over along an arrow: it must respond to some
+    outcome, other than by a bypass."""
     if relation.only is not None or relation.listing or relation.parent == ENTRY:
         return False
     return any(relation.conditions.answer(o) not in {"ignore", "bypass"} for o in PRECONDITIONS)
 
 
 def _takes(target: Parameter, source: Parameter) -> bool:
-    """Return whether an input takes an output that reaches it."""
+    """Return whether an input (`target`) accepts the value of an output (`source`): the types are
+    equal and the input is not locked."""
     to, given = _leaf(target), _leaf(source)
     return _type(to) == _type(given) and to.get("pvf_updatable") is not False
 
 
 def _rows(inputs: Iterable[Parameter]) -> Iterable[str]:
-    """Yield the prefixes of paths of points, vectors and poses, each of which is one thing for
-    people.
-
-    For example `grip/` of `grip/position/x`.
-    """
+    """Yield the path prefix of each point, vector and pose among the inputs, which people see as
+    one thing: `grip/` for `grip/position/x`."""
     for prefix, neighbours in groupby(inputs, key=lambda each: _above(each.path)):
         members = list(neighbours)
         if not prefix or not 2 <= len(members) <= _MOST_IN_ROW or not all(map(_axis, members)):
@@ -163,7 +164,8 @@ def _above(path: str) -> str:
 
 
 def _axis(parameter: Parameter) -> bool:
-    """Return whether a parameter is an unrestricted number with the name of an axis."""
+    """Return whether a parameter is a number without allowed values whose name is that of an axis,
+    such as `x`."""
     leaf = _leaf(parameter)
     free = not isinstance(allowed := leaf.get("pvf_allowed_values"), list) or not allowed
     return keys_of(parameter.path)[-1] in _LETTERS and _type(leaf) == "number" and free

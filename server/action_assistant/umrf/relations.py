@@ -28,9 +28,10 @@ assert set(_RESPONSES) == set(get_args(Response))
 
 
 def condition_of(text: Json) -> tuple[Precondition, Response] | None:
-    """Return the parts of `"on_true -> run"`, or None if the engine refuses it.
+    """Parse a condition such as `"on_true -> run"` into outcome and response; return None if the
+    engine refuses it.
 
-    Blanks are ignored, tabs are not, and everything after a second arrow is ignored.
+    Like the engine, ignore blanks, and everything after a second arrow; tabs are not ignored.
     """
     if not isinstance(text, str):
         return None
@@ -43,8 +44,8 @@ def condition_of(text: Json) -> tuple[Precondition, Response] | None:
 
 
 def conditions_of(value: Json) -> tuple[Conditions, bool]:
-    """Return the conditions of a list over the engine's defaults, and whether all of it could be
-    read."""
+    """Return the conditions that a list of texts sets, and whether the engine could read the whole
+    list. Outcomes that the list lacks have the engine's default response."""
     conditions = ENGINE_DEFAULTS
     if not isinstance(value, list):
         return conditions, False
@@ -59,13 +60,13 @@ def conditions_of(value: Json) -> tuple[Conditions, bool]:
 
 
 def conditions_text(conditions: Conditions) -> list[Json]:
-    """Return all four conditions as a file has them."""
+    """Return the four conditions as a list of texts in the form of a file."""
     return [f"{outcome} -> {conditions.answer(outcome)}" for outcome in PRECONDITIONS]
 
 
 def remap_of(value: Json) -> tuple[tuple[Remap, ...], bool, bool]:
-    """Return the renamings of a list, whether the engine takes them, and whether the list has no
-    other members."""
+    """Return the renamings that a list spells, whether the engine accepts the list, and whether no
+    item has members beyond `from` and `to`."""
     if not isinstance(value, list):
         return (), False, False
     found: dict[str, Remap] = {}
@@ -82,8 +83,8 @@ def remap_of(value: Json) -> tuple[tuple[Remap, ...], bool, bool]:
 
 
 def whole_of(value: Json) -> tuple[int, bool]:
-    """Return an `instance_id` as the engine reads it, and whether it is valid (whole, not
-    negative)."""
+    """Return the number that the engine reads from an `instance_id`, and whether the given value is
+    valid: a whole number that is not negative."""
     match value:
         case Number(text=text):
             exact = text.lstrip("-").isdigit()

@@ -12,21 +12,23 @@ MAX_EACH: Final = 1_000
 
 
 class ProblemList:
-    """Keeps the first `MAX_EACH` problems of each severity and code, in the order in which they were found."""
+    """Keeps the first `MAX_EACH` problems of each severity and code, in the order in which they
+    were found."""
 
     def __init__(self) -> None:
         self.found: list[Problem] = []
         self._reported: Counter[tuple[Severity, str]] = Counter()
 
     def has_room(self, severity: Severity, code: str) -> bool:
-        """Count one more problem of this kind, and return whether it is to be kept."""
+        """Count one more problem of this severity and code, and return whether the caller shall
+        keep it."""
         self._reported[severity, code] += 1
         return self._reported[severity, code] <= MAX_EACH
 
 
 class Notes:
-    """Keeps what was translated or left out while a file is read. Notes with one message are one note with all
-    their places."""
+    """Collects remarks on values that were translated or left out while a file was read. Remarks
+    with the same message become one note with several places."""
 
     def __init__(self) -> None:
         self._places: dict[str, list[Where]] = {}
@@ -40,7 +42,7 @@ class Notes:
         self._times[message] += 1
 
     def all(self) -> tuple[Note, ...]:
-        """Return all notes, in the order in which each message first came."""
+        """Return all notes in the order in which their messages first occurred."""
         return tuple(self._all())
 
     def _all(self) -> Iterator[Note]:

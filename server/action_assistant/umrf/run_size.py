@@ -14,7 +14,8 @@ MOST_ACTIONS: Final = 5_000
 
 
 class RunSize(msgspec.Struct, frozen=True):
-    """The size of a graph together with all graphs inside of it."""
+    """The size of a graph together with all of its sub-graphs: bytes of UMRF text, number of
+    actions, and number of sub-graphs (`inside`)."""
 
     bytes: int
     actions: int
@@ -22,7 +23,8 @@ class RunSize(msgspec.Struct, frozen=True):
 
 
 def excess(size: RunSize) -> str | None:
-    """Return why a graph of this size is not run, with the counts, as a sentence; None where it may be run."""
+    """Return a sentence that says why a graph of this size is too large to be run, with the counts;
+    None if it is not too large."""
     whole = (
         f"the graph and the {_counted(size.inside)} inside of it" if size.inside else "the graph"
     )

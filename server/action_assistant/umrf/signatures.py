@@ -18,10 +18,10 @@ def signature_of(action: Action) -> Signature:
 
 
 def signature_of_graph(graph: Graph) -> Signature:
-    """Return the signature of a graph as a sub-graph.
+    """Return the inputs and outputs that a graph has as a sub-graph.
 
-    It has the inputs of its entry actions that have no value, and the outputs of the last exit
-    action that has any.
+    The inputs are those inputs of its entry actions that have no value. The outputs are those of
+    the last exit action that has any outputs.
     """
     by_key = {action.key: action for action in graph.actions if not action.missing}
     inputs: dict[str, str] = {}
@@ -39,10 +39,10 @@ def signature_of_graph(graph: Graph) -> Signature:
 
 
 def action_of_graph(graph: Graph) -> Action:
-    """Return the action that stands for a graph in another one, with the parameters of
-    `signature_of_graph`.
+    """Return an action that stands for this graph in another graph, with the parameters of
+    `signature_of_graph`. Its key is empty.
 
-    An input that two entry actions take is required if one of them requires it.
+    An input that several entry actions have is required if any of these actions requires it.
     """
     by_key = {action.key: action for action in graph.actions if not action.missing}
     inputs: dict[str, Parameter] = {}
@@ -67,7 +67,8 @@ def action_of_graph(graph: Graph) -> Action:
 
 
 def with_inputs(graph: Graph) -> Graph:
-    """Return the graph as if its parent had given its entry actions the values that they lack."""
+    """Return the graph in which the entry actions require no input, as if a graph around it had
+    given the missing values."""
     entries = {relation.child for relation in graph.relations if relation.parent == ENTRY}
     actions = tuple(
         msgspec.structs.replace(action, inputs=tuple(map(_not_required, action.inputs)))

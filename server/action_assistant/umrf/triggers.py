@@ -36,8 +36,8 @@ _Outcomes: TypeAlias = frozenset[Precondition]
 
 
 class TriggerArrow(msgspec.Struct, frozen=True, array_like=True):
-    """One arrow by full names (`parent` may be ENTRY, `child` EXIT), with its responses in the
-    order of PRECONDITIONS."""
+    """One arrow, with the full names of its ends; `parent` may be ENTRY, and `child` may be EXIT.
+    `responses` are in the order of PRECONDITIONS."""
 
     parent: str
     child: str
@@ -45,16 +45,16 @@ class TriggerArrow(msgspec.Struct, frozen=True, array_like=True):
     responses: tuple[Response, ...]
 
     def answer(self, outcome: Precondition) -> Response:
-        """Return the response to one outcome."""
+        """Return the child's response to this outcome of its parent."""
         return self.responses[PRECONDITIONS.index(outcome)]
 
 
 class Triggers(msgspec.Struct, frozen=True):
-    """The arrows of one graph, as far as triggering is concerned.
+    """The arrows of one graph, with facts about how often the arrows trigger actions.
 
-    `once`: actions that run at most once; `barring_errors`: those of them for which this holds only
-    until an action fails. `in_turn`: at each moment at most one action is loading, runs or reports,
-    since no outcome has two consequences.
+    `once`: full names of actions that run at most once. `barring_errors`: the actions of `once` for
+    which this holds only until an action fails. `in_turn`: at each moment, at most one action
+    loads, runs or reports, since no outcome has two consequences.
     """
 
     arrows: tuple[TriggerArrow, ...] = ()
@@ -64,10 +64,10 @@ class Triggers(msgspec.Struct, frozen=True):
 
 
 class SeenAfter(msgspec.Struct, frozen=True):
-    """Observations of a graph after it had left RUNNING.
+    """Observations that were made of a graph after it had left RUNNING.
 
-    `active`: actions that moved then, and `idle`: those that had never begun; neither had reported
-    an end before. `drained`: the graph had ended by itself.
+    `active`: actions that moved then. `idle`: actions that had never begun then. No action of
+    either set had reported an end before. `drained`: the graph had ended by itself.
     """
 
     active: frozenset[str] = frozenset()
@@ -76,10 +76,11 @@ class SeenAfter(msgspec.Struct, frozen=True):
 
 
 def triggers_of(graph: Graph, *, exits_known: bool) -> Triggers:
-    """Return the arrows of a graph.
+    """Return the arrows of a graph with the facts of `Triggers`.
 
-    `exits_known`: the text it was read from has the responses of the graph's exit; an engine's own
-    text has not.
+    `exits_known`: True if the graph was read from a text with the responses of the graph's exit.
+    The text that an engine prints lacks these responses, and does not say which inputs are
+    required.
     """
     names = {each.key: each.full_name for each in graph.actions if not each.missing}
     names |= {ENTRY: ENTRY, EXIT: EXIT}
@@ -105,10 +106,9 @@ def triggers_of(graph: Graph, *, exits_known: bool) -> Triggers:
 
 
 def _lacking(graph: Graph) -> Iterator[str]:
-    """Yield the actions that never run, since nothing gives them a required input.
-
-    Entry actions may get theirs from the graph around it.
-    """
+    """Yield the full names of actions that never run, since no parent gives them a required input.
+    An action that the entry starts is never among them, since the graph around may give the
+    input."""
     actions = {each.key: each for each in graph.actions if not each.missing}
     arriving: dict[str, list[Relation]] = {}
     for arrow in graph.relations:
@@ -161,10 +161,11 @@ def may_be_loading(
     *,
     parts: Collection[str] = (),
 ) -> tuple[str, ...]:
-    """Return the full names of actions that may have been triggered and have not begun, in a graph
-    of which no action moves.
+    """Return the full names of actions that may have been triggered although they have not begun,
+    in a graph of which no action moves.
 
-    `states`: the states of all actions, by full name. `parts`: the actions that are sub-graphs.
+    `states`: the state of each action, by full name. `seen`: earlier observations of this graph.
+    `parts`: full names of the actions that are sub-graphs.
     """
     idle = {name for name, state in states.items() if state in NEVER_BEGAN}
     if not idle or graph_state in NEVER_BEGAN:
@@ -178,7 +179,7 @@ def may_be_loading(
 
 class _Reports:
     """Finds the outcomes that each action may have reported while the graph was RUNNING, including
-    passed-on ones."""
+    outcomes that a bypassed action passed on."""
 
     def __init__(
         self,
@@ -205,7 +206,8 @@ class _Reports:
             self._report(name, outcome)
 
     def triggers(self, name: str) -> bool:
-        """Return whether a report runs an action, and all that it waits for have reported."""
+        """Return whether some reported outcome runs this action, and all required parents of the
+        action have reported."""
         if name not in self._run:
             return False
         needed = (each.parent for each in self._arriving.get(name, ()) if each.required)
@@ -220,7 +222,8 @@ class _Reports:
                 yield name, outcome
 
     def _outcomes(self, name: str, state: str) -> _Outcomes:
-        """Return all outcomes with which an action that has begun may have ended."""
+        """Return the outcomes that an action may have reported, which has begun and is now in this
+        state."""
         if name not in self._once or name in self._parts:
             return _ALL
         possible = frozenset[Precondition](
@@ -232,7 +235,8 @@ class _Reports:
         return possible or _ALL
 
     def _is_begun_by(self, arrow: TriggerArrow) -> bool:
-        """Return whether an action has begun, and only this arrow can have run it."""
+        """Return whether the child of this arrow has begun and no other arrow leads to the child,
+        so that this arrow must have run it."""
         begun = self._states.get(arrow.child, "UNINITIALIZED") not in NEVER_BEGAN
         return begun and len(self._arriving[arrow.child]) == 1
 

@@ -13,7 +13,8 @@ export interface EditorApi {
     };
     /**
      * ActionChange
-     * @description An action that was added, removed or changed. `name` is its full name, the newer one.
+     * @description An action that was added, removed or changed. `name`: its full name after the change, or
+     *     before it if the action was removed.
      */
     ActionChange: {
         /** @enum {string} */
@@ -286,8 +287,8 @@ export interface EditorApi {
     };
     /**
      * Difference
-     * @description The difference from the moment `before` to the moment `after`, both numbers of changes of one
-     *     graph's document.
+     * @description The difference between two states of one graph. `before` and `after` are the numbers of the
+     *     document's changes at which the graph was in these states.
      */
     Difference: {
         before: number;
@@ -471,7 +472,8 @@ export interface EditorApi {
     };
     /**
      * Field
-     * @description A field with another value. null stands for no value.
+     * @description A field that has another value than before. `before` or `after` is null if the field had no
+     *     value then.
      */
     Field: {
         field: string;
@@ -1089,9 +1091,10 @@ export interface EditorApi {
     };
     /**
      * NoteChange
-     * @description A note or frame that was added, removed or changed. `text` is its text, the newer one.
+     * @description A note or frame that was added, removed or changed. `text`: its text after the change, or
+     *     before it if the note was removed.
      *
-     *     `moved`: only its position or size has changed.
+     *     `moved`: True if only its position or size has changed.
      */
     NoteChange: {
         /** @enum {string} */
@@ -1392,11 +1395,11 @@ export interface EditorApi {
     };
     /**
      * RelationChange
-     * @description An arrow that was added, removed or changed, between actions by full name, or `entry` and
-     *     `exit`.
+     * @description An arrow that was added, removed or changed. `parent` and `child` are full names of actions,
+     *     or `entry` and `exit`.
      *
-     *     `ends`: the same by their keys. `when`: pairs of outcome and response of an arrow that was added
-     *     or removed.
+     *     `ends`: the keys of parent and child. `when`: pairs of outcome and response of an arrow that was
+     *     added or removed.
      */
     RelationChange: {
         /** @enum {string} */
@@ -1415,7 +1418,7 @@ export interface EditorApi {
     };
     /**
      * Renames
-     * @description Renamed parameters: pairs of old and new path.
+     * @description The parameters that a library has renamed: pairs of the old path and the new path.
      */
     Renames: {
         inputs: [

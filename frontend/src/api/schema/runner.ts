@@ -2,7 +2,8 @@
 export interface RunnerApi {
     /**
      * ActionChange
-     * @description An action that was added, removed or changed. `name` is its full name, the newer one.
+     * @description An action that was added, removed or changed. `name`: its full name after the change, or
+     *     before it if the action was removed.
      */
     ActionChange: {
         /** @enum {string} */
@@ -138,10 +139,10 @@ export interface RunnerApi {
     };
     /**
      * ArrowCoverage
-     * @description The coverage of some courses together.
+     * @description The coverage of a graph by some courses together, as numbers of arrows and of actions.
      *
-     *     `untaken` and `unvisited`: arrows that no course took and actions that ran in none, in file
-     *     order, at most `SHOWN` of each.
+     *     `taken` of `arrows` arrows were taken, `visited` of `actions` actions have run. `untaken` and
+     *     `unvisited` list the others in file order, at most `SHOWN` of each.
      */
     ArrowCoverage: {
         arrows: number;
@@ -353,8 +354,8 @@ export interface RunnerApi {
     };
     /**
      * Difference
-     * @description The difference from the moment `before` to the moment `after`, both numbers of changes of one
-     *     graph's document.
+     * @description The difference between two states of one graph. `before` and `after` are the numbers of the
+     *     document's changes at which the graph was in these states.
      */
     Difference: {
         before: number;
@@ -430,7 +431,8 @@ export interface RunnerApi {
     };
     /**
      * ExpectedStep
-     * @description One step of a course: an event of an action, or of the graph if no action is named.
+     * @description One step of a course: it concerns one action of the graph `graph`, or this graph itself if no
+     *     action is named. `how` is the result, state, response or hazard code that `what` announces.
      */
     ExpectedStep: {
         graph: string;
@@ -441,7 +443,8 @@ export interface RunnerApi {
     };
     /**
      * Field
-     * @description A field with another value. null stands for no value.
+     * @description A field that has another value than before. `before` or `after` is null if the field had no
+     *     value then.
      */
     Field: {
         field: string;
@@ -769,9 +772,10 @@ export interface RunnerApi {
     };
     /**
      * NoteChange
-     * @description A note or frame that was added, removed or changed. `text` is its text, the newer one.
+     * @description A note or frame that was added, removed or changed. `text`: its text after the change, or
+     *     before it if the note was removed.
      *
-     *     `moved`: only its position or size has changed.
+     *     `moved`: True if only its position or size has changed.
      */
     NoteChange: {
         /** @enum {string} */
@@ -782,7 +786,8 @@ export interface RunnerApi {
     };
     /**
      * OutcomeArrow
-     * @description One outcome of an arrow. `parent` and `child` are keys of actions, or `entry` and `exit`.
+     * @description One arrow together with one outcome of its parent. `parent` and `child` are keys of actions,
+     *     or `entry` and `exit`.
      */
     OutcomeArrow: {
         parent: string;
@@ -1035,11 +1040,11 @@ export interface RunnerApi {
     };
     /**
      * RelationChange
-     * @description An arrow that was added, removed or changed, between actions by full name, or `entry` and
-     *     `exit`.
+     * @description An arrow that was added, removed or changed. `parent` and `child` are full names of actions,
+     *     or `entry` and `exit`.
      *
-     *     `ends`: the same by their keys. `when`: pairs of outcome and response of an arrow that was added
-     *     or removed.
+     *     `ends`: the keys of parent and child. `when`: pairs of outcome and response of an arrow that was
+     *     added or removed.
      */
     RelationChange: {
         /** @enum {string} */

@@ -158,8 +158,13 @@ def _begin(
     *,
     elsewhere: bool,
 ) -> None:
-    """Mark the folder; and bring the graphs into a database `elsewhere`, where one transaction does
-    it. Raises CannotStart, and then the folder is as before."""
+    """Write the file `mark`, which says that a restore is under way; then, if `elsewhere`, copy the
+    graphs of the backup into the database `url` in one transaction.
+
+    `folder` holds the unpacked backup. `elsewhere`: the database is no file of the data folder.
+    Nothing is done if an interrupted restore has copied these graphs already. Raises CannotStart if
+    the database cannot be read or the copy fails; `mark` is then as it was before the call.
+    """
     from action_assistant.journal.copies.copying import copy
 
     before = _under(mark)

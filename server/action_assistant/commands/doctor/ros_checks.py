@@ -30,7 +30,12 @@ ROBOTS_S: Final = _PATIENCE_S + 5
 
 
 def robots_answer(place: Installation) -> Iterator[Diagnostic]:
-    """ROS 2 and each registered robot. Takes some seconds where there are any."""
+    """Check ROS 2, and whether each registered robot answers, with the Python that the runner would
+    use. Yield what was found.
+
+    With registered robots this takes some seconds. Nothing is yielded if there is no such Python,
+    since the check of the settings reports that.
+    """
     try:
         interpreter = for_runner()
     except CannotStart:  # told with the settings

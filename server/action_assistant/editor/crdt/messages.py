@@ -214,7 +214,11 @@ def _one_entry(data: bytes) -> PresenceEntry | None:
 
 
 def _short(data: bytes, at: int) -> tuple[int, int]:
-    """A varUint of at most 35 bit, and the place after it. Raises IndexError, also for longer ones."""
+    """Read a variable-length unsigned integer (varUint) of at most five bytes at offset `at`, and
+    return the number with the offset of the byte after it.
+
+    Raises IndexError if the data end within the number, or if the number has more than five bytes.
+    """
     byte = data[at]
     if byte < 128:
         return byte, at + 1

@@ -23,7 +23,12 @@ def places_of(state: bytes) -> dict[Place, Any]:
 
 
 def field_of(root: Root, key: str) -> str:
-    """Return the field of its owner that a key holds."""
+    """Return the name of the field that a key of the document stores, within the action, arrow or
+    note that `owner_of` returns for this key.
+
+    `root` is the top-level map that has the key. The field of `ID|type` is `type`; the field of
+    `ID` alone in `actions` is an empty text.
+    """
     if root == "meta":
         return key
     if root == "positions":

@@ -111,7 +111,12 @@ async def _keep_up(journal: Journal, mark: Path) -> None:
 
 
 async def _remember(journal: Journal, mark: Path) -> None:
-    """Write the mark. Without it only less is noticed, so that nothing fails for it."""
+    """Write the position and chain of the log's newest event into the file `mark`, by which the
+    next start notices that the log went back.
+
+    A failure is only logged: without a new mark, the next start notices less and nothing else
+    breaks.
+    """
     try:
         position = await journal.position()
         text = msgspec.json.encode(EpochMark(position, await _chain(journal, position)))

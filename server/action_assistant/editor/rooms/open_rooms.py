@@ -93,7 +93,8 @@ class Rooms:
             room.graph_exists = False
 
     def expel(self, stream: str) -> None:
-        """Close all sockets of a graph that was deleted, also those that are being opened."""
+        """Close all sockets of the graph with this stream, which was deleted. Sockets that are
+        still being opened are closed, too."""
         self._deleted.add(stream)
         self.check_existence(stream)
         room = self._rooms.get(stream)

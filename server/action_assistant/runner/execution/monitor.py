@@ -132,8 +132,12 @@ class Monitor:
         self.sends(umrf)
 
     def sends(self, umrf: str, *, beside: bool = False) -> None:
-        """Note that this graph is handed over: the next answer is compared with it. `beside`: an action
-        of it is started beside those that go on."""
+        """Note that the runner now sends this graph (its UMRF text) to the engine, so that the
+        engine's next answer is compared with it.
+
+        `beside`: the graph runs already, and one of its actions is started while other actions go
+        on.
+        """
         self._loading.sends(umrf, beside=beside)
         if beside:  # what begins when that arrives has no thread yet
             self._threads = EngineThreads()

@@ -345,8 +345,8 @@ def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:
 
 
 def decode(kind: str, body: bytes) -> RunEvent:
-    """Decode a stored body; an unknown kind gives `Unknown`. Raises msgspec.DecodeError when the
-    body does not match its kind."""
+    """Decode the stored body of an event of this kind; return `Unknown` if the kind is not known.
+    Raises msgspec.DecodeError if the body does not match its kind."""
     known = _DECODERS.get(kind)
     try:
         return Unknown() if known is None else known.decode(body)

@@ -281,7 +281,8 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
 
 
 def with_newest_visits(run: Run) -> Run:
-    """Return the run without the visits that `run_view` leaves out."""
+    """Return the run with only the newest visits of each action, as many as `run_view` shows. The
+    visits left out are counted in the action's `older`."""
     most = _most(run, _LIVE)
     actions = {
         name: replace(

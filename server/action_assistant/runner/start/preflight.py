@@ -139,7 +139,9 @@ def refusal_item(code: str, refused: Refused) -> Item:
 
 
 def graph_item(admitted: Admitted | Prepared) -> Item:
-    """Return the item for an admitted graph: passed, or with warnings and overridden errors."""
+    """Return the item of the preflight list for the graph itself: passed, or warned if it has loud
+    warnings or errors that were overridden. The graph was admitted, so the item is never a
+    refusal."""
     warned = tuple(each for each in admitted.problems if each.severity == "warning")[:_SHOWN]
     overridden = tuple(each for each in admitted.problems if each.severity == "error")[:_SHOWN]
     if overridden:

@@ -21,11 +21,12 @@ MOST: Final = 20_000
 
 
 class Concurrency:
-    """Answers which actions can run at the same time.
+    """Finds which actions can run at the same time.
 
-    `runs`: the actions that can run. `reports`: the outcomes that each action, or the entry, can
-    report, its own or those that it passes on when it is bypassed. `known`: True if the graph was
-    followed; if not, any action that can run may run at any time.
+    `runs`: the keys of the actions that can run. `reports`: the outcomes that each action, or the
+    entry, can report, by key; an action reports its own outcomes, and passes others on when it is
+    bypassed. `known` is False if the graph is too large to be followed; then any two actions that
+    can run may run together.
     """
 
     def __init__(
@@ -62,7 +63,8 @@ class Concurrency:
 
     @property
     def known(self) -> bool:
-        """True if the graph was followed completely."""
+        """True if the graph was followed completely; False if it has too many actions or pairs of
+        actions."""
         return self._pairs <= PAIRS
 
     def may_run(self, key: Key, other: Key) -> bool:
@@ -74,11 +76,11 @@ class Concurrency:
     def running_after(
         self, key: Key, outcome: Precondition, waited: Iterable[Key] = ()
     ) -> set[Key]:
-        """Return the actions that may run just after `key` reported this outcome, including those
-        that it starts.
+        """Return the keys of the actions that may run just after `key` has reported this outcome,
+        including actions that this outcome starts. `key` itself is not among them.
 
-        `waited`: actions that have reported, too. For a graph that was not followed, this is any
-        action that can run.
+        `waited`: other actions that have reported before. If the graph was not followed, all
+        actions that can run are returned.
         """
         if outcome not in self._reports.get(key, ()):
             return set()
@@ -90,15 +92,16 @@ class Concurrency:
         return {self.keys[index] for index in nodes_in(mask)} - {key}
 
     def may_run_at(self, key: Key, other: Key, outcome: Precondition) -> bool:
-        """Return whether `key` can be running when `other` reports this outcome."""
+        """Return whether `key` can be running at the moment at which `other` reports this outcome."""
         if key not in self._runs or outcome not in self._reports.get(other, ()):
             return False
         return not self.known or bool(self._when(other, outcome) >> self.index[key] & 1)
 
     def may_outlast(self, key: Key, outcome: Precondition) -> bool:
-        """Return whether `key` itself may continue when it reports this outcome.
+        """Return whether `key` may still run after it has itself reported this outcome.
 
-        A spontaneous action begins again, and a bypassed action may be running.
+        A spontaneous action begins again, and an action that is bypassed while it runs passes the
+        outcome on.
         """
         if key not in self._runs or outcome not in self._reports.get(key, ()):
             return False
@@ -118,29 +121,26 @@ class Concurrency:
 
     @cached_property
     def _first(self) -> Mask:
-        """Return, as a mask, the actions with which the graph begins."""
+        """Return, as a mask, the actions that the entry starts."""
         indices = {index for index in self._children(ENTRY) if self.keys[index] in self._runs}
         return sum(1 << index for index in indices)
 
     @cached_property
     def _needs(self) -> list[Mask]:
-        """Return for each action, as a mask, the required parents for which it waits."""
+        """Return for each action, as a mask, the required parents for which this action waits."""
         listed = (self._required.get(key, ()) for key in self.keys)
         return [sum(1 << self.index[each] for each in set(own)) for own in listed]
 
     @cached_property
     def _after(self) -> list[Mask]:
-        """Return for each action, as a mask, the actions to which a path of arrows leads from
-        it."""
+        """Return for each action, as a mask, the actions that paths of arrows from this action
+        reach."""
         return reachable([self._children(key) for key in self.keys])
 
     @cached_property
     def _repeated(self) -> Mask:
-        """Return, as a mask, the actions that may have reported and run again although no path
-        leads back to them.
-
-        They are started by several parents, or by a loop.
-        """
+        """Return, as a mask, the actions that may have reported and then run again although no path
+        of arrows leads back to them: several parents, or an action on a loop, start them."""
         found = 0
         for index, after in enumerate(self._after):
             if after >> index & 1:
@@ -156,8 +156,8 @@ class Concurrency:
         return found
 
     def _beside(self, required: Key) -> Mask:
-        """Return the actions that may run when this one has reported and an action that waits for
-        it begins."""
+        """Return, as a mask, the actions that may run at the moment at which `required` has
+        reported and a child that waits for `required` begins."""
         index = self.index[required]
         found = self._whenever(required) | self._after[index] | self._repeated & 1 << index
         # A bypass takes no time: successors of the actions that run then come after it has reported.
@@ -166,7 +166,8 @@ class Concurrency:
         return found
 
     def _behind(self, mask: Mask) -> Mask:
-        """Return the actions that come after any of these, along arrows."""
+        """Return, as a mask, the actions that paths of arrows reach from any action of the given
+        mask."""
         found = self._behind_kept.get(mask)
         if found is None:
             found = 0
@@ -186,7 +187,8 @@ class Concurrency:
                 yield relation, "run" if run else relation.conditions.answer(outcome)
 
     def _started(self, key: Key, outcome: Precondition) -> Mask:
-        """Return the actions that an end starts at its instant, also by way of bypasses."""
+        """Return, as a mask, the actions that are started at once when `key` reports this outcome,
+        directly or by bypasses."""
         if key == ENTRY:
             return self._first
         if outcome not in self._starts:
@@ -194,10 +196,11 @@ class Concurrency:
         return self._starts[outcome][self.index[key]]
 
     def _all_started(self, outcome: Precondition) -> list[Mask]:
-        """Return the actions that the end of each action starts with this outcome.
+        """Return for each action, as a mask, the actions that are started at once when it reports
+        this outcome.
 
-        Bypasses are the edges of the searched graph; started actions are its ends, numbered after
-        the last action.
+        Bypasses are the edges of the graph that is searched; started actions are its ends, numbered
+        after the last action.
         """
         count = len(self.keys)
         ways: list[list[int]] = []
@@ -228,14 +231,14 @@ class Concurrency:
                     self._joins.add(child)
 
     def _around(self, key: Key, outcome: Precondition) -> Mask:
-        """Return the actions that already run when an action reports; a spontaneous one continues
-        itself."""
+        """Return, as a mask, the actions that run already when `key` reports this outcome. A
+        spontaneous action is itself among them."""
         own = 1 << self.index[key] if key in self._lively else 0
         return own | self._when(key, outcome)
 
     def _join(self, child: Key) -> None:
-        """Follow the parents of an action again, since more may run beside it than was known when
-        they were followed."""
+        """Follow the parents of an action again, since more actions may run beside this action than
+        was known when they were followed."""
         for relation in self._subject.incoming.get(child, []):
             for outcome in self._reports.get(relation.parent, ()):
                 run = relation.parent == ENTRY or relation.conditions.answer(outcome) == "run"
@@ -278,10 +281,10 @@ class Concurrency:
         self._pairs += looked_at
 
     def _is_ready(self, key: Key, parent: Key, beside: int) -> bool:
-        """Return whether an action that the same end would start can begin while the action
-        `beside` (an index) runs.
+        """Return whether `key` can begin when `parent` ends, while the action with the index
+        `beside` runs.
 
-        All other actions that it waits for have to have reported by then.
+        The other required parents of `key` must have reported by then.
         """
         listed = self._required.get(key, ())
         again = self._after[beside] | self._repeated
@@ -293,7 +296,8 @@ class Concurrency:
         )
 
     def _again(self, key: Key) -> None:
-        """Follow an action again, since more runs beside it than was known."""
+        """Queue an action to be followed again, since more actions may run beside it than was
+        known."""
         if key not in self._waiting and key in self._reports:
             self._waiting.add(key)
             self._open.append(key)

@@ -47,9 +47,11 @@ def check_spontaneous(subject: Subject) -> None:
 def check_instant_loops(
     subject: Subject, runs: Collection[Key], reports: Mapping[Key, Collection[Precondition]]
 ) -> None:
-    """Report loops that would block the engine if they took no time (H5).
+    """Report each loop of actions, none of which is declared to take time (H5): if all its actions
+    end at once, the engine blocks itself and obeys no stop.
 
-    `runs`: the actions that can run; `reports`: the outcomes with which they can end.
+    `runs`: keys of the actions that can run; a loop with any other action is not reported.
+    `reports`: the outcomes with which each action can end, by key.
     """
     if "H5" not in subject.facts.hazards:
         return
@@ -80,7 +82,7 @@ def _takes_time(action: Action) -> bool:
 
 
 def _leading_to(subject: Subject, keys: set[Key]) -> set[Key]:
-    """Return all actions from which a path leads to one of these, and these themselves."""
+    """Return the given actions, and all actions from which a path of arrows leads to any of them."""
     found = set(keys)
     stack = list(keys)
     while stack:
@@ -94,8 +96,8 @@ def _leading_to(subject: Subject, keys: set[Key]) -> set[Key]:
 def loops(
     subject: Subject, follows: Callable[[Relation], bool] = lambda _: True
 ) -> list[list[Key]]:
-    """Return the actions that lie on loops, by loop or group of connected loops, along the relations that
-    `follows` accepts."""
+    """Return groups of actions that lie on loops: each group is one loop, or several loops that
+    share actions. Only arrows that `follows` accepts are followed."""
     number = {action.key: place for place, action in enumerate(subject.real)}
     ways = [
         [number[r.child] for r in subject.outgoing.get(key, []) if r.child in number and follows(r)]
@@ -109,8 +111,8 @@ def loops(
 
 
 def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> None:
-    """Report all problems of the flow. `nested`: the names of actions that are graphs
-    themselves."""
+    """Report all problems of the graph's flow from entry to exit. `nested`: names of actions that
+    are sub-graphs."""
     _check_sides(subject)
     if not subject.real:
         subject.report(
@@ -156,7 +158,7 @@ def _check_sides(subject: Subject) -> None:
 
 
 def _check_bypasses(subject: Subject, reachability: "Reachability") -> None:
-    """Report the bypasses that can happen (H3), as one problem."""
+    """Report all bypasses that can happen as one problem (H3), on an engine that has this hazard."""
     if "H3" not in subject.facts.hazards or subject.facts.bypass_fixed:
         return
     found: list[tuple[Relation, list[Precondition]]] = []
@@ -182,11 +184,11 @@ def _check_bypasses(subject: Subject, reachability: "Reachability") -> None:
 
 
 class Reachability:
-    """Finds the actions that can run and the outcomes that each can report, as far as arrows and
-    outcomes tell.
+    """Finds the actions that can run and the outcomes that each can report, judged by arrows and
+    outcomes alone, without values.
 
-    `runs`: actions that can run; `reports`: outcomes that each of them, or the entry, can report;
-    `asked`: actions that can be asked at all.
+    `runs`: actions that can run. `reports`: the outcomes that each action, or the entry, can
+    report. `asked`: actions to which an arrow leads from any action that can report.
     """
 
     def __init__(self, subject: Subject) -> None:
@@ -280,8 +282,11 @@ def _check_waiting(subject: Subject, reachability: Reachability) -> None:
 def _report_missed_join(
     subject: Subject, key: Key, missing: list[Relation], net: dict[Key, int]
 ) -> None:
-    """Report required parents that never report. `net`: the number of the group of loops in which
-    an action lies."""
+    """Report each relation of `missing`: its parent is required and never reports, so that the
+    action `key` never runs.
+
+    `net`: for each action on a loop, the number of its group of loops.
+    """
     action = subject.actions[key]
     for relation in missing:
         parent = subject.name(relation.parent)

@@ -37,9 +37,11 @@ def check_responses(
     concurrency: Concurrency,
     nested: Container[str] = frozenset(),
 ) -> None:
-    """Report responses that reach a child in the wrong state (H4, H5).
+    """Report responses that may reach a child in a state in which the engine aborts or does nothing
+    (H4, H5).
 
-    `nested`: names of actions that are graphs themselves, which run as soon as they are told to.
+    `reports`: the outcomes that each action can report, by key. `nested`: names of actions that are
+    sub-graphs; a sub-graph runs without loading first.
     """
     killed: set[Key] = set()
     for key, relations in subject.incoming.items():
@@ -80,7 +82,8 @@ def check_responses(
 def _asking(
     relations: list[Relation], reports: _Reports
 ) -> dict[str, set[tuple[Key, Precondition]]]:
-    """Return for each response the parents that can ask for it, with the outcome."""
+    """Return, for each response, the parents that can ask the child for this response, each with
+    the outcome that makes it ask."""
     found: dict[str, set[tuple[Key, Precondition]]] = {}
     for relation in relations:
         reported = reports.get(relation.parent, ())
@@ -126,11 +129,12 @@ def check_loading(
     concurrency: Concurrency,
     nested: Container[str] = frozenset(),
 ) -> None:
-    """Report ends that halt the graph beside an action that may still load (H14), as one problem.
+    """Report as one problem (H14) all ends of actions that halt the graph while another action may
+    still load.
 
-    `nested` as in `check_responses`. Of ends with on_error only those are reported that start an action
-    and halt the graph themselves: every graph that ignores the errors of one branch would have the
-    others, and an action would have to fail while another one loads.
+    `reports` and `nested` are as in `check_responses`. An end with on_error is reported only if it
+    starts an action and halts the graph by itself: otherwise every graph that ignores the errors of
+    one branch would get this problem, though an action would have to fail while another one loads.
     """
     if "H14" not in subject.facts.hazards:
         return
@@ -173,9 +177,11 @@ def check_loading(
 def _failing_starts(
     subject: Subject, reports: _Reports, runs_at_once: Container[Key]
 ) -> Iterator[tuple[Action, Key, set[Key]]]:
-    """Yield the actions that fail, start others and bypass one after which nothing follows.
+    """Yield each action whose end with on_error starts other actions and bypasses one action after
+    which nothing follows.
 
-    With each comes the bypassed action and the set of started ones: those that wait for nothing else.
+    With it come the key of the bypassed action and the keys of the started actions that wait for no
+    other parent.
     """
     for action in subject.real:
         if "on_error" not in reports.get(action.key, ()):
@@ -196,10 +202,10 @@ def _failing_starts(
 
 
 def check_endless(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
-    """Report spontaneous actions that continue when the graph is FINISHED (H12), as one problem.
+    """Report as one problem (H12) all spontaneous actions that continue when the graph is FINISHED.
 
-    They begin again and again, and no stop reaches them. It is an error if this happens when all
-    actions end with on_true.
+    They begin again and again, and no stop reaches them. The problem is an error if this happens
+    even when all actions end with on_true, else a warning.
     """
     lively = {action.key for action in subject.real if action.type == "spontaneous"}
     if "H12" not in subject.facts.hazards or not lively:
@@ -240,8 +246,11 @@ def _going_on(
     lively: Collection[Key],
     concurrency: Concurrency,
 ) -> set[Key]:
-    """Return the spontaneous actions that may continue after this arrow has led to the exit with
-    this outcome."""
+    """Return the keys of spontaneous actions that may continue after the parent of this arrow has
+    reported this outcome and the arrow has led to the exit.
+
+    `lively`: the keys of all spontaneous actions.
+    """
     parent = relation.parent
     if relation.conditions.answer(outcome) == "ignore":
         return set()
@@ -259,10 +268,11 @@ def _full_names(subject: Subject, keys: Collection[Key]) -> set[str]:
 
 
 def _endless_when_well(graph: Graph) -> set[str]:
-    """Return the spontaneous actions that continue after all actions have ended with on_true and
-    the graph is FINISHED.
+    """Return the full names of the spontaneous actions that continue after all other actions have
+    ended with on_true and the graph is FINISHED.
 
-    Only those count that do so whichever of two concurrent actions is quicker.
+    An action is returned only if it continues in both simulated orders, in which the earlier or the
+    later of two concurrent actions ends first.
     """
     found: list[set[str]] = []
     for slower_first in (False, True):
@@ -274,10 +284,11 @@ def _endless_when_well(graph: Graph) -> set[str]:
 
 
 class _EarlyExit(msgspec.Struct, frozen=True):
-    """An arrow to the exit that does not wait for actions which may still run.
+    """An arrow to the exit that may finish the graph while other actions still run.
 
-    `left`: those actions. `bypassed`: the outcomes for which the arrow waits for nobody. `started`:
-    the parent starts them itself when it ends.
+    `left`: the keys of these actions. `bypassed`: the outcomes by which the arrow bypasses the
+    exit, so that the exit waits for no other parent. `started`: True if the arrow's parent starts
+    actions of `left` when it ends.
     """
 
     relation: Relation
@@ -287,8 +298,8 @@ class _EarlyExit(msgspec.Struct, frozen=True):
 
 
 def check_stragglers(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
-    """Report arrows to the exit by which a graph is FINISHED while other actions may still run
-    (H12), as one problem."""
+    """Report as one problem (H12) all arrows to the exit by which the graph is FINISHED while other
+    actions may still run."""
     if "H12" not in subject.facts.hazards:
         return
     incoming = [r for r in subject.incoming.get(EXIT, []) if not r.listing]
@@ -371,7 +382,8 @@ def _begun(subject: Subject, key: Key, outcome: Precondition) -> set[Key]:
 
 
 def _comes_after(subject: Subject, key: Key, others: list[Key]) -> bool:
-    """Return whether one of the others that the exit waits for can only come after this action."""
+    """Return whether any of the `others`, for which the exit waits, can only be reached from the
+    entry through the action `key`."""
     if not others:
         return False
     seen, stack = {ENTRY}, [ENTRY]

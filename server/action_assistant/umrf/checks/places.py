@@ -27,8 +27,9 @@ from action_assistant.umrf.reports import MAX_EACH, ProblemList
 class Subject:
     """A graph under examination, indexed, with the problems found so far.
 
-    `paths`: JSON pointers of actions. `parents` and `children`: relations as the file lists them,
-    by child and by parent. `incoming` and `outgoing`: those of them that the engine follows.
+    `paths`: the JSON pointer of each action, by key. `parents` and `children`: the relations that
+    the file lists, by the key of their child and by the key of their parent. `incoming` and
+    `outgoing`: the relations that the engine follows, by the same keys.
     """
 
     def __init__(self, graph: Graph, facts: EngineFacts) -> None:
@@ -70,8 +71,8 @@ class Subject:
         return self._problems.found
 
     def place(self, relation: Relation) -> tuple[int, int]:
-        """Return the position of a relation in the file: the number of the child, and the number
-        within its `parents`."""
+        """Return two numbers by which relations are sorted in the order of the file: the index of
+        the child's action, and the index of the relation within the child's `parents`."""
         path = self.parent_paths.get(id(relation), "")
         numbers = [int(part) for part in path.split("/") if part.isdigit()]
         return (numbers[0], numbers[-1]) if numbers else (0, 0)
@@ -91,15 +92,20 @@ class Subject:
         listed.append(relation)
 
     def fix_of_input(self, action: Action, name: str) -> str | None:
-        """Return the fix for an input that has no value: to take its example, if that fits; else
-        None."""
+        """Return `take-example`, the name of the fix that gives an input its declared example as
+        value; None if the input has no example, or one that does not fit its type and allowed
+        values.
+
+        `name` is the flat name of the input. The caller knows that the input has no value.
+        """
         if action.key not in self._texts:
             self._texts[action.key] = {p.path: p.text for p in action.inputs}
         text = self._texts[action.key].get(self.path_of(action, name), "null")
         return "take-example" if example_of(text) is not None else None
 
     def path_of(self, action: Action, name: str) -> str:
-        """Return the path of a parameter by its flat name."""
+        """Return the path of the parameter that has this flat name; the name itself if the action
+        has no such parameter."""
         if action.key not in self._flat:
             every = (*action.inputs, *action.outputs)
             self._flat[action.key] = {flat_name(p.path): p.path for p in reversed(every)}
@@ -110,7 +116,8 @@ class Subject:
         return relation.only is None and not any(end and end.missing for end in ends)
 
     def name(self, key: Key) -> str:
-        """Return the name of one end of a relation for a message."""
+        """Return the words by which a message calls an action: its full name, or "the entry" or
+        "the exit" for a key of an end."""
         match key:
             case "entry":
                 return "the entry"
@@ -133,13 +140,14 @@ class Subject:
         also: Iterable[Relation] = (),
         inside: PlaceInside | None = None,
     ) -> None:
-        """Add a problem of the graph, of an action or of a relation.
+        """Add a problem that concerns an action, a relation, or, without either, the whole graph.
 
-        `member` is a pointer below that place, `side` names the list in which a relation is meant.
+        `member` is the JSON pointer of the faulty value below that action, relation or graph.
+        `side` is the list in which the relation is shown, since a file lists each relation twice.
         `also`: other relations with the same problem. `inside`: the place in the sub-graph for
         which the action stands.
 
-        Only the first `MAX_EACH` of one code and severity are kept.
+        Only the first `MAX_EACH` problems of one code and severity are kept.
         """
         if not self._problems.has_room(severity, code):
             return
@@ -173,17 +181,18 @@ class Subject:
 
 
 def joined(names: set[str]) -> str:
-    """Return names for a sentence, without quotes: a name in quotes stands at the place of the
-    problem."""
+    """Join names with commas for a sentence, without quotes: only a name that is written at the
+    place of the problem is quoted (`quoted`)."""
     return ", ".join(sorted(names))
 
 
 def quoted(names: set[str]) -> str:
-    """Return names for a sentence in quotes, which stand at the place of its problem."""
+    """Join names with commas, each in quotes, for a sentence about a problem at whose place these
+    names are written."""
     return ", ".join(f"“{name}”" for name in sorted(names))
 
 
 def more(count: int, one: str, many: str) -> str:
-    """Return the end of a message that is reported for several places at once; empty if `count` is
-    0."""
+    """Return the end of a message about a problem that is reported once for several places: how
+    many more there are, named `one` or `many`. Empty if `count` is 0."""
     return f" {count:,} more {one if count == 1 else many} of this kind." if count > 0 else ""

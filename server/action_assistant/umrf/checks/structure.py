@@ -26,7 +26,8 @@ TYPES: Final = ("sync", "async", "spontaneous")
 
 
 def check_structure(subject: Subject) -> None:
-    """Report all problems of the structure."""
+    """Report all problems of the structure: names, numbers, types, fields and relations that the
+    engine refuses or misreads."""
     graph = subject.graph
     for field, text in graph.extra:
         _check_known(subject, field, parse_small(text), f"/{field}", None)
@@ -62,7 +63,8 @@ def _check_known(
 
 
 def _check_number(value: Json) -> tuple[str, Severity, str] | None:
-    """Return code, severity and message for an `instance_id` that is not valid, else None."""
+    """Return code, severity and message for an `instance_id` that is not valid; None for a valid
+    one."""
     if whole_of(value)[1]:
         return None
     if isinstance(value, Number):
@@ -201,7 +203,7 @@ def _check_parent_field(subject: Subject, relation: Relation, field: str, value:
 
 
 def _check_conditions(subject: Subject, relation: Relation, value: Json) -> None:
-    """Report conditions that the engine refuses, each at its own place."""
+    """Report each condition of a list that the engine refuses, at its own place in the list."""
     if not isinstance(value, list):
         message = "“conditions” must be a list of texts; the engine refuses the graph."
         subject.report(

@@ -41,7 +41,8 @@ _REACHES_OUT: Final = frozenset({"H4", "H5", "H8", "H12", "H14"})
 
 @dataclass(frozen=True)
 class _Finding:
-    """A problem of a sub-graph or of one inside it. `place` leads there from the sub-graph."""
+    """A problem inside a sub-graph, at any depth. `place` names the levels from the sub-graph down
+    to the problem."""
 
     severity: Severity
     place: PlaceInside
@@ -49,9 +50,10 @@ class _Finding:
 
 @dataclass(frozen=True)
 class _Inner:
-    """The findings about one sub-graph, computed once for all actions that stand for it.
+    """The results of the check of one sub-graph, computed once for all actions that stand for it.
 
-    `halted`: in which case the graph ends HALTED, and whether it always does.
+    `halted`: in which case the sub-graph ends HALTED (in words), and whether it always does; None
+    if no trial does.
     """
 
     signature: Signature
@@ -61,11 +63,11 @@ class _Inner:
 
 @dataclass(frozen=True)
 class Resolution:
-    """The way in which names were resolved to graphs.
+    """Facts about how the names of sub-graphs were resolved to graphs.
 
-    `several`: names of more than one graph, of which the oldest was taken. `cut`: there are more
-    graphs inside than were examined. `hidden`: names of a graph that an action of the library has,
-    too.
+    `several`: names that more than one graph has, of which the oldest was taken. `cut`: True if
+    more graphs are inside than were examined. `hidden`: names that both a graph and an action of
+    the library have.
     """
 
     several: Container[str] = frozenset()
@@ -79,8 +81,8 @@ CERTAIN: Final = Resolution()
 
 @dataclass(frozen=True)
 class _Graphs:
-    """The graphs by name, the names of actions that take precedence over them, and the findings
-    about each graph."""
+    """The graphs by name, the names of actions that take precedence over graphs of the same name
+    (`known`), and the results of the check of each graph."""
 
     by_name: Mapping[str, Graph]
     known: Container[str]
@@ -89,18 +91,19 @@ class _Graphs:
     _recurring: dict[tuple[str, str], bool] = field(default_factory=dict)
 
     def of(self, name: str) -> Graph | None:
-        """Return the graph that an action of this name stands for, or None."""
+        """Return the graph for which an action of this name stands; None if it stands for no graph."""
         return None if name in self.known else self.by_name.get(name)
 
     def is_hidden(self, name: str) -> bool:
-        """Return whether an action takes precedence over a graph of that name."""
+        """Return whether a graph has this name that no action can use, since an action of the
+        library has the same name."""
         return name in self.resolution.hidden or (name in self.known and name in self.by_name)
 
     def recurs(self, name: str, within: str) -> bool:
-        """Return whether the graph of an action of that name contains itself, or the graph `within`
-        which the action is.
+        """Return whether the graph with this name contains itself, or contains the graph `within`
+        in which an action stands for it.
 
-        Only the names that actions use count; the name in a graph's own text decides nothing.
+        The names by which actions use graphs count; the name in a graph's own text does not.
         """
         if (name, within) not in self._recurring:
             self._recurring[name, within] = name == within or self._reaches(name, {name, within})
@@ -123,10 +126,10 @@ class _Graphs:
         return (name for name in real if self.of(name) is not None)
 
     def inmost_first(self, top: Graph) -> Iterator[str]:
-        """Yield the name of every graph inside that does not recur, after those of all graphs
-        inside it.
+        """Yield the name of each graph inside `top` that does not contain itself, the innermost
+        graphs first.
 
-        Iterative, since a hierarchy may be deeper than Python's stack.
+        The search is iterative, since a hierarchy may be deeper than Python's stack.
         """
         seen: set[str] = set()
         levels = [(top.name, self._inside(top))]
@@ -148,8 +151,8 @@ def check_subgraphs(
     known: Container[str] = frozenset(),
     resolution: Resolution = CERTAIN,
 ) -> None:
-    """Report all problems of sub-graphs. `known`: names of actions, which take precedence over
-    graphs of the same name."""
+    """Report all problems of the sub-graphs. `graphs`: the indexed graphs by name. `known`: names
+    of actions, which take precedence over graphs of the same name."""
     if resolution.cut:
         message = (
             "There are more graphs inside this one than are examined. Deeper graphs were not checked, "
@@ -164,8 +167,8 @@ def check_subgraphs(
 
 
 def _check_each(subject: Subject, within: str, graphs: _Graphs) -> None:
-    """Report how the sub-graphs of one graph affect it. `within`: the name by which that graph is
-    called."""
+    """Report how each sub-graph of one graph affects this graph. `within`: the name by which the
+    graph around uses it."""
     for action in subject.real:
         graph = graphs.of(action.name)
         if graph is None:
@@ -194,7 +197,7 @@ def _check_each(subject: Subject, within: str, graphs: _Graphs) -> None:
 
 
 def _report(subject: Subject, action: Action, graph: Graph, found: _Inner) -> None:
-    """Report the findings about a sub-graph at the action that stands for it."""
+    """Report the results of the check of a sub-graph at the action that stands for this sub-graph."""
     own = slots_of(action.inputs), slots_of(action.outputs)
     check_signature(subject, action, found.signature, *own)
     for each in found.findings:
@@ -225,8 +228,8 @@ def _sentence(severity: Severity, place: PlaceInside) -> str:
 
 
 def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container[str]) -> None:
-    """Report sub-graphs that an engine has used up when it comes to them. Each engine resolves its
-    own actions."""
+    """Report sub-graphs that an engine has used already when it comes to them a second time. Each
+    engine (actor) resolves only its own actions."""
     reported: set[tuple[Key, str]] = set()
     for actor in sorted({action.actor for action in subject.real} - {""}) or [""]:
 
@@ -248,7 +251,8 @@ def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container
 
 
 def _inner(name: str, facts: EngineFacts, graphs: _Graphs) -> _Inner:
-    """Check a sub-graph; the graphs inside it were checked before."""
+    """Check one sub-graph, and return the results. The graphs inside it must have been checked
+    before."""
     graph = graphs.by_name[name]
     inside = Subject(with_inputs(graph), facts)
     check_structure(inside)
@@ -263,13 +267,13 @@ def _inner(name: str, facts: EngineFacts, graphs: _Graphs) -> _Inner:
 
 
 def _stays(finding: _Finding) -> bool:
-    """Return whether a finding already says that the sub-graph may not end."""
+    """Return whether this finding already says that the sub-graph may never end."""
     return finding.severity == "error" or finding.place.code == "H8"
 
 
 def _findings(inside: Subject) -> tuple[_Finding, ...]:
-    """Return the worst problems of a sub-graph: its errors, else the first of each kind that
-    affects the graph around it."""
+    """Return the findings about a sub-graph for the graph around it: its errors, the final ones
+    first; without errors, the first problem of each code that affects the graph around."""
     problems = sorted(inside.problems, key=rank)
     errors = [each for each in problems if each.severity == "error"]
     errors.sort(key=lambda each: each.code not in FINAL)  # final errors are always among them
@@ -287,9 +291,10 @@ def _findings(inside: Subject) -> tuple[_Finding, ...]:
 
 
 def _finding(inside: Subject, problem: Problem, left: int = 0) -> _Finding:
-    """Return a problem of a sub-graph as a finding for the graph around it.
+    """Return a problem of a sub-graph as a finding for the graph around.
 
-    It stands for `left` further problems, and a problem from deeper inside keeps its place.
+    `left`: how many further problems this finding stands for. A problem from a deeper graph keeps
+    its place there.
     """
     place = problem.inside or PlaceInside(
         levels=(),

@@ -28,8 +28,8 @@ _OTHERWISE: Final[tuple[Precondition, ...]] = ("on_false", "on_error")
 
 
 class Trial(msgspec.Struct, frozen=True):
-    """One course that was tried. `action`: the action that ends with `outcome` the first time; None
-    in the baseline course."""
+    """One course that was tried, and how it ends. `action`: the action whose first run ends with
+    `outcome` while all others end with on_true; None in the baseline course, where all do."""
 
     action: Action | None
     outcome: str
@@ -37,17 +37,19 @@ class Trial(msgspec.Struct, frozen=True):
 
     @property
     def when(self) -> str:
-        """The condition of the trial in words, for the beginning of a sentence."""
+        """The condition of this trial in words, as the beginning of a sentence: "If NAME ends with
+        OUTCOME"."""
         if self.action is None:
             return "If all goes well"
         return f"If {self.action.full_name} ends with {self.outcome}"
 
 
 class Coverage(msgspec.Struct, frozen=True, kw_only=True):
-    """The extent of the trials: `tried` courses of `ways`.
+    """The number of courses that were tried (`tried`), of all courses that make a difference
+    (`ways`).
 
-    `cut`: how many of them were followed for four laps only. `first_left`: the first course that
-    was not tried.
+    `cut`: how many of the tried courses were followed for four laps only. `first_left`: the first
+    course that was not tried, in words.
     """
 
     ways: int = 0
@@ -57,8 +59,8 @@ class Coverage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Trials:
-    """All trial courses of one graph. `slower_first`: of two concurrent actions, the later one in
-    the file ends first."""
+    """Iterates over all trial courses of one graph. `slower_first`: if two actions run
+    concurrently, the later one in the file ends first."""
 
     def __init__(self, graph: Graph, *, slower_first: bool = False) -> None:
         self.graph = graph
@@ -89,7 +91,7 @@ class Trials:
             yield self._noted(Trial(self.actions[self.net.names[index]], outcome, end))
 
     def coverage(self) -> Coverage:
-        """Return how much was tried, once the iteration is over."""
+        """Return how many courses were tried. Call it after the iteration has ended."""
         ways = 1 + len(self._others)
         return Coverage(ways=ways, tried=self._tried, cut=self._cut, first_left=self._left)
 
@@ -114,10 +116,11 @@ class Trials:
         return end
 
     def _meant(self) -> list[tuple[int, Precondition]]:
-        """Return the deviations that can make a difference.
+        """Return the deviations (index of an action, outcome of its first run) that can make a
+        difference.
 
-        These are outcomes that a child answers otherwise, that a bypass passes on, or whose missing
-        outputs matter.
+        A deviation does so if a child responds to this outcome otherwise than to on_true, if a
+        bypass passes the outcome on, or if the outputs that a failed action lacks matter.
         """
         found: list[tuple[int, Precondition]] = []
         for index, row in enumerate(self.net.edges):
@@ -169,8 +172,8 @@ def _report_left(subject: Subject, coverage: Coverage) -> None:
 
 
 class _Waiting:
-    """Reports the actions that wait without end inside the graph, each once, with the first trial
-    that leads there."""
+    """Reports each action that waits for ever inside the graph once, with the first trial that
+    makes it wait."""
 
     def __init__(self, subject: Subject, net: Network) -> None:
         self.subject = subject
@@ -180,7 +183,8 @@ class _Waiting:
         self._firsts: dict[int, int] = {}  # many trials leave the same actions waiting
 
     def report(self, trial: Trial) -> bool:
-        """Report a stuck trial, and return True; return False if only the exit waits."""
+        """Report a trial after which the graph is stuck, and return True. Return False without a
+        report if only the exit waits."""
         inside = trial.end.waiting & ~(1 << self.net.exit)
         if not inside and trial.end.waiting:
             return False
@@ -196,7 +200,8 @@ class _Waiting:
         return True
 
     def _first(self, waiting: int) -> int:
-        """Return the first waiting action that waits for no other waiting action."""
+        """Return the index of the first waiting action that waits for no other waiting action.
+        `waiting` is a mask."""
         if waiting not in self._firsts:
             for_others, rest = 0, waiting
             while rest:
@@ -224,7 +229,8 @@ class _Waiting:
 
 
 def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
-    """Report each parent that the exit misses and each action whose outputs it misses, once."""
+    """Report once each parent for which the exit waits for ever, and once the outputs that the exit
+    lacks. `found`: the trials in which the exit waits."""
     mended = _mended(subject.graph, {name for trial in found for name in trial.end.lacking})
     is_mend = bool(found) and _never_stuck(mended)
     reported: set[str] = set()
@@ -253,10 +259,11 @@ def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
 
 
 def _may_fit(subject: Subject, last: str) -> bool:
-    """Return whether an output other than the default could be a value that the exit takes.
+    """Return whether an action can give an output other than its default that the exit accepts, so
+    that the error is not certain.
 
-    Only actions know the values that they give. Those of the action whose outputs the exit takes
-    count if it was the `last` to end.
+    The outputs of the action whose outputs the exit takes count only if this action was the `last`
+    that ended.
     """
     owner = exit_owner(subject.graph)
     limited = {
@@ -292,7 +299,8 @@ def _exits(graph: Graph) -> list[Relation]:
 
 
 def _mended(graph: Graph, lacking: set[str]) -> Graph:
-    """Return the graph with an exit that requires neither these parents nor any outputs."""
+    """Return the graph with an exit that requires neither the parents `lacking` (full names) nor
+    any outputs."""
     names = {action.key: action.full_name for action in graph.actions}
     relations = tuple(
         msgspec.structs.replace(r, required=r.required and names.get(r.parent) not in lacking)
@@ -306,8 +314,8 @@ def _mended(graph: Graph, lacking: set[str]) -> Graph:
 
 
 def _never_stuck(mended: Graph) -> bool:
-    """Return whether a graph ends in every trial and never while an action runs, whichever of two
-    concurrent actions is quicker."""
+    """Return whether the graph ends in every trial, and never while an action still runs. Both
+    orders in which concurrent actions can end are tried."""
     for slower_first in (False, True):
         trials = Trials(mended, slower_first=slower_first)
         if any(trial.end.kind == "stuck" or trial.end.early for trial in trials):
@@ -318,7 +326,8 @@ def _never_stuck(mended: Graph) -> bool:
 
 
 def halted(subject: Subject) -> str | None:
-    """Return in which case a graph ends HALTED, in words; None if no trial does."""
+    """Return the first trial in which the graph ends HALTED, as words that end a sentence ("if …",
+    "in any case"); None if there is no such trial."""
     for trial in Trials(subject.graph):
         if trial.end.kind == "halted":
             return f"if {trial.when[3:]}" if trial.action else "in any case"

@@ -15,8 +15,9 @@ def check_values(
     library: Mapping[str, Signature] | None,
     graphs: Container[str] = frozenset(),
 ) -> None:
-    """Report all problems of parameters. `graphs`: names of sub-graphs, which a library need not
-    know."""
+    """Report all problems of parameters and their values. `library`: the actions that the engine
+    has, by name, or None if unknown. `graphs`: names of sub-graphs, which need not be in the
+    library."""
     inputs = {action.key: slots_of(action.inputs) for action in subject.real}
     outputs = {action.key: slots_of(action.outputs) for action in subject.real}
     for relation in subject.sound:
@@ -122,7 +123,8 @@ def _check_inputs(
 def _given_kinds(
     incoming: list[Relation], outputs: Mapping[Key, _Slots], needed: _Slots
 ) -> dict[str, set[str]]:
-    """Return for each unlocked input the types of the outputs that parents hand over to it."""
+    """Return, for each input that is not locked, the types of the outputs that parents hand over to
+    it."""
     open_ = {name: slot for name, slot in needed.items() if slot.updatable}
     kinds: dict[str, set[str]] = {}
     for relation in incoming if open_ else []:
@@ -137,7 +139,7 @@ def _given_kinds(
 
 
 def check_static(subject: Subject) -> None:
-    """Report values that are none of the allowed ones."""
+    """Report each value that is not among the allowed values of its parameter."""
     for action in subject.real:
         _check_static(subject, action, slots_of(action.inputs))
 
@@ -171,8 +173,8 @@ def _check_known(
 def check_signature(
     subject: Subject, action: Action, known: Signature, inputs: _Slots, outputs: _Slots
 ) -> None:
-    """Report parameters of an action that differ from those of the action or graph to which it is
-    resolved."""
+    """Report the parameters in which an action differs from `known`, the library action or
+    sub-graph that it stands for."""
     for side, ours, theirs in (("input", inputs, known.inputs), ("output", outputs, known.outputs)):
         surplus, lacking = set(ours) - set(theirs), set(theirs) - set(ours)
         if surplus or lacking:

@@ -26,7 +26,8 @@ SHOWN: Final = 2_000
 
 
 class OutcomeArrow(msgspec.Struct, frozen=True, order=True):
-    """One outcome of an arrow. `parent` and `child` are keys of actions, or `entry` and `exit`."""
+    """One arrow together with one outcome of its parent. `parent` and `child` are keys of actions,
+    or `entry` and `exit`."""
 
     parent: Key
     child: Key
@@ -34,17 +35,17 @@ class OutcomeArrow(msgspec.Struct, frozen=True, order=True):
 
 
 class TakenArrows(msgspec.Struct, frozen=True):
-    """The arrows that one course took, and the actions that ran in it."""
+    """The arrows that one course took, and the keys of the actions that ran in it."""
 
     arrows: frozenset[OutcomeArrow]
     actions: frozenset[Key]
 
 
 class ArrowCoverage(msgspec.Struct, frozen=True, kw_only=True):
-    """The coverage of some courses together.
+    """The coverage of a graph by some courses together, as numbers of arrows and of actions.
 
-    `untaken` and `unvisited`: arrows that no course took and actions that ran in none, in file
-    order, at most `SHOWN` of each.
+    `taken` of `arrows` arrows were taken, `visited` of `actions` actions have run. `untaken` and
+    `unvisited` list the others in file order, at most `SHOWN` of each.
     """
 
     arrows: int
@@ -56,7 +57,8 @@ class ArrowCoverage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def arrows_of(graph: Graph) -> Iterator[OutcomeArrow]:
-    """Yield every outcome of an arrow that its child does not ignore, each once, in file order."""
+    """Yield one `OutcomeArrow` for each outcome of each arrow that its child does not ignore, in
+    file order and without repetition."""
     ends = {action.key for action in graph.actions if not action.missing} | {ENTRY, EXIT}
     found: dict[OutcomeArrow, None] = {}
     for relation in graph.relations:
@@ -80,8 +82,11 @@ def outcomes_of(relation: Relation) -> list[Precondition]:
 
 
 def arrows_taken(graph: Graph, traces: Iterable[Trace]) -> TakenArrows:
-    """Return the arrows and actions of this graph that a trace shows. Events of its sub-graphs are
-    not counted."""
+    """Return the arrows of this graph that were taken and its actions that ran, according to the
+    trace events of one course or run.
+
+    Events of its sub-graphs are not counted.
+    """
     keys = {a.full_name: a.key for a in graph.actions if not a.missing}
     ends = keys | {ENTRY_NODE: ENTRY, EXIT_NODE: EXIT}
     labels = {f"{p} => {c}": (ends[p], ends[c]) for p, c in _pairs(graph, ends)}
@@ -110,7 +115,8 @@ def _pairs(graph: Graph, ends: dict[str, Key]) -> Iterator[tuple[str, str]]:
 
 
 def coverage(graph: Graph, courses: Iterable[TakenArrows]) -> ArrowCoverage:
-    """Return the coverage of a graph by these courses together."""
+    """Return the coverage of a graph by these courses together: an arrow or action counts if any of
+    them took or ran it."""
     took: set[OutcomeArrow] = set()
     came: set[Key] = set()
     for each in courses:

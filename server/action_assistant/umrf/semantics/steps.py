@@ -23,7 +23,8 @@ MOST: Final = 20_000  # the most events of one course
 
 
 class ExpectedStep(msgspec.Struct, frozen=True):
-    """One step of a course: an event of an action, or of the graph if no action is named."""
+    """One step of a course: it concerns one action of the graph `graph`, or this graph itself if no
+    action is named. `how` is the result, state, response or hazard code that `what` announces."""
 
     graph: str
     node: str
@@ -32,8 +33,8 @@ class ExpectedStep(msgspec.Struct, frozen=True):
 
 
 class Departure(msgspec.Struct, frozen=True):
-    """The first step in which a course differs from the expected one. A step is None where that
-    course has ended."""
+    """The first step in which a course differs from the expected one. `place` is its index from 0;
+    `expected` or `found` is None if that course ended before it."""
 
     place: int
     expected: ExpectedStep | None
@@ -46,10 +47,11 @@ def course(
     most: int = MOST,
     inside: Mapping[str, Graph] | None = None,
 ) -> tuple[ExpectedStep, ...]:
-    """Return the steps of this graph under this script, with the graphs of `inside` as sub-graphs,
-    up to `most` trace events.
+    """Simulate this graph under this script, and return the steps without times. The same arguments
+    always give the same steps.
 
-    Deterministic; times are left out.
+    `most`: the number of trace events after which the simulation is cut off. `inside`: the graphs
+    that can be its sub-graphs, by name.
     """
     traces = simulate(
         graph, script=script, library=inside, facts=SIMULATED, until_ms=DAY_MS, max_events=most
@@ -58,7 +60,7 @@ def course(
 
 
 def steps_of(traces: Iterable[Trace]) -> tuple[ExpectedStep, ...]:
-    """Return the steps of a trace."""
+    """Return the steps among trace events, in the same order; events that are no step are left out."""
     return tuple(step for trace in traces if (step := _step(trace)) is not None)
 
 
@@ -80,8 +82,7 @@ def _step(trace: Trace) -> ExpectedStep | None:
 
 
 def departure(expected: Sequence[ExpectedStep], found: Sequence[ExpectedStep]) -> Departure | None:
-    """Return the first step in which the second course differs from the first; None if they are
-    equal."""
+    """Return the first step in which `found` differs from `expected`; None if they are equal."""
     for place in range(max(len(expected), len(found))):
         one = expected[place] if place < len(expected) else None
         other = found[place] if place < len(found) else None
@@ -91,8 +92,11 @@ def departure(expected: Sequence[ExpectedStep], found: Sequence[ExpectedStep]) -
 
 
 def unnamed(steps: Sequence[ExpectedStep]) -> list[ExpectedStep]:
-    """Return the steps without the name of the top graph, so that a renamed graph compares
-    equal."""
+    """Return the steps without the name of the top graph, so that the courses of a graph before and
+    after a renaming are equal.
+
+    The graph of the first step is the top graph.
+    """
     top = steps[0].graph if steps else ""
     return [
         msgspec.structs.replace(step, graph=step.graph.removeprefix(top).lstrip("_"))
@@ -104,7 +108,7 @@ _WORDS: Final = {"result": "ends", "runs": "is told to", "state": "is", "hazard"
 
 
 def step_text(step: ExpectedStep | None) -> str:
-    """Return a step in words."""
+    """Return a step in words that follow "expected" or "found"; "the end" for None."""
     if step is None:
         return "the end"
     if step.what == "ends":

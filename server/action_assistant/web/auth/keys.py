@@ -144,9 +144,12 @@ class Keys:
         return ServerProof(address, self._proof(challenge, address))
 
     def proven(self, challenge: str, proof: ServerProof, *, at: str | None = None) -> bool:
-        """Return whether another server has proven that it knows the token.
+        """Return whether the proof that another server has given shows that the other server knows
+        our token.
 
-        With `at`, the proof has to name this address.
+        `challenge`: the text that we sent to the other server, over which the proof is computed.
+        With `at`, the proof must also name this address (`HOST:PORT`) as the one that accepted our
+        connection.
         """
         if at is not None and proof.address != at:
             return False

@@ -90,7 +90,8 @@ class ConnectionsByHolder:
         self._by.setdefault(connection.holder, {})[peer] = connection
 
     def remove(self, peer: Peer, connection: Connection) -> None:
-        """One less, if it is there."""
+        """Remove this connection of a peer from those of its holder. Do nothing if the peer has
+        another connection by now, or none."""
         if self._peers.get(peer) is not connection:
             return
         del self._peers[peer]

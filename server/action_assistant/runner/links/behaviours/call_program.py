@@ -246,7 +246,8 @@ def _result(file: str, source: str, action: PerformedAction) -> tuple[bool, str 
 
 
 def _told_of(error: BaseException, file: str) -> str:
-    """Return an error as one line, with its line number in the behaviour's file."""
+    """Return one line of text that describes an error, with the line number in the behaviour's file
+    if its traceback leads through that file."""
     places = [
         each.lineno for each in traceback.extract_tb(error.__traceback__) if each.filename == file
     ]
