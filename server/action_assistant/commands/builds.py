@@ -87,7 +87,10 @@ def _build(
 
 
 def errors_of(said: str, source: Path | None) -> tuple[BuildError, ...]:
-    """The errors in what was said of a package; if none is known to be one, its last words."""
+    """Return the errors in `said`, the output of the build of one package. If no line of the output
+    is recognised as an error, return one error with the last three lines. `source`: the source
+    folder of the package, to which the paths of files in errors are made relative; None if it is
+    not known."""
     found = list(dict.fromkeys(_errors(said, source)))
     if not found:
         lines = [line.strip() for line in said.splitlines() if line.strip()]

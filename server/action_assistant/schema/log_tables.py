@@ -57,11 +57,12 @@ def log_tables(metadata: MetaData) -> tuple[Table, Table, Table]:
 
 
 def written_by_table(metadata: MetaData) -> Table:
-    """Return the table of the program versions that wrote to a database, with a row for each
-    change.
+    """Return the table that lists which versions of the program wrote to a database, with one row
+    for each change of the version.
 
-    A row says since when, and at which revision of the tables. Older versions read the last row, so
-    the table stays as it is.
+    A row holds the version, the time since which this version writes, and the revision of the
+    tables. Versions of the program that are older than this one read the last row, so the columns
+    never change.
     """
     return Table(
         "written_by",

@@ -138,7 +138,8 @@ def _put_file(data: Path, copy: UpgradeCopy, path: Path, progress: Progress) -> 
 
 
 def _exchange(part: Path, path: Path, aside: Path) -> None:
-    """One file in the place of another, which goes aside with what lies beside it."""
+    """Put the file `part` in the place of `path`. Before that, link the old file and its SQLite
+    side files (-wal, -shm, -journal) into the folder `aside`, and remove the side files."""
     beside = [path.with_name(f"{path.name}{suffix}") for suffix in ("-wal", "-shm", "-journal")]
     for each in (path, *beside):
         if each.exists():

@@ -191,7 +191,9 @@ def _target(data: Path, to: str) -> str:
 
 
 def _source(data: Path, known: str, given: str | None) -> str:
-    """Return the URL of the graphs' database, with the password that was given. Raise CannotStart."""
+    """Return the URL of the graphs' database: `given`, which may hold a password, if it names the
+    same database as `known`, else `known`, the URL without a password that the data folder has
+    for its graphs. Raise CannotStart if the data folder has no graphs yet."""
     from action_assistant.editor.log import database_location
 
     if given is not None and database_location.same(given, known):

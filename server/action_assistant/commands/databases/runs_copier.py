@@ -120,8 +120,9 @@ class RunsCopier:
         self._prepared = False
 
     async def catch_up(self) -> int:
-        """Copy what is new; how many events. Raises CannotStart when the copy is of another log,
-        Unavailable, or what the driver raises."""
+        """Copy the events that are not in the copy yet, and return their number. Raise CannotStart
+        if the copy is of another log, Unavailable if the log cannot be read, and errors of the
+        driver as they are."""
         if not self._prepared:
             await self._do(_prepare)
             await self._archived()

@@ -226,7 +226,9 @@ def graphs_are_there(place: Installation) -> Iterator[Diagnostic]:
 
 
 def runs_are_there(place: Installation) -> Iterator[Diagnostic]:
-    """The runner's database, which is always a file of the folder."""
+    """Check the runner's database, the file `runner.db` in the data folder. Yield an error if the
+    file is missing although archives or recordings of runs exist, and what is wrong in the file
+    if it exists."""
     file = place.data / "runner.db"
     left = [place.data / name for name in ("archive", "recordings")]
     if file.exists():

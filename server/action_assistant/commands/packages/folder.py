@@ -94,7 +94,9 @@ def write_all(root: Path, steps: Sequence[FileStep], known: Mapping[str, bytes])
 
 @contextmanager
 def _inside(top: Directory, path: str, make: bool = False) -> Iterator[tuple[Directory, str]]:
-    """The folder of a path, opened step by step, and the last name."""
+    """Open the folders of a relative path one after the other below `top`, and yield the last
+    folder and the last name of the path. `make` makes folders that are missing. Raise OSError if
+    the path leads out of `top`."""
     *folders, name = path.split("/")
     if any(part in {"", ".", ".."} or "\x00" in part for part in (*folders, name)):
         raise OSError(errno.EINVAL, "the path leads out of the folder")

@@ -63,8 +63,9 @@ class GraphNames:
         self._actions: Counter[str] = Counter()
 
     def graph(self, name: str) -> NamedGraph | None:
-        """The graph that an action of this name stands for, as of the last `refresh`: none where the
-        library has such an action, and of several the oldest."""
+        """Return the graph that an action of this name stands for, by the names that the last
+        `refresh` read. Return None if no graph has the name, or if an action of the library has
+        it. If several graphs have the name, return the oldest of these graphs."""
         found = self._graphs.get(name)
         if not found or self._actions[name]:
             return None

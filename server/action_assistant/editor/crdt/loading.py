@@ -150,8 +150,11 @@ async def _followed(
 async def _folded(
     tail: LogTail, document: bytes, events: EventColumns, learn: bool, run_in_worker: RunInWorker
 ) -> Folded | None:
-    """Fold the events whose chain of hashes is intact. In this process no event is applied before its hash was
-    checked; a worker may begin earlier, and its result is dropped where a check fails."""
+    """Apply to `document` the events before the first one whose hash does not match, and return the
+    result. `learn`: also collect what only editing needs. In this process no event is applied
+    before its hash was checked; a worker may begin earlier, and its result is thrown away if a
+    hash does not match: the events before that one are then folded again. Return None if `fold`
+    returns None."""
     if run_in_worker is run_here or len(document) + events.size <= _SMALL:
         return _fold(document, events.part(0, await tail.sound()), learn)
     folding = asyncio.ensure_future(_folded_aside(document, events, learn, run_in_worker))

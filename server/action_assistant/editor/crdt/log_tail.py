@@ -80,8 +80,9 @@ class LogTail:
         return good
 
     def _in_place(self, rows: Sequence[Sequence[Any]]) -> StoredColumns | None:
-        """Return the rows up to the first that is not the next event; None when there are none. Types of
-        columns other than the bodies are not looked at here: the chain check finds a wrong one."""
+        """Return the rows before the first row that is not the next event, as columns; None if
+        there is no such row. Only sequence numbers and the types of the bodies are checked here:
+        the chain check finds wrong types in other columns."""
         if not rows:
             return None
         columns = StoredColumns(*zip(*rows, strict=True))

@@ -150,7 +150,8 @@ class ByteReader:
             pass
 
     def magnitude(self) -> int:
-        """A varInt of at most 62 bit, without its sign."""
+        """Read a signed varInt (lib0) of at most 62 bits and return its absolute value. Raise
+        Malformed if the number is longer or the message ends before it does."""
         byte = self.byte()
         number, shift = byte & 0x3F, 6
         while byte & 0x80:

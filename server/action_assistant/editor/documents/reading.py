@@ -194,7 +194,8 @@ def _relations(fields: Fields, positions: Fields) -> list[Relation]:
 
 
 def _waypoints(positions: Fields) -> dict[str, dict[str, JsonText]]:
-    """The JSON texts of waypoints by the id of their relation, and by response."""
+    """Return the waypoints of arrows as JSON texts: for each id of a relation a mapping from
+    response to text."""
     found: dict[str, dict[str, JsonText]] = defaultdict(dict)
     for line, text in _under(positions, "w/"):
         relation, _, response = line.partition("|")

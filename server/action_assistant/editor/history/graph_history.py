@@ -188,7 +188,9 @@ def _entry(
 def _changes(
     connection: Connection, graph: str, shown: Sequence[EditSession]
 ) -> dict[tuple[str, int], Changes]:
-    """Return the changes of each session, by its author and its last change."""
+    """Return the changes that each session made, keyed by the author of the session and the number
+    of its last change. Old sessions are left out if all of them together have too many changes
+    to read."""
     edits = _edits(shown)
     if not edits:
         return {}

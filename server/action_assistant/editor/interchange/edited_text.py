@@ -288,7 +288,11 @@ def _by_end(graph: Graph) -> dict[tuple[str, Key], list[str]]:
 def _numbered(
     was: Sequence[str], now: Sequence[str], numbers: Mapping[str, float]
 ) -> dict[str, float]:
-    """New numbers so that `now` is the order; those that kept their order keep their numbers."""
+    """Return the numbers of heads that have to change so that sorting by number gives the order
+    `now`. `was` is the order before, `numbers` the number of each head. The result is empty if
+    no number has to change. If the heads in both orders keep their relative order, they keep
+    their numbers, and only new heads get numbers between these; otherwise every head gets a new
+    number."""
     kept = [head for head in now if head in numbers]
     there = set(now)
     if kept == [head for head in was if head in there]:

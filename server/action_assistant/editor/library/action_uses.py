@@ -214,7 +214,9 @@ def _described(parameter: Parameter) -> LibraryParameter:
 
 
 def _distinct(graph: Graph) -> tuple[Action, ...]:
-    """The actions that differ in what a library says of them; one that is only named is none."""
+    """Return one action for each different combination of the fields that a library stores (name,
+    type, description, inputs and outputs). An action that exists only because a relation refers
+    to it is left out."""
     found: dict[object, Action] = {}
     for action in graph.actions:
         if action.missing:

@@ -165,9 +165,10 @@ def unbegun(graph: Graph) -> tuple[ForInput, ...]:
 
 
 def waits(run: Run, graph: Graph, moment: int | None = None) -> tuple[Wait, ...]:
-    """Return what the actions of a standing graph wait for, as far as observations show. Actions
-    that no arrow has reached yet are left out: they wait for one that is named. `moment`:
-    microseconds UTC of a standstill in the past; no action may have begun since."""
+    """Return what the actions of a graph that makes no progress wait for, as far as the
+    observations show it. An action that no arrow has reached yet is left out, because it waits
+    for another action, which is in the result. `moment`: the time of an earlier standstill, in
+    microseconds since 1970 UTC, after which no action has begun; None means now."""
     stalled = _Stalled(run, graph, moment)
     found: list[Wait] = [*stalled.parts()]
     for action in graph.actions:

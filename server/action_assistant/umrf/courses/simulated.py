@@ -55,10 +55,11 @@ class _Timed(Engine):
 def simulated_outcome(
     net: Network, graph: Graph, full_name: str, result: str
 ) -> tuple[Outcome, int]:
-    """Return how a graph ends if the first run of one action ends with `result`, and how many trace
-    events that took.
+    """Simulate a graph in which the first run of the action `full_name` ends with `result`, and
+    every other run with on_true. Return how the graph ends, and the number of trace events of
+    the simulation.
 
-    With `full_name` empty all actions end with on_true.
+    If `full_name` is empty, every run ends with on_true.
     """
     calls: dict[str, tuple[Behaviour, ...]] = {}
     if full_name:

@@ -22,7 +22,9 @@ Located = TypeVar("Located", Problem, Note)
 
 
 def origin(origins: Origins, path: str) -> str:
-    """Return the pointer before one step of the value that is at `path` after it."""
+    """Return the pointer that a value had before one step of a translation. `path` is the pointer
+    of the value after the step, `origins` the map of this step. If no entry of the map covers
+    the value, its pointer is the same before and after."""
     head = path
     while head not in origins:
         cut = head.rfind("/")

@@ -183,8 +183,9 @@ def ways_out_differ(selection: Selection) -> Iterator[FlatteningReason]:
 
 
 def answers_of(selection: Selection, child: Key) -> Conditions:
-    """Return the responses of an action outside to the ends of the action that stands for the
-    selection."""
+    """Return the conditions of the arrow that leads from the new action, which stands for the
+    selected actions, to the action `child` outside of the selection: its response to each
+    outcome."""
     found: dict[str, Response] = {}
     for outcome in PRECONDITIONS:
         for key in selection.chosen:

@@ -101,7 +101,8 @@ def _message(body: str) -> File:
 
 
 async def _lead_below(send: Send) -> None:
-    """Relatively, hence below the path at which a proxy shows it, too."""
+    """Send a redirect (308) to `help/`. The address is relative, so that the redirect also works if
+    a proxy serves this page below another path."""
     fields = [(b"location", b"help/"), (b"content-length", b"0")]
     start: Any = {"type": "http.response.start", "status": 308, "headers": fields}
     end: Any = {"type": "http.response.body", "body": b"", "more_body": False}

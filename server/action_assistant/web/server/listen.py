@@ -313,8 +313,9 @@ class _Server(uvicorn.Server):
         self._connections = connections
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Called once, before anyone is let in. Connections are accepted by ourselves: uvicorn
-        counts them when it is too late, after a handshake and with the last descriptor gone."""
+        """Run the startup of the application, then accept connections on `sockets`. Our own code
+        accepts connections in place of uvicorn's: uvicorn counts a connection only after its
+        handshake, when there may be no free file descriptor any more."""
         await self.lifespan.startup()
         if self.lifespan.should_exit:
             sys.exit(_FAILED)

@@ -118,7 +118,9 @@ def file_of(name: str) -> str | None:
 
 
 def _text(file: str, folder: int) -> str:
-    """Return the text of a regular file in an open folder. Raises OSError, Unusable."""
+    """Return the text of the regular file `file` in the folder with the descriptor `folder`. Raise
+    OSError if it cannot be opened or read, and Unusable if it is no regular file, is too large
+    or is not UTF-8."""
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with os.fdopen(os.open(file, flags, dir_fd=folder), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):

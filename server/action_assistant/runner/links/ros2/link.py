@@ -142,7 +142,8 @@ class Ros2Link:
             await domain.outlets.resume.send(lambda: message)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Publish one modify message. Raises NotSent."""
+        """Publish one modify message with the graph of `order`. `continue_from`: the field of the
+        same name in the message. Raise NotSent if the message cannot be published."""
         domain = self._reachable("modify", self._topics.modify)
         message = UmrfGraphModify(
             umrf_graph_name=order.graph.name,
