@@ -235,7 +235,7 @@ class SecondEngine(Story):
     """A run begins while a second engine hears starts and does not serve its get yet."""
 
     async def step(self, control: ExecutionService, stranger: Stranger) -> None:
-        if len(self.robots) > 1:
+        if control.open:
             return
         self.quirks = EngineTraits(loading_ms=1_500.0)
         self.tasks.start_soon(anyio.to_thread.run_sync, self.robot, 4.0)
@@ -248,7 +248,7 @@ class SecondEngine(Story):
             (run,) = control.open
             await anyio.sleep(0.3)
             await control.stop(run, BEN)
-            while self.moving() != {run}:  # noqa: ASYNC110 - of another thread
+            while len(self.robots) < 2 or not self.robots[1][0].robot.executing:  # noqa: ASYNC110
                 await anyio.sleep(0.01)
         await anyio.sleep(2)
         assert control.open[run].run.proof_at is None
