@@ -78,12 +78,13 @@ class EditorState:
         self._services: EditorServices | None = None
 
     def open(self, services: EditorServices) -> None:
-        """From here on requests can be answered."""
+        """Set the services, so that requests can be answered from now on."""
         self._services = services
 
     @property
     def services(self) -> EditorServices:
-        """The services that requests use. Raises RuntimeError before `open` was called."""
+        """Return the services that requests use. Raise RuntimeError if `open` was not called
+        before."""
         if self._services is None:
             raise RuntimeError("the editor is not open yet")
         return self._services

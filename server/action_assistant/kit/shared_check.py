@@ -72,7 +72,7 @@ class SharedCheck(Generic[T]):
             self._answered_at = loop.time()
 
     def cancel(self) -> None:
-        """Nobody will ask any more."""
+        """Cancel the question that is under way, since nobody will ask any more."""
         if self._task is not None:
             self._task.cancel()
 

@@ -45,7 +45,7 @@ class TokenBucket:
 
     @property
     def used_at(self) -> float:
-        """The time of the last call, by the clock of the bucket."""
+        """Return the time of the last call, by the clock of the bucket."""
         return self._at
 
     def _refill(self) -> None:

@@ -24,7 +24,7 @@ NAMES: Final = {
 
 
 def log_tables(metadata: MetaData) -> tuple[Table, Table, Table]:
-    """The tables `event`, `head` and `snapshot` of a database."""
+    """Return the tables `event`, `head` and `snapshot` of a database."""
     event = Table(
         "event",
         metadata,

@@ -93,7 +93,8 @@ class Catalogue:
         self._graph_reader = graph_reader
 
     async def require(self, graph: str, kind: h.DocumentKind | None = None) -> h.DocumentKind:
-        """Be sure that there is such a document; what it is of."""
+        """Check that a document exists and is not deleted, and return its kind. Raise NotFound if
+        there is no such document, or if `kind` is given and the document is of another kind."""
         found: h.DocumentKind = _there(
             graph, await self._journal.query(_KIND, {"id": graph}), kind
         ).kind
@@ -107,8 +108,8 @@ class Catalogue:
     async def all(
         self, *, deleted: bool = False, kind: h.DocumentKind = "graph"
     ) -> list[GraphView]:
-        """Every document of a kind, the last changed first, drafts left out; or all that were
-        deleted."""
+        """Return every document of a kind, the last changed first. Deleted documents and drafts are
+        left out; with `deleted`, return the deleted documents instead."""
         graph = editor_tables.graph.c
         shown = [graph.deleted_at.is_(None), graph.draft_of.is_(None)]
         chosen = _rows().where(
@@ -120,10 +121,11 @@ class Catalogue:
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
     async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
-        """A graph from a UMRF file, or an empty one from an object with a name only; with JSON of a
-        `Reading` in the first case.
+        """Make a graph. `body` is either an object with a name and a description, for an empty
+        graph, or a UMRF file. Return the graph, and JSON of a `Reading` if a file was read.
 
-        Raises BadInput, NotUmrf, TooLarge with the place; then nothing is stored.
+        Raise BadInput, NotUmrf or TooLarge, with the place in the file, if the file cannot be read;
+        then nothing is stored.
         """
         try:
             wanted = msgspec.json.decode(body, type=NewGraph)
@@ -214,7 +216,8 @@ class Catalogue:
     async def add_action(
         self, action: Action, author: str, about: h.GraphCreated, file: bytes | None = None
     ) -> GraphView:
-        """The document of an action of the library; with the file that it came from, if it did."""
+        """Make the document of an action of the library. `file`: the file from which the action was
+        read, which is stored with the document; None if there was none."""
         graph = Graph(name=action.name, actions=(action,), direction="right")
         created = h.draft(h.CREATED, author, about)
         came = None if file is None else Draft(h.IMPORTED, author, file)
@@ -222,8 +225,10 @@ class Catalogue:
         return await self._add(document_edits.first(graph), info, [created], author, came)
 
     async def add_draft(self, origin: str, seq: int, name: str, author: str) -> GraphView:
-        """A graph that begins as another one was after its change `seq`, with the same keys. What people
-        said about that one stays there. Raises NotFound, Conflict, Unavailable."""
+        """Make a draft of the graph `origin`: a new graph with the content that `origin` had after
+        its change `seq`, under the same keys. Comments are not copied. Raise NotFound if there
+        is no such graph, Conflict if it has no such change, and Unavailable if the log cannot be
+        read or written."""
         row = await self._row(origin, kind="graph")
         then = await self._graph_reader.at(origin, seq)
         update, about = await self._graph_reader.ask(drafted, then)
@@ -303,7 +308,8 @@ class Catalogue:
 def _there(
     graph: str, rows: Sequence[Row[Any]], kind: h.DocumentKind | None, *, deleted: bool = False
 ) -> Row[Any]:
-    """The one row of a graph. Raises NotFound."""
+    """Return the first of `rows`, the row of a graph. Raise NotFound if there is no row, if the
+    graph is deleted and `deleted` is False, or if it is not of this `kind`."""
     if not rows or (rows[0].deleted_at is not None and not deleted):
         raise NotFound(f"There is no {kind or 'graph'} {graph!r}.")
     if kind not in {None, rows[0].kind}:
@@ -312,7 +318,7 @@ def _there(
 
 
 def _rows() -> Select[Any]:
-    """Graphs with the number and time of their document's last change."""
+    """Return a query for graphs with the number and the time of the last change of their documents."""
     event, graph = editor_tables.editor_event, editor_tables.graph
     last = (
         select(event.c.seq)

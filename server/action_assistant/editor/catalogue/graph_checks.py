@@ -113,21 +113,22 @@ class GraphChecks:
         return found
 
     async def inside(self, *moments: GraphAtSeq, more: Iterable[str] = ()) -> Inside:
-        """The graphs inside of a graph, as they are now: by the names of its actions at these moments, and
-        by `more` names."""
+        """Return the graphs inside of a graph, as they are now. The names of its actions are read
+        from the graph at these moments, and the names in `more` are added."""
         await self.names.refresh()
         known = [await self._names_at(each) for each in moments]
         uses = [name for _, each in known for name in each]
         return await self._seen(await self._resolved(known[0][0], (*uses, *more)))
 
     async def inside_of(self, graph: str, uses: Iterable[str]) -> Inside:
-        """The graphs inside of a graph of this name with actions of these names."""
+        """Return the graphs inside of a graph with the name `graph`, whose actions have the names
+        `uses`."""
         await self.names.refresh()
         return await self._seen(await self._resolved(graph, uses))
 
     async def digest(self, name: str) -> str | None:
-        """The digest of the graph that an action of this name stands for now; None where there is none, or
-        it cannot be read."""
+        """Return the digest of the graph that an action of this name stands for now. Return None if
+        the name stands for no graph, or if the graph cannot be read."""
         await self.names.refresh()
         known = await self._standing_for(name)
         if known is None:
@@ -140,7 +141,8 @@ class GraphChecks:
         return found
 
     def made(self, graph: str, state: bytes, about: GraphInfo) -> None:
-        """A graph has been made of this document, and this is to be said of it by itself."""
+        """Remember the state of a new graph and its result `about`, so that neither has to be
+        computed again."""
         self._reader.made(graph, state)
         self._remember(graph, _About(1, 1, about))
 
@@ -215,7 +217,7 @@ class GraphChecks:
         return info.first[0] if info.first is not None else ""
 
     async def _names_at(self, sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
-        """The name of a graph at a moment, and those of its actions."""
+        """Return the name of a graph at a moment, and the names of its actions."""
         key = sight.graph, sight.seq
         found = self._uses.get(key)
         return found or self._uses.put(key, await self._reader.ask(contents.names, sight))

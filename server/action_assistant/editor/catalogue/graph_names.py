@@ -96,7 +96,8 @@ class GraphNames:
 
     @asynccontextmanager
     async def read_ahead(self) -> AsyncIterator[None]:
-        """While you are inside, names are being read already, so that who asks first seldom waits."""
+        """Read the names in background tasks while the context is open, so that the first request
+        for a name seldom waits."""
         self._begun()
         try:
             yield
@@ -135,7 +136,9 @@ class GraphNames:
             self._position = position
 
     async def _news(self) -> tuple[int, dict[str, int], set[str]]:
-        """Up to where the log goes, the newest changes of documents, and of what more was told."""
+        """Return the position of the last event that was read, the newest change of each document
+        that has changed since the last call, and the ids of the documents about which there are
+        other new events."""
         if self._position is None:
             position = await self._journal.position()
             rows = await self._journal.query(select(editor_head.c.stream, editor_head.c.seq))
@@ -158,7 +161,8 @@ class GraphNames:
         return position, seqs, abouts
 
     async def _look_up(self, abouts: Collection[str]) -> set[str]:
-        """Documents that count from now on, and did not."""
+        """Read the rows of these documents from the tables. Forget documents that are deleted or
+        are drafts, and return the ids of documents that are known only from now on."""
         ids = sorted(abouts)
         fresh: set[str] = set()
         graph = editor_tables.graph.c
@@ -187,7 +191,8 @@ class GraphNames:
             self._call(graph, msgspec.structs.replace(document, name=name))
 
     def _call(self, graph: str, document: _Document | None) -> None:
-        """From now on a document is this one; None: it does not count."""
+        """Replace what is known of a document by `document`. None means that the document no longer
+        counts, since it was deleted or is a draft."""
         before = self._documents.pop(graph, None)
         if before is not None and before.name:
             if before.kind == "action":

@@ -30,10 +30,8 @@ class GraphReader:
         self._moments = LruCache[tuple[str, int], GraphAtSeq](_REMEMBERED)
 
     async def now(self, graph: str) -> GraphAtSeq:
-        """The graph as it is; of one whose history is damaged, what can be read of it.
-
-        Raises Unavailable, NotFound.
-        """
+        """Return the graph as it is now. If its history is damaged, return the last state that can
+        be read. Raise Unavailable if the log cannot be read, NotFound if there is no such graph."""
         room = self._rooms.open_room(graph_stream(graph))
         if room is None:
             newest = await self._newest(graph)
@@ -46,7 +44,8 @@ class GraphReader:
         return self._moments.put((graph, found.seq), found)
 
     async def at(self, graph: str, seq: int) -> GraphAtSeq:
-        """The graph after its change `seq`. Raises NotFound, Conflict, Unavailable."""
+        """Return the graph after its change `seq`. Raise Conflict if it has no such change,
+        NotFound if there is no such graph, Unavailable if the log cannot be read."""
         known = self._moments.get((graph, seq))
         if known is not None and known.seq == seq:
             return known
@@ -70,7 +69,8 @@ class GraphReader:
         return found
 
     async def _loaded(self, graph: str, seq: int) -> GraphAtSeq:
-        """The graph after its change `seq`, or after the last one before it that can be read."""
+        """Load the graph after its change `seq` from the log. If that state cannot be read, return
+        the state after the last earlier change that can be read."""
         found = await stored(
             self._journal, graph_stream(graph), seq, learn=False, run_in_worker=self._run_in_worker
         )
@@ -78,15 +78,15 @@ class GraphReader:
         return self._moments.put((graph, seq), sight)
 
     async def moment(self, graph: str, seq: int | None) -> GraphAtSeq:
-        """The graph at `seq`, or as it is."""
+        """Return the graph after its change `seq`, or as it is now if `seq` is None."""
         return await (self.now(graph) if seq is None else self.at(graph, seq))
 
     def made(self, graph: str, state: bytes) -> None:
-        """A graph has been made of this document."""
+        """Remember the state of a new graph, which is its state after change 1."""
         self._moments.put((graph, 1), GraphAtSeq(graph, 1, state))
 
     async def ask(self, work: Callable[..., T], /, *values: Any) -> T:
-        """The outcome of a function of `contents`, of sights and other values."""
+        """Call a function of `contents` in a worker and return its result. `values`: its arguments."""
         return await self._run_in_worker(work, *values)
 
     async def _newest(self, graph: str) -> int:

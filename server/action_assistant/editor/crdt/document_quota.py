@@ -93,7 +93,8 @@ class DocumentQuota:
         self._changed = True  # since actions were counted
 
     def check(self, update: bytes, read: UpdateOutline) -> None:
-        """Raises Full for an update that brings too much. Only deletions never do."""
+        """Raise QuotaExceeded if the document would have too many actions, fields or bytes after
+        this update. An update that only deletes is always accepted."""
         if read.actions > self._spare and self._changed:
             self._changed = False
             self._spare = MOST_ACTIONS - actions_in(self._doc)
@@ -111,7 +112,8 @@ class DocumentQuota:
                 raise QuotaExceeded(f"a graph may have {MOST_BYTES >> 20} MiB")
 
     def took(self, size: int, actions: int = 0, fields: int = 0) -> None:
-        """So many bytes were applied, with so many new actions and fields in them."""
+        """Count an update that was applied: its `size` in bytes, and the numbers of new actions and
+        fields in it."""
         self._bytes += size
         self._spare -= actions
         self._spare_fields -= fields

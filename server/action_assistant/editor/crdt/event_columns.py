@@ -41,12 +41,12 @@ class EventColumns(msgspec.Struct, frozen=True):
 
     @property
     def last(self) -> int:
-        """The seq of the last one."""
+        """Return the sequence number of the last event."""
         return self.first + len(self) - 1
 
     @property
     def size(self) -> int:
-        """The size of all bodies in bytes."""
+        """Return the total size of the bodies of all events, in bytes."""
         return sum(map(len, self.bodies))
 
     def part(self, start: int, end: int) -> "EventColumns":

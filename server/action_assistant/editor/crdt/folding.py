@@ -39,8 +39,10 @@ def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
 
 
 def fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
-    """A document, as the bytes of a snapshot or nothing, after some events that follow it; None when
-    these bytes are no document."""
+    """Apply events to a document and return the result. `document`: the bytes of a snapshot, or
+    empty bytes for a new document. `learn`: also collect what only editing needs. If an event
+    cannot be applied, return the document before this event, with the damage. Return None if
+    `document` is not readable as a snapshot."""
     replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None
@@ -66,7 +68,7 @@ def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Fo
 
 
 def _first_bad(document: bytes, events: EventColumns) -> tuple[int, str]:
-    """The place of the one among these events that cannot be applied, and why."""
+    """Return the index of the first of these events that cannot be applied, and the reason."""
     replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
     for n in range(len(events)):

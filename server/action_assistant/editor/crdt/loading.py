@@ -53,10 +53,9 @@ async def load(
     learn: bool | None = None,
     run_in_worker: RunInWorker = run_here,
 ) -> Loaded:
-    """The document of a stream, now or after its event `upto`, to go on with.
-
-    `learn`: what only editing needs; by default for a document as it is now. Raises Unavailable.
-    """
+    """Load the document of a stream as it is now, or after its event `upto`. `learn`: also collect
+    what only editing needs; the default is to do so only if `upto` is None. Raise Unavailable if
+    the log cannot be read."""
     learn = upto is None if learn is None else learn
     found = await stored(journal, stream, upto, learn=learn, run_in_worker=run_in_worker)
     replica = await _opened(found.document, run_in_worker)
@@ -108,10 +107,9 @@ async def stored(
     learn: bool,
     run_in_worker: RunInWorker = run_here,
 ) -> Stored:
-    """The document of a stream as bytes. What depends on its size is done by `run_in_worker`.
-
-    Raises Unavailable.
-    """
+    """Return the document of a stream as bytes, as it is now or after its event `upto`. Work that
+    grows with the document is done by `run_in_worker`. Raise Unavailable if the log cannot be
+    read."""
     snapshot = await _snapshot(journal, stream)
     if snapshot is not None and (upto is None or snapshot.seq <= upto):
         found = await _followed(
@@ -131,7 +129,8 @@ async def _followed(
     learn: bool,
     run_in_worker: RunInWorker,
 ) -> Stored:
-    """A snapshot, or nothing, and the events after it."""
+    """Apply the events after a snapshot to it; without a snapshot, apply all events of the stream
+    to an empty document. A snapshot that turns out to be unreadable is ignored."""
     start, document = (0, b"") if snapshot is None else (snapshot.seq, snapshot.state)
     tail = LogTail(journal, stream, start, upto)
     while events := await tail.next():
@@ -196,7 +195,8 @@ def _fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
 
 
 async def _snapshot(journal: Journal, stream: str) -> StreamSnapshot | None:
-    """The snapshot; none where it cannot even be read, since the log says all that it could."""
+    """Return the snapshot of a stream. Return None if there is none or if it cannot be read, since
+    the log has all that a snapshot has."""
     try:
         return await journal.snapshot(stream)
     except Unavailable as error:

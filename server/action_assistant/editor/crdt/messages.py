@@ -111,7 +111,7 @@ class ByteReader:
         self._at = 0
 
     def number(self) -> int:
-        """A varUint of at most 64 bit."""
+        """Read a varUint of at most 64 bits and return it."""
         number = shift = 0
         while True:
             if self._at >= len(self._data) or shift > 63:
@@ -124,7 +124,7 @@ class ByteReader:
             shift += 7
 
     def text(self) -> bytes:
-        """A varUint8Array, or a varString as UTF-8."""
+        """Read a varUint8Array, or a varString, and return its bytes (UTF-8 for a varString)."""
         length = self.number()
         if length > self.left:
             raise Malformed("longer than the message")
@@ -164,7 +164,7 @@ class ByteReader:
 
     @property
     def left(self) -> int:
-        """Bytes that were not read."""
+        """Return the number of bytes that were not read yet."""
         return len(self._data) - self._at
 
 
@@ -262,7 +262,8 @@ def number(value: int) -> bytes:
 
 
 def text(value: bytes) -> bytes:
-    """A varUint8Array, or a varString."""
+    """Return bytes encoded as a varUint8Array or, if they are UTF-8, as a varString, which has the
+    same form."""
     return number(len(value)) + value
 
 
@@ -288,7 +289,8 @@ def presence(entries: Iterable[PresenceEntry]) -> bytes:
 
 
 def acks(messages: int, seq: int) -> bytes:
-    """The first `messages` edits of this socket are durable; it was sent the log up to `seq`."""
+    """Return a message to a socket: the first `messages` edits that it sent are durable, and it was
+    sent all changes of the log up to `seq`."""
     return _ACKS + number(messages) + number(seq)
 
 
@@ -298,7 +300,7 @@ def compared(seq: int, entries: int, total: int) -> bytes:
 
 
 def read_only(why: str) -> bytes:
-    """Nobody may change this document; a sentence says why."""
+    """Return a message that nobody may change this document. `why`: the reason, as a sentence."""
     return bytes((READ_ONLY,)) + text(why.encode())
 
 

@@ -49,7 +49,7 @@ class Nesting:
         }
 
     def learn(self, depths: Mapping[Span, int]) -> None:
-        """The update has been applied."""
+        """Note the depth of each span of an update that was applied to the document."""
         for (client, start, end), depth in depths.items():
             insort(self.spans.setdefault(client, []), (start, end, depth))
 

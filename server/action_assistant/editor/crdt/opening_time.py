@@ -44,9 +44,9 @@ class OpeningTime:
         return self._came
 
     def opened(self, seconds: float, size: int, came: int | None = None) -> None:
-        """So many bytes were applied in so many seconds to a document with nothing in it: as it was when
-        so many structs had come, or as it is now. What is older than the newest measurement counts for
-        nothing."""
+        """Note a measurement: a document of `size` bytes was applied to an empty replica in
+        `seconds`. `came`: the number of structs that the document had received at that time;
+        None means now. A measurement older than the newest one is ignored."""
         then = self._came if came is None else came
         if then < self._came_then:
             return
@@ -58,7 +58,7 @@ class OpeningTime:
         self._bound()
 
     def took(self, structs: int) -> None:
-        """So many structs were added."""
+        """Count `structs` new structs of the document."""
         self._came += structs
 
     def is_doubtful_with(self, size: int) -> bool:

@@ -123,7 +123,7 @@ def read(sight: GraphAtSeq) -> Read:
 
 
 def graphs_of(inside: Inside) -> dict[str, Graph]:
-    """The graphs themselves, by name."""
+    """Return the graphs inside of a graph, keyed by name."""
     return {name: read(sight).moment.graph for name, sight in inside.graphs}
 
 
@@ -148,13 +148,13 @@ def counted(sight: GraphAtSeq, inside: Inside) -> tuple[Counts, ProblemCounts]:
 
 
 def names(sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
-    """The name of a graph, and those of its actions."""
+    """Return the name of a graph, and the names of its actions."""
     graph = read(sight).moment.graph
     return graph.name, uses_of(graph)
 
 
 def uses_of(graph: Graph) -> tuple[str, ...]:
-    """The names of a graph's actions."""
+    """Return the names of a graph's actions."""
     return tuple(sorted({action.name for action in graph.actions if not action.missing} - {""}))
 
 
@@ -237,12 +237,12 @@ def _text(graph: Graph, stamp: codec.Stamp) -> bytes:
 
 
 def digest_at(sight: GraphAtSeq) -> str:
-    """The digest of a graph at a moment."""
+    """Return the digest of a graph at a moment."""
     return digest(read(sight).moment.graph)
 
 
 def shown(state: bytes) -> Fingerprint:
-    """The fingerprint of what a document shows."""
+    """Return the fingerprint of what a document shows."""
     return fingerprint(maps_of(state))
 
 

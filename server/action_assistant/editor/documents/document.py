@@ -52,12 +52,13 @@ PLAIN: Final = (str, float, int, bool, list, dict, bytes, bytearray, type(None))
 
 
 def new_aid() -> Key:
-    """A random key for an action."""
+    """Return a new random key for an action."""
     return random_id()
 
 
 def read(doc: Doc) -> Graph:  # type: ignore[type-arg]
-    """The graph that a document shows. Never raises, never edits."""
+    """Return the graph that a document shows. The document is not changed, and no content of it
+    raises an error."""
     return read_maps(maps_of(doc))
 
 
@@ -71,20 +72,22 @@ def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
 
 
 def name_of(doc: Doc) -> str:  # type: ignore[type-arg]
-    """The name of the graph that a document shows, whatever else is in it."""
+    """Return the name of the graph that a document shows. The rest of the document is not read."""
     name = _root(doc, "meta").get("name")
     return name if isinstance(name, str) else ""
 
 
 def fill(doc: Doc, graph: Graph) -> None:  # type: ignore[type-arg]
-    """Writes a graph into an empty document. Keys that are no aids are replaced by fresh ones."""
+    """Write a graph into an empty document. Keys of actions that are no aids are replaced by new
+    random keys."""
     with doc.transaction():
         for root, fields in flatten(with_aids(graph)).items():
             _root(doc, cast(Root, root)).update(fields)
 
 
 def change(doc: Doc, target: Mapping[str, Mapping[str, object]]) -> None:  # type: ignore[type-arg]
-    """Edits the document until its maps equal `target`, touching only what differs."""
+    """Edit the document until its maps equal `target`. Keys whose values are equal already are not
+    touched."""
     with doc.transaction():
         now = maps_of(doc)
         for root in ROOTS:
@@ -197,7 +200,7 @@ def _place(positions: dict[str, object], key: Key, position: Position | None) ->
 
 
 def with_aids(graph: Graph) -> Graph:
-    """The graph with a fresh aid for every key that is none, or that stands twice."""
+    """Return the graph with a new random key for every action whose key is no aid or occurs twice."""
     seen: set[Key] = set()
     actions: list[Action] = []
     renamed: dict[Key, Key] = {}

@@ -34,7 +34,8 @@ _NOTHING: Fields = {}
 
 
 def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
-    """The graph that the document's maps show. Never raises; ignores what it does not know."""
+    """Return the graph that the maps of a document show. Entries that make no part of a graph are
+    ignored, and no content raises an error."""
     meta = maps.get("meta", _NOTHING)
     positions = maps.get("positions", _NOTHING)
     actions = _numbered(_actions(maps.get("actions", _NOTHING), positions))
@@ -122,7 +123,8 @@ def _parameters(own: Fields, side: str) -> tuple[Parameter, ...]:
 
 
 def _listed(names: Iterable[str], order: object) -> list[str]:
-    """Names in the order of a list, the others after them as they come."""
+    """Return the names in the order of the list `order`; names that the list lacks follow in the
+    order of `names`."""
     known = dict.fromkeys(names)
     first = [name for name in dict.fromkeys(values.text_list(order) or ()) if name in known]
     return list(dict.fromkeys([*first, *known]))

@@ -43,13 +43,13 @@ def is_aid(text: str) -> bool:
 
 
 def relation_id(relation: Relation | Ends) -> str:
-    """The id of a relation, which is also the head of its keys."""
+    """Return the id of a relation. The keys of its fields in the document begin with this id."""
     pair = f"{relation.parent}>{relation.child}"
     return f"{pair};{relation.listing}" if relation.listing else pair
 
 
 def ends_of(head: str) -> Ends | None:
-    """The ends that a relation id names; None when it fits no pattern."""
+    """Return the ends of the relation that has this id; None if the text is no id of a relation."""
     parent, arrow, rest = head.partition(">")
     child, semicolon, count = rest.partition(";")
     if not arrow or (semicolon and not _LISTING.fullmatch(count)):
@@ -100,7 +100,8 @@ def response(value: object) -> Response | None:
 
 
 def json_text(value: object) -> str | None:
-    """JSON as text, unparsed; None when it is none or nested deeper than 64."""
+    """Return a value as unparsed JSON text. Return None if the value is no JSON text, or is nested
+    deeper than 64 levels."""
     if not isinstance(value, str):
         return None
     try:

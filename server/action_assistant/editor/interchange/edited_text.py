@@ -305,7 +305,8 @@ def _numbered(
 
 
 def _between(now: Sequence[str], numbers: Mapping[str, float]) -> dict[str, float]:
-    """Numbers for the new ones alone, evenly between their neighbours."""
+    """Return numbers for the heads of `now` that have no number yet, evenly spaced between the
+    numbers of their neighbours."""
     found: dict[str, float] = {}
     run: list[str] = []
     low: float | None = None

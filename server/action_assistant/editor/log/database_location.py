@@ -100,7 +100,7 @@ def check(data: Path, url: str, *, switch: bool) -> None:
 
 
 def remember(data: Path, url: str) -> None:
-    """From now on the graphs are there."""
+    """Write down in the data folder that its graphs are in the database `url` from now on."""
     path = data / FILE
     parsed = make_url(url)
     if parsed.get_backend_name() == "sqlite":  # wherever commands are started
@@ -116,7 +116,7 @@ def remember(data: Path, url: str) -> None:
 
 
 def shown(url: str) -> str:
-    """A URL without what is secret in it."""
+    """Return a URL without its password and other secrets, to be shown to people."""
     parsed = make_url(url)
     query = {name: value for name, value in parsed.query.items() if _SECRET not in name}
     return URL.create(

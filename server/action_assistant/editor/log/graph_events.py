@@ -211,12 +211,13 @@ class RevokedInvitation(msgspec.Struct, frozen=True):
 
 
 def graph_stream(graph: str) -> str:
-    """The stream of a graph's document."""
+    """Return the name of the stream that holds the edits of a graph's document."""
     return f"graph/{graph}"
 
 
 def about_stream(graph: str) -> str:
-    """The stream of everything else about a graph."""
+    """Return the name of the stream that holds all events about a graph except the edits of its
+    document."""
     return f"about/{graph}"
 
 

@@ -54,7 +54,8 @@ REFUSED_SOCKET: Final = (b"x-refused", b"websocket")
 
 
 def cookie_name(page_port: int) -> str:
-    """Cookies ignore ports, so the name carries the page's."""
+    """Return the name of the session cookie. Browsers send cookies to every port of a host, so the
+    name holds the port of the page."""
     return f"aa_{page_port}"
 
 
@@ -109,7 +110,8 @@ def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | Non
 
 
 def live_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session:
-    """The browser's session. Raises, where the door is open to anybody, why there is none."""
+    """Return the session of the browser. If there is none, raise the refusal that says why: for
+    example, the session has ended."""
     state = connection.scope["state"]
     session: Session | None = state.get("session")
     if session is None:
@@ -126,7 +128,8 @@ class Plain(NamedTuple):
 
 
 def plain(connection: ASGIConnection[Any, Any, Any, Any]) -> Plain:
-    """Without what stands around the application; answers to requests need all of that."""
+    """Return the receive and send functions of a connection as the server gave them, before the
+    access layer wrapped `send`. Answers to requests need the wrapped function."""
     found: Plain = connection.scope["state"]["plain"]
     return found
 
@@ -281,7 +284,8 @@ class Access:
             raise state["ended"]
 
     def _sessions(self, headers: dict[str, str]) -> list[Session]:
-        """All whose seal is ours: there may be one for each path that this server has had."""
+        """Return the sessions of all cookies that this server sealed. A browser may send several,
+        one for each path at which this server was reachable."""
         tried = map(self._keys.session, cookies.values(headers.get("cookie", ""), self._cookie))
         return [each for each in tried if each is not None]
 
@@ -291,7 +295,8 @@ class Access:
         return next(filter(None, map(self._keys.device, given)), "")
 
     def _lasting(self, genuine: list[Session]) -> Session | None:
-        """The first one that lasts, else the first."""
+        """Return the first session that is neither expired nor revoked. If there is none, return
+        the first session, or None if `genuine` is empty."""
         lasting = (each for each in genuine if not (each.expired or self._revoked.ends(each)))
         return next(lasting, genuine[0] if genuine else None)
 

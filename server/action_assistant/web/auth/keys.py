@@ -129,8 +129,9 @@ class Keys:
         person_id: str | None = None,
         session_id: str | None = None,
     ) -> Session:
-        """A session from now on; with `person_id` for somebody who is known already, with
-        `session_id` for a browser whose session goes on, so that one end ends all cookies of it."""
+        """Make a session that begins now. `invitation`: the link by which the person came.
+        `person_id`: the id of a person who is known already. `session_id`: the id of a browser's
+        session that goes on, so that revoking it ends all cookies of this browser."""
         person = Person(person_id or random_id(), name, role)
         expires = time.time() + SESSION_SECONDS
         return Session(session_id or random_id(), person, expires, invitation)
@@ -140,7 +141,8 @@ class Keys:
         return _text(hmac.digest(self._seal, b"invitation\0" + invitation.encode(), "sha256"))
 
     def prove(self, challenge: str, address: str) -> ServerProof:
-        """For a client that is to show us the token."""
+        """Prove to a client that this server knows the token, before the client shows it.
+        `challenge`: the text that the client chose."""
         return ServerProof(address, self._proof(challenge, address))
 
     def proven(self, challenge: str, proof: ServerProof, *, at: str | None = None) -> bool:
@@ -162,7 +164,8 @@ class Keys:
 
     @cached_property
     def _proving(self) -> bytes:
-        """Strangers may ask for proofs: a token that somebody thought of must be slow to guess."""
+        """Derive the key for proofs from the token. The derivation is slow on purpose: strangers
+        may ask for proofs, and guessing a weak token from a proof must take long."""
         salt = b"action-assistant server"
         return hashlib.scrypt(self.token.encode(), salt=salt, n=1 << 14, r=8, p=1, dklen=32)
 

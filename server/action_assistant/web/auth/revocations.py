@@ -166,7 +166,7 @@ class SessionGuard:
             self._task.cancel()
 
     def let_go(self) -> None:
-        """The task goes on after it was cut."""
+        """Undo the cancellation of the task, so that the task goes on after the guard has cut it."""
         self._task.uncancel()
 
 

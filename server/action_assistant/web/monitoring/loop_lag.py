@@ -37,7 +37,7 @@ class LoopLag(Collector):
 
     @property
     def worst_s(self) -> float:
-        """The worst of the last minute, seconds."""
+        """Return the worst lag of the event loop in the last minute, in seconds."""
         return max(self._last, default=0.0)
 
     def collect(self) -> Iterator[Metric]:

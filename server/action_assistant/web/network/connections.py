@@ -49,7 +49,7 @@ class Connection:
         return self._wire.fileno() < 0
 
     def end(self) -> None:
-        """Now, whatever waits to be sent."""
+        """Close the connection at once, and drop what waits to be sent."""
         if self.is_silent:
             asyncio.get_running_loop().remove_reader(self._wire)
             self._wire.close()
@@ -74,7 +74,8 @@ class ConnectionsByHolder:
         return iter(self._peers.items())
 
     def get(self, peer: Peer) -> Connection | None:
-        """The one with this other end."""
+        """Return the connection whose other end has this address; None if there is no such
+        connection."""
         return self._peers.get(peer)
 
     def most(self) -> dict[Peer, Connection]:
@@ -90,8 +91,8 @@ class ConnectionsByHolder:
         self._by.setdefault(connection.holder, {})[peer] = connection
 
     def remove(self, peer: Peer, connection: Connection) -> None:
-        """Remove this connection of a peer from those of its holder. Do nothing if the peer has
-        another connection by now, or none."""
+        """Remove a connection. Do nothing if the connection with this address is not there or is
+        another one."""
         if self._peers.get(peer) is not connection:
             return
         del self._peers[peer]
@@ -153,7 +154,7 @@ class Connections:
             self._keep(self._sweep())
 
     def close(self) -> None:
-        """Accept nobody any more. Connections that are there stay."""
+        """Stop accepting connections. Connections that are open stay open."""
         loop = asyncio.get_running_loop()
         for listener in self._listeners:
             loop.remove_reader(listener)
@@ -236,7 +237,9 @@ class Connections:
     # --- going --------------------------------------------------------------------------------
 
     def _make_room(self, among: ConnectionsByHolder, most: int) -> None:
-        """The oldest of whoever holds most goes, those first that nothing is being done for."""
+        """Close connections until at most `most` are left. Each time, choose among the oldest
+        connections of the holder that has most, and prefer a connection on which no request is
+        being answered."""
         while len(among) > most:
             of_them = among.most()
             first = tuple(islice(of_them.items(), _LOOKED_AT))
