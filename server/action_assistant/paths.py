@@ -8,7 +8,8 @@ _CHECKOUT = _PACKAGE.parent.parent
 
 
 def _carried(name: str, in_checkout: Path) -> Path:
-    """A folder that the wheel carries inside the package and a checkout keeps at its top."""
+    """Return the folder `in_checkout` if this program runs from a checkout, else the folder `name`
+    inside the installed package."""
     return in_checkout if (_CHECKOUT / "pyproject.toml").is_file() else _PACKAGE / name
 
 
@@ -18,7 +19,7 @@ def migrations() -> Path:
 
 
 def page() -> Path:
-    """The built page; the folder is missing when nobody has built it."""
+    """Return the folder of the built page. The folder does not exist if the page was not built."""
     return _carried("static", _CHECKOUT / "frontend" / "dist")
 
 
@@ -28,22 +29,25 @@ def page_sources() -> Path | None:
 
 
 def checkout() -> Path | None:
-    """The folder of the sources, when this program runs from them."""
+    """Return the top folder of the checkout from which this program runs; None if it runs from an
+    installed package."""
     return _CHECKOUT if (_CHECKOUT / "pyproject.toml").is_file() else None
 
 
 def help_site() -> Path:
-    """The built documentation; the folder is missing when nobody has built it."""
+    """Return the folder of the built documentation. The folder does not exist if the documentation
+    was not built."""
     return _carried("help", _CHECKOUT / "build" / "help")
 
 
 def wheels() -> Path | None:
-    """The environment that `make ros` makes in a checkout; None outside of one."""
+    """Return the folder of the Python environment that `make ros` makes in a checkout; None if this
+    program does not run from a checkout."""
     return _CHECKOUT / ".venv-ros" if checkout() is not None else None
 
 
 def examples() -> Path:
-    """The example graphs that greet a new user."""
+    """Return the folder of the example graphs that a new user gets."""
     return _PACKAGE / "examples"
 
 

@@ -19,7 +19,8 @@ _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
 
 def opener(path: str, flags: int) -> int:
-    """For `open(…, opener=opener)`: whatever is made by it, only this user may read and write."""
+    """Open a file so that only this user may read and write it if it is new. Pass this function to
+    `open(…, opener=opener)`."""
     return os.open(path, flags, 0o600)
 
 
@@ -58,8 +59,9 @@ def sync(path: Path) -> None:
 
 
 def own_folder(data: Path) -> Path:
-    """A data folder, made if need be, proven writable, and closed to other users as far as it is ours.
-    Raises CannotStart."""
+    """Make the data folder if it is missing, check that it is writable, close our files in it to
+    other users, and return its path. The folder itself stays open to other users if it also
+    holds files that are not ours. Raise CannotStart if it cannot be written."""
     prove_writable(data)
     for path in open_to_others(data):
         if path != data or holds_nothing_else(data):
@@ -68,7 +70,8 @@ def own_folder(data: Path) -> Path:
 
 
 def prove_writable(data: Path) -> None:
-    """Raises CannotStart. The folder is made if need be."""
+    """Make the data folder if it is missing, and check that files can be made in it. Raise
+    CannotStart if they cannot."""
     try:
         data.mkdir(mode=0o700, parents=True, exist_ok=True)
         probe = data / f".probe-{os.getpid()}"

@@ -79,7 +79,7 @@ class PublicUrl(msgspec.Struct, frozen=True):
 
 
 def public_url(text: str) -> PublicUrl:
-    """The address that somebody wrote down. Raises CannotStart."""
+    """Parse the public address that somebody configured. Raise CannotStart if it cannot be used."""
     try:
         parts = urlsplit(text.strip())
         port = parts.port
@@ -114,7 +114,8 @@ def public_url(text: str) -> PublicUrl:
 
 
 def proxies(text: str) -> tuple[Network, ...]:
-    """Addresses and networks, comma separated. Raises CannotStart."""
+    """Parse a list of addresses and networks that are separated by commas. Raise CannotStart if an
+    entry is neither."""
     try:
         return tuple(ipaddress.ip_network(each.strip()) for each in text.split(",") if each.strip())
     except ValueError as error:

@@ -8,6 +8,6 @@ _CHARACTERS: Final = string.ascii_letters + string.digits
 
 
 def random_id() -> str:
-    """12 letters and digits, 71 bits: safe in an address, a file name and a shell, where one that
-    began with a dash would be an option, and a Stop refused for it."""
+    """Return a random id of 12 letters and digits (71 bits). It is safe in a URL, a file name and a
+    shell; it never begins with a dash, which a command would read as an option."""
     return "".join(secrets.choice(_CHARACTERS) for _ in range(12))

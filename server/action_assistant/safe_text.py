@@ -46,7 +46,8 @@ _Raised: TypeAlias = (
 
 
 def printable(text: str) -> str:
-    """The text, with lines and tabs as they were."""
+    """Return the text with its control characters written as escape sequences. Line breaks and tabs
+    stay as they are."""
     return _STEERING.sub(lambda found: f"\\u{ord(found[0]):04x}", text)
 
 
@@ -89,7 +90,8 @@ def hold_names(told: msgspec.Struct, *fields: str) -> None:
 
 
 def redacted(text: str, secrets: tuple[str, ...] = ()) -> str:
-    """The text without what would let its readers in."""
+    """Return the text without secrets: each of `secrets`, and each pattern that looks like a
+    secret, is replaced."""
     for secret in secrets:
         text = text.replace(secret, "…")
     for pattern, shown in _SECRETS:
@@ -106,7 +108,7 @@ class PrintableStream:
         self._shown = told if sentences else printable
 
     def write(self, text: str) -> int:
-        """Returns how many characters were taken."""
+        """Write the text in its printable form. Return the number of characters of `text`."""
         self._stream.write(self._shown(text))
         return len(text)
 
@@ -115,7 +117,7 @@ class PrintableStream:
 
 
 def make_streams_printable() -> None:
-    """From here on, for `print` and everything else."""
+    """Replace the standard output and the standard error by streams that write only printable text."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is not None and not isinstance(stream, PrintableStream):

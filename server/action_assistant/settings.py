@@ -161,7 +161,8 @@ def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> N
 
 
 def port(environ: Mapping[str, str] = os.environ) -> int:
-    """The editor's, when the command line names none. Raises CannotStart."""
+    """Return the port of the editor from ACTION_ASSISTANT_PORT, or 8000 if the variable is not set.
+    Raise CannotStart if it is no port below 65535."""
     text = environ.get("ACTION_ASSISTANT_PORT", "").strip() or "8000"
     if not text.isdecimal() or not 0 < int(text) < 65535:
         raise CannotStart(f"ACTION_ASSISTANT_PORT is a port below 65535, not {text!r}.")
@@ -178,7 +179,8 @@ def share(environ: Mapping[str, str] = os.environ) -> str:
 
 
 def database(environ: Mapping[str, str] = os.environ) -> str | None:
-    """The editor's, when the command line names none."""
+    """Return the URL of the editor's database from ACTION_ASSISTANT_DATABASE; None if the variable
+    is not set."""
     return environ.get("ACTION_ASSISTANT_DATABASE") or None
 
 
@@ -222,12 +224,14 @@ def hide_target_password() -> None:
 
 
 def _is_database(name: str) -> bool:
-    """Also as far as argparse takes it for that; `--data` is an option of its own."""
+    """Tell whether an argument is the option `--database` or a beginning of it that argparse
+    accepts. `--data` is another option."""
     return len(name) > len("--data") and "--database".startswith(name)
 
 
 def _has_password(url: str) -> bool:
-    """Or may have: SQLAlchemy allows characters in it that others take for its end."""
+    """Tell whether a URL may hold a password. The test is wide on purpose: SQLAlchemy allows
+    characters in a password that others read as its end."""
     return "@" in url or "password=" in url
 
 
@@ -308,7 +312,8 @@ def as_index_folders(folders: Mapping[str, Path]) -> str:
 
 
 def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
-    """Host names, beside the loopback ones, under which people reach the page."""
+    """Return the host names from ACTION_ASSISTANT_HOSTS under which people reach the page, beside
+    the loopback names."""
     names = environ.get("ACTION_ASSISTANT_HOSTS", "")
     return tuple(name.strip().lower() for name in names.split(",") if name.strip())
 

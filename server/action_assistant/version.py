@@ -24,8 +24,8 @@ _SHORT: Final = 8
 
 @cache
 def commit() -> str | None:
-    """The commit of this program, 40 hex digits; with `+` behind it if the wheel was built from files
-    that had been changed since. None when nobody knows."""
+    """Return the commit of this program as 40 hex digits; None if it is not known. A `+` follows if
+    the wheel was built from files with changes that were not committed."""
     try:
         return _CARRIED.read_text().strip() or None
     except OSError:
@@ -33,8 +33,8 @@ def commit() -> str | None:
 
 
 def described() -> str:
-    """For people: `0.1.0 (commit 1a2b3c4d)`, and whether it runs from a checkout, where files may have
-    been changed since."""
+    """Return the version for people, for example `0.1.0 (commit 1a2b3c4d)`. The text also says if
+    the program runs from a checkout, where files may have changed since the commit."""
     known = commit()
     if known is None:
         return f"{VERSION} (commit not known)"

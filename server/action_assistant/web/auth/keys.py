@@ -142,7 +142,8 @@ class Keys:
 
     def prove(self, challenge: str, address: str) -> ServerProof:
         """Prove to a client that this server knows the token, before the client shows it.
-        `challenge`: the text that the client chose."""
+        `challenge`: the text that the client chose. `address`: the address (`HOST:PORT`) that
+        accepted the connection of the client."""
         return ServerProof(address, self._proof(challenge, address))
 
     def proven(self, challenge: str, proof: ServerProof, *, at: str | None = None) -> bool:
