@@ -64,28 +64,31 @@ class JournalReader:
     async def read(
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
-        """The events of a stream with `after < seq <= upto`, in order."""
+        """Return the events of a stream with `after < seq <= upto`, in order. `limit`: return at
+        most so many events, the oldest of them."""
         chosen = _EVENTS.where(_event.stream == stream, _event.seq > after)
         if upto is not None:
             chosen = chosen.where(_event.seq <= upto)
         return await self._events(chosen.order_by(_event.seq).limit(limit))
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
-        """The events of a stream with `after < seq <= upto`, in order, most of them of the kind
-        `usual`. Fewer than that when some are missing."""
+        """Return the events of a stream with `after < seq <= upto`, in order. `usual`: the kind
+        that most of these events have. The list is shorter than `upto - after` if events are
+        missing."""
         place = {"stream": stream, "usual": usual, "after": after, "upto": upto}
         return cast("list[BareEvent]", await self.plain_rows(_BARE, place))
 
     async def read_all(self, *, after: int = 0, limit: int = _PAGE) -> list[Event]:
-        """The events of all streams with `position > after`, in order."""
+        """Return the first `limit` events of all streams with `position > after`, in order of their
+        positions."""
         return await self._events(following(after, limit))
 
     async def newest(self, stream: str) -> int:
-        """The seq of a stream's last event; 0 when there is none."""
+        """Return the sequence number of the last event of a stream; 0 if the stream is empty."""
         return await self._number(_NEWEST, {"stream": stream})
 
     async def position(self) -> int:
-        """The position of the last event of all."""
+        """Return the position of the newest event of all streams; 0 if there are no events."""
         return await self._number(select(func.max(_event.position)))
 
     async def query(
@@ -102,7 +105,8 @@ class JournalReader:
         return await self._ask(lambda connection: _plain(connection.execute(statement, values)))
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
-        """The cached sum of a stream; None when there is none, or when it does not fit the log."""
+        """Return the cached state of a stream. Return None if none is stored, or if its seal does
+        not match the event after which it was made."""
 
         def find(connection: Connection) -> StreamSnapshot | None:
             row = connection.execute(_KEPT, {"stream": stream}).first()
@@ -114,7 +118,8 @@ class JournalReader:
         return await self._ask(find)
 
     async def end(self, stream: str) -> Head:
-        """The last event of a stream, and the chain up to it."""
+        """Return the sequence number of the last event of a stream, and its chain value; NOTHING if
+        the stream is empty."""
         chosen = select(_head.seq, _head.chain).where(_head.stream == stream)
         row = await self._ask(lambda connection: connection.execute(chosen).first())
         return Head(*row) if row is not None else NOTHING
@@ -154,15 +159,16 @@ def _plain(result: CursorResult[Any]) -> list[Sequence[Any]]:
 
 
 def following(position: int, limit: int) -> Select[Any]:
-    """Events of all streams from a position on."""
+    """Return a query for the first `limit` events of all streams after a position, in order."""
     return _EVENTS.where(_event.position > position).order_by(_event.position).limit(limit)
 
 
 def body_of(connection: Connection, stream: str, seq: int) -> bytes:
-    """The bytes of an event; none when it is not there."""
+    """Return the body of an event; empty bytes if there is no such event."""
     return connection.execute(_BODY, {"stream": stream, "seq": seq}).scalar() or b""
 
 
 def seal_of(event: bytes, state: bytes) -> bytes:
-    """Ties a snapshot to its own bytes and to the event it was made at."""
+    """Return a digest that ties a snapshot to its own bytes (`state`) and to the body of the event
+    after which it was made (`event`)."""
     return hashlib.sha256(hashlib.sha256(event).digest() + state).digest()

@@ -29,7 +29,8 @@ class SharedCheck(Generic[T]):
         return task.result() if done else None
 
     def begin(self) -> "asyncio.Task[T]":
-        """Ask, unless that is under way or the answer is fresh; return what will have the answer."""
+        """Start to ask, unless a question is under way or the last answer is fresh. Return the task
+        whose result is the answer."""
         loop = asyncio.get_running_loop()
         task = self._task
         if task is None or (task.done() and loop.time() - self._answered_at > self._fresh):
@@ -40,7 +41,8 @@ class SharedCheck(Generic[T]):
 
     @property
     def last(self) -> tuple[T, float, float] | None:
-        """The last answer, how many seconds old it is, and how many seconds it took; None before the first."""
+        """Return the last answer, its age and the time that it took, both in seconds. Return None
+        before the first answer."""
         if self._last is None:
             return None
         answer, at, took = self._last
@@ -48,7 +50,8 @@ class SharedCheck(Generic[T]):
 
     @property
     def under_way(self) -> float | None:
-        """For how many seconds an answer has been waited for; None where none is."""
+        """Return for how many seconds the present question has been waiting for its answer; None if
+        no question is under way."""
         if self._task is None or self._task.done():
             return None
         return asyncio.get_running_loop().time() - self._asked_at

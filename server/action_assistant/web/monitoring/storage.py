@@ -126,7 +126,8 @@ class StorageWatch:
 
 
 def bytes_below(folders: Mapping[str, Path]) -> dict[str, int]:
-    """Bytes of all files in each folder; those that are not there have none."""
+    """Return the total size of all files in each folder, in bytes, by the name of the folder. A
+    folder that does not exist has 0 bytes."""
     return {name: sum(_sizes(path)) for name, path in folders.items()}
 
 

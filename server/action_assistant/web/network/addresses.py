@@ -19,7 +19,8 @@ _INNER: Final = ("docker", "br-", "veth", "virbr", "cni", "podman", "lxc", "lxd"
 
 
 def host_name(host: str) -> str:
-    """The name in a Host header or URL authority, without port, lower case; "" if it is none."""
+    """Return the host name in a Host header or URL authority, in lower case and without the port;
+    "" if the text cannot be parsed."""
     return _host_and_port(host)[0]
 
 
@@ -123,7 +124,7 @@ class Addresses:
         return (port or (443 if parts.scheme == "https" else 80)) == self._page_port
 
     def public_at(self, header: str) -> PublicUrl | None:
-        """The public address, if this is what a Host header names; None for everything else."""
+        """Return the public address if the Host header `header` names it, else None."""
         public = self._public
         return public if public is not None and public.is_named(*_host_and_port(header)) else None
 
@@ -147,7 +148,8 @@ class Addresses:
         return public.runner if public is not None else self.direct(header, port)
 
     def direct(self, header: str, port: int) -> str:
-        """A port of ours under the name that somebody used; without a slash at the end."""
+        """Return the URL of a port of this computer under the host name of a Host header, without a
+        slash at the end."""
         return f"{self._scheme}://{_shown(host_name(header) or '127.0.0.1')}:{port}"
 
     def jar(self, header: str) -> tuple[bool, str]:
@@ -166,7 +168,7 @@ class Addresses:
         return tuple(dict.fromkeys((*self._named, *own, *self._found)))
 
     def certified(self) -> tuple[str, ...]:
-        """Every name that a certificate has to carry."""
+        """Return every host name for which the certificate has to be valid."""
         if self._lan is not None:
             self._found = self._lan()
         return tuple(dict.fromkeys((*sorted(LOOPBACK), *self.names())))
