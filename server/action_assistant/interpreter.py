@@ -42,8 +42,12 @@ class Interpreter(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def for_runner(environ: Mapping[str, str] = os.environ) -> Interpreter:
-    """The one to take: whoever is named, else this one where it can speak ROS 2 by itself or through
-    the workspace that is sourced, else the one of `make ros`, else this one. Raises CannotStart."""
+    """Choose the Python interpreter that runs the runner: the one that the environment names; else
+    the running one if it finds an rclpy that fits; else the one that `make ros` made, if it is
+    up to date; else the running one, with a remark why it fits badly.
+
+    Raise CannotStart if the environment names no program.
+    """
     named = environ.get(VARIABLE)
     if named:
         path = Path(named)

@@ -137,9 +137,11 @@ def running(options: argparse.Namespace) -> Iterator[Server]:
 
 
 def reach(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments of an httpx client for the server of a command.
+    """Return the arguments of an httpx client that talks to the server which a command is meant
+    for.
 
-    The client sends the token only after the server has proven that it knows it. Raise CannotStart.
+    The client sends the token only after the server has proven that it knows the token. Raise
+    CannotStart if the data folder holds no token that can be read.
     """
     from action_assistant.commands.token_proof import AfterProof
 

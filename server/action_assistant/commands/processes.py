@@ -194,7 +194,8 @@ def _host(options: argparse.Namespace) -> str:
 def _identity(
     chosen: settings.EditorSettings | settings.RunnerSettings, page_port: int
 ) -> "TlsIdentity | None":
-    """The certificate of a process, with --tls."""
+    """Return the certificate that a process serves, for all addresses at which it can be reached;
+    None without --tls. `page_port` is the port at which people open the page."""
     if not chosen.tls:
         return None
     from action_assistant.web.network.addresses import addresses_of

@@ -169,7 +169,8 @@ def _routes(
 
 
 async def _greet(services: EditorServices, folder: Path) -> None:
-    """Fill an empty catalogue with the graphs that come with the program."""
+    """Import the graphs in `folder`, which are shipped with the program, as examples. The caller
+    does so only for a new catalogue. A file that cannot be read is logged and skipped."""
     files = [path async for path in anyio.Path(folder).glob("*.umrf.graph.json")]
     for path in sorted(files, reverse=True):  # the last one made stands first in the list
         try:

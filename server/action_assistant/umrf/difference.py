@@ -76,8 +76,8 @@ class Difference(msgspec.Struct, frozen=True):
 
 
 def difference(before: tuple[int, Graph], after: tuple[int, Graph]) -> Difference:
-    """Compare two states of a graph. Each is given with the number of the change of the document at
-    which the graph was in this state."""
+    """Return what changed in a graph from `before` to `after`. Each is a pair: the number of a
+    change of the graph's document, and the graph after that change."""
     (old_seq, old), (new_seq, new) = before, after
     return Difference(
         old_seq,

@@ -1095,7 +1095,7 @@ export interface RunnerApi {
     };
     /**
      * RestRequest
-     * @description A person's word that a run is at rest; `how` says by what that was seen.
+     * @description A person's statement that a run is at rest. `how` says by what the person saw that.
      */
     RestRequest: {
         how: string;

@@ -153,10 +153,11 @@ def _exchange(part: Path, path: Path, aside: Path) -> None:
 
 
 def _emptied(path: Path) -> int | None:
-    """Return the number of events of a database, after its write-ahead log was merged into the
-    file.
+    """Merge the write-ahead log of a SQLite database into its file, and return the number of events
+    in the database.
 
-    Return None for a damaged file. Raise CannotStart while somebody else has it open.
+    Return None if the file is damaged. Raise CannotStart if another process has the database open,
+    or if it cannot be closed for another reason.
     """
     if not path.exists():
         return 0

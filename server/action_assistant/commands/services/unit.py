@@ -234,8 +234,8 @@ class Systemd:
                 )
 
     def state(self) -> dict[str, str]:
-        """Return the properties that the manager reports of the service; empty if it cannot be
-        asked."""
+        """Return the service's properties, as systemd's manager reports them: name → value. Return
+        an empty dict if the manager does not answer."""
         wanted = "LoadState,ActiveState,SubState,MainPID,NRestarts,UnitFileState,DropInPaths"
         answer = subprocess.run(
             self.command("show", NAME, "--property", wanted),

@@ -38,9 +38,13 @@ def applying() -> AbstractContextManager[None]:
 
 
 def apply_updates(doc: "Doc[Any]", *updates: bytes) -> None:
-    """Apply updates in one transaction, as `doc.apply_update` does for each. No other transaction may be under
-    way, and errors of observers are dropped. The library's Python layer costs more than the change itself: this
-    saves a twentieth of the cost of an edit, a quarter where many come together."""
+    """Apply updates in one transaction, with the same result as `doc.apply_update` for each. The
+    caller must have no other transaction open. Errors of observers are dropped.
+
+    The function calls the library's core, since its Python layer costs more than the change itself.
+    That saves a twentieth of the cost of an edit, and a quarter where many updates are applied
+    together.
+    """
     core = doc._doc  # noqa: SLF001 - no public way is as short; tests hold both to be the same
     transaction = core.create_transaction()
     try:

@@ -31,10 +31,11 @@ class Nesting:
         self.spans: Final = spans or {}
 
     def depths(self, placed: tuple[Placed, ...], known: Mapping[int, int]) -> dict[Span, int]:
-        """Return how deep the new structs of an update lie inside of others, by their spans. `known`: how many
-        clocks of each client the document has.
+        """Return how many types enclose each struct that an update adds, by the struct's span.
+        Structs that no type encloses are left out. `known` gives, for each client, the first
+        clock that the document does not have yet.
 
-        Raises Malformed for types that are nested too deeply.
+        Raise Malformed if a struct lies too deep.
         """
         if not placed or (not self.spans and not any(each.inside for each in placed)):
             return {}

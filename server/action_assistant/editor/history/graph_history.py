@@ -106,7 +106,8 @@ class GraphHistory:
 def history_of(
     connection: Connection, graph: str, limit: int, before: int | None
 ) -> list[HistoryEntry]:
-    """The entries of a graph's history, newest first."""
+    """Return the newest entries of a graph's history, newest first, at most `limit`. With `before`,
+    the number of a change of the document, return only entries from before that change."""
     person = stored_people(connection)
     versions = versions_by_event(connection, graph)
     special = _special(connection, graph, person)

@@ -118,8 +118,9 @@ def _packed(document: bytes) -> bytes:
 
 
 def _unpacked(kept: bytes) -> bytes:
-    """The document of a head, also of one that was kept before they were packed. What cannot be unpacked is returned
-    as it is: it is no document either, and the index starts anew."""
+    """Decompress the document in a stored head of the change index. Older versions stored the
+    document uncompressed; such bytes are returned as they are. Damaged bytes are returned as
+    they are, too: the caller finds that they are no document, and builds the index anew."""
     if kept[:1] != _ZLIB:
         return kept
     try:

@@ -33,7 +33,8 @@ def chosen(base: object, ours: object, theirs: object) -> Side | None:
 
 
 def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
-    """Call `edit` on a copy of a document, and return its changes as one update."""
+    """Call `edit` on a copy of the document with this encoded state, and return the changes that it
+    makes as one update."""
     copy: Doc[Any] = Doc()
     if state:
         copy.apply_update(state)

@@ -98,7 +98,9 @@ def found(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
 
 
 def merged(sources: list[tuple[ActionSource, bytes]]) -> bytes:
-    """JSON of what the library and several graphs know, the last changed first."""
+    """Return all actions of the library's documents and of graphs as JSON: a list of
+    `LibraryAction`, ordered by name. `sources` are documents, the last changed first, each with
+    its actions as `found` encodes them."""
     uses: dict[str, list[tuple[ActionSource, Action]]] = {}
     known: list[tuple[ActionSource, Action, tuple[str, ...]]] = []
     for source, text in sources:

@@ -65,8 +65,12 @@ def is_own(data: Path, url: str) -> bool:
 
 
 def remembered(data: Path) -> str | None:
-    """The URL of a database elsewhere; None when the folder holds its graphs itself, or none.
-    Raises CannotStart."""
+    """Return the URL of the database outside of the data folder that `remember` has written down
+    there. Return None if nothing is written down: the graphs are then in the folder itself, or
+    there are none yet.
+
+    Raise CannotStart if the file with the URL cannot be read or is damaged.
+    """
     try:
         return msgspec.json.decode((data / FILE).read_bytes(), type=StoredLocation).database
     except FileNotFoundError:

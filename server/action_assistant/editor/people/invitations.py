@@ -222,7 +222,8 @@ class Invitations:
         await self._journal.append(h.INVITATIONS, [h.draft(kind, author, body)])
 
     async def _read(self, new: str | None = None) -> None:
-        """Read one new invitation from the tables, or all of them."""
+        """Read the invitation with the id `new` from the tables into memory. Without an id, read
+        all invitations and their guests."""
         which = select(editor_tables.invitation)
         if new is not None:
             which = which.where(editor_tables.invitation.c.id == new)

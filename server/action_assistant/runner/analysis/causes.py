@@ -501,7 +501,11 @@ def _given_up(run: Run) -> int | None:
 def _waiting(
     run: Run, names: dict[str, str], child: str, arrows: list[Relation], moment: int
 ) -> Iterator[Waiting]:
-    """Yield the parents that a join waited for, when at least one other parent had ended."""
+    """Yield the parents that kept the action `child` from running at `moment` (microseconds UTC).
+    `arrows` are the required arrows to `child`; `names` gives full names of actions by key.
+
+    Yield nothing unless `child` has several parents and at least one of them had ended by then.
+    """
     parents = [(names[arrow.parent], arrow) for arrow in arrows if arrow.parent in names]
     if not any(_over(run.actions.get(name), moment) for name, _ in parents) or len(parents) < 2:
         return

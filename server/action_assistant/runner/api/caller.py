@@ -27,8 +27,8 @@ _BODY_S: Final = 60.0
 
 
 def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
-    """Return the person behind a request or a socket. Programs send the token, browsers have a
-    session."""
+    """Return the person who sent a request or opened a socket. A caller with a session counts as a
+    browser, a caller that sends the token instead counts as a program."""
     person = person_of(connection)
     return Author(
         person.id,

@@ -38,7 +38,8 @@ class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 
 async def pause(opened: OpenRun, author: Author) -> Run:
-    """Pause a run. Raises Conflict, Unavailable."""
+    """Pause a run. Raise Conflict if the run is not running or pausing is not safe on its engine,
+    Unavailable if the message could not be sent."""
     run = opened.run
     if run.state != "running" or run.desired != "running":
         raise Conflict(f"Only a running run can be paused; this one is {_condition(run)}.")
@@ -52,7 +53,8 @@ async def pause(opened: OpenRun, author: Author) -> Run:
 
 
 async def resume(opened: OpenRun, author: Author) -> Run:
-    """Let a paused run go on. Raises Conflict, Unavailable."""
+    """Let a paused run go on. Raise Conflict if the run is not paused, Unavailable if the message
+    could not be sent."""
     if opened.run.desired != "paused":
         raise Conflict(f"Only a paused run can go on; this one is {_condition(opened.run)}.")
     try:
@@ -71,8 +73,13 @@ async def modify(
     approvals: Approvals,
     run_in_worker: RunInWorker,
 ) -> Run:
-    """Give a running graph another structure; `body` is a ModifyRequest, `engine` None that of a
-    simulated run. Raises BadInput, Conflict, Unavailable, OutcomeUnknown."""
+    """Give a running graph another structure. `body` is an encoded ModifyRequest; `engine` is None
+    for a simulated run.
+
+    Raise BadInput if the body is wrong, Conflict if the run or its engine does not allow the
+    change, Unavailable if the message could not be sent, and OutcomeUnknown if nobody knows whether
+    the engine has made the change.
+    """
     run = opened.run
     _require_moving(run)
     if not opened.pauses:
@@ -105,7 +112,7 @@ async def modify(
 
 
 def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
-    """Return a change as a request to start the other version, which is checked in the same way."""
+    """Return a change as a request to start the other version, so that the same checks apply to it."""
     return StartRequest(
         version=asked.version,
         digest=asked.digest,
@@ -118,8 +125,8 @@ def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
 
 
 async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInWorker) -> None:
-    """Refuse a change with actions that the engine cannot build, since it looks none up for a change:
-    sub-graphs, and actions that it does not know. Raises Conflict."""
+    """Raise Conflict if a changed graph has sub-graphs or actions that the engine cannot build. For
+    a change the engine does not look actions up in its index, and it would abort."""
     held = {each.graph for each in engine.answer.graphs} if engine.answer is not None else set()
     index = await engine.index(run_in_worker)
     lost = await run_in_worker(not_matched_in, umrf, engine.facts, index, held)
@@ -132,13 +139,15 @@ async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInW
 
 
 class RestRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A person's word that a run is at rest; `how` says by what that was seen."""
+    """A person's statement that a run is at rest. `how` says by what the person saw that."""
 
     how: Annotated[str, msgspec.Meta(min_length=3, max_length=500)]
 
 
 def confirm_rest(opened: OpenRun, asked: RestRequest, author: Author) -> Run:
-    """End a run of which nothing that its engine says can prove rest. Raises BadInput, Conflict."""
+    """End a run because a person has seen it at rest, where no answer of its engine can prove that.
+    Raise BadInput if the person does not say how, Conflict if the run is simulated or its
+    engine's answers still count."""
     run, how = opened.run, asked.how.strip()
     if len(how) < 3:
         raise BadInput("Say how it was seen that nothing moves.", where={"path": "/how"})

@@ -295,7 +295,8 @@ class OpenRun:
         )
 
     async def _opens_again(self) -> bool:
-        """Wait until everything is stored, or until the run moves again; return whether it moves again."""
+        """Wait until all events of the run are stored, or until the run moves again after its end.
+        Return True if the run moves again and must be driven on, False if it can be closed."""
         async with anyio.create_task_group() as tasks:
 
             async def wait_until_stored() -> None:

@@ -107,9 +107,9 @@ class ExecutionService:
         past: Past | None = None,
         sources: StartSources = NO_SOURCES,
     ) -> "AsyncIterator[ExecutionService]":
-        """Open the service, after it has adopted the runs that an earlier process left open. `past`
-        reads runs that are over; `simulator` makes links of simulated runs; `sources`: behaviours,
-        expected courses and index folders for starts."""
+        """Open the service, after it has taken over the runs that an earlier process left open.
+        `past` reads runs that are over; `simulator` makes links to simulated engines; `sources`
+        are the behaviours, expected courses and index folders that starts need."""
         async with anyio.create_task_group() as tasks:
             control = cls(
                 journal,
@@ -142,51 +142,56 @@ class ExecutionService:
     # --- start --------------------------------------------------------------------------------
 
     async def start(self, request: StartRequest, author: Author) -> Started:
-        """Carry out a start, at most once per request. Returns after the one message has left. Raises
-        Refused of many kinds; then nothing was sent."""
+        """Carry out a start, at most once per request id. Return after the one start message has
+        left. Raise a subclass of Refused if the start is refused; nothing was sent then."""
         return await self._starts.start(request, author)
 
     async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
-        """Start one version on several robots: each start is accepted before the first message leaves.
-        Raises Refused; then nothing was sent to any of them."""
+        """Start one version on several robots. Every start is accepted before the first message
+        leaves. Raise a subclass of Refused if one start is refused; nothing was sent to any
+        robot then."""
         return await self._starts.start_group(group, author)
 
     async def look(self, group: GroupRequest, starter: str = "") -> list[Preflight]:
-        """Return the pre-flight of a start by this person on each engine. Sends nothing but a get."""
+        """Return the pre-flight of a start on each engine; `starter` is the id of the person who
+        would start. Only a get is sent."""
         return await self._starts.look(group, starter)
 
     def under_way(self, request_id: str) -> bool:
-        """Return whether this start, or start of a group, is being carried out at this moment."""
+        """Return whether the start, or the start of a group, with this request id is being carried
+        out at this moment."""
         return self._starts.is_under_way(request_id)
 
     def next_number(self) -> int:
-        """Return the number of one more run; each is given once."""
+        """Return the number for a new run. Each number is given once."""
         return self._runs.next_number()
 
     async def change(self, run: str, revision: int) -> None:
-        """Wait until an open run has another revision than this one, or is over and stored."""
+        """Wait until an open run has another revision than `revision`, or is over and stored."""
         await self._runs.change(run, revision)
 
     # --- stop, pause, resume ------------------------------------------------------------------
 
     def stop_all(self, author: Author, stop_id: str = "") -> StoppedAll:
-        """Begin to stop all runs and all foreign graphs, and return which these are. Never
-        waits."""
+        """Begin to stop all runs and all graphs that others have started. Return which runs and
+        graphs are being stopped. The call never waits."""
         self._stops.note("", author, stop_id)
         runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
         self.robots.stop_foreign_graphs(author, self._runs.on)
         return StoppedAll(runs, self.robots.foreign_stops.graphs(), self.robots.unheard())
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
-        """Begin to stop all runs and foreign graphs of a robot; return the ids of the runs and the
-        names of the graphs. Raises NotFound."""
+        """Begin to stop all runs on a robot and all graphs that others have started there. Return
+        the ids of the runs and the names of the graphs. Raise NotFound if the robot is not
+        registered."""
         graphs = self.robots.stop_foreign_graphs(author, self._runs.on, name)
         self._stops.note(name, author)
         return [run for run in self._runs.on(name) if self._stop(run, author, "")], graphs
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
-        """Begin to stop a run, or all runs of a group, and return their ids; empty when it is over.
-        Waits only to look up an id that is not open. Raises NotFound."""
+        """Begin to stop a run, or all runs of a group, and return the ids of the runs that are
+        being stopped. The list is empty if the run is over already. The call waits only to look
+        up an id that is not open. Raise NotFound if there is no such run or group."""
         if run in self.open:
             return [run] if self._stop(run, author, stop_id) else []
         group = [each for each, opened in tuple(self.open.items()) if opened.run.group == run]
@@ -204,16 +209,18 @@ class ExecutionService:
         return True
 
     async def pause(self, run: str, author: Author) -> Run:
-        """Pause a run. Raises NotFound, Conflict, Unavailable."""
+        """Pause a run. Raise NotFound if there is no such run, Conflict if it cannot be paused now,
+        Unavailable if the message could not be sent."""
         return await interventions.pause(await self._movable(run), author)
 
     async def resume(self, run: str, author: Author) -> Run:
-        """Resume a paused run. Raises NotFound, Conflict, Unavailable."""
+        """Resume a paused run. Raise NotFound if there is no such run, Conflict if it is not
+        paused, Unavailable if the message could not be sent."""
         return await interventions.resume(await self._movable(run), author)
 
     async def modify(self, run: str, body: bytes, author: Author) -> Run:
-        """Give a run another version of its graph. Raises NotFound, BadInput, Conflict,
-        Unavailable, OutcomeUnknown."""
+        """Give a run another version of its graph; `body` is an encoded ModifyRequest. Raise
+        NotFound if there is no such run, and what `interventions.modify` raises."""
         opened = await self._movable(run)
         engine = self.robots.link(opened.run.engine)
         return await interventions.modify(
@@ -226,8 +233,8 @@ class ExecutionService:
         )
 
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
-        """Record that a person has seen a run at rest, where its engine cannot prove it. Raises
-        NotFound, BadInput, Conflict."""
+        """Record that a person has seen a run at rest, where its engine cannot prove that. Raise
+        NotFound if there is no such run, and what `interventions.confirm_rest` raises."""
         opened = await self._movable(run)
         return interventions.confirm_rest(opened, asked, author)
 
@@ -241,31 +248,35 @@ class ExecutionService:
     # --- what there is ------------------------------------------------------------------------
 
     async def find(self, run: str) -> Run:
-        """Return a run, open or over. Raises NotFound."""
+        """Return a run, open or over. Raise NotFound if there is no such run."""
         return await self._runs.find(run)
 
     async def simulates(self, run: str) -> bool:
-        """Return whether a run is simulated. Raises NotFound."""
+        """Return whether a run is simulated. Raise NotFound if there is no such run."""
         opened = self.open.get(run)
         return bool(
             opened.run.simulated if opened is not None else (await self._over(run)).simulated
         )
 
     async def _over(self, run: str) -> Row[Any]:
-        """Return state and `simulated` of a run from the table. Raises NotFound, Unavailable."""
+        """Return `state` and `simulated` of a run from the table. Raise NotFound if there is no
+        such run, Unavailable if the journal cannot be read."""
         rows = await self._journal.query(queries.of_run(run))
         if not rows:
             raise NotFound("There is no such run.")
         return rows[0]
 
     async def register(self, asked: Registration, author: Author) -> Robot:
-        """Register a robot, or change its registration. Raises BadInput, Conflict, Unavailable."""
+        """Register a robot, or change its registration. Raise BadInput if the registration is not
+        valid, Conflict if the robot is in use or has the simulator's name, Unavailable if the
+        journal cannot store it."""
         async with self._starts.turn(asked.name):
             self._check_unused(asked.name)
             return await self.robots.register(asked, author)
 
     async def remove(self, robot: str, author: Author) -> None:
-        """Remove a robot from the registry. Raises NotFound, Conflict, Unavailable."""
+        """Remove a robot from the registry. Raise NotFound if the robot is not registered, Conflict
+        if it is in use, Unavailable if the journal cannot store that."""
         async with self._starts.turn(robot):
             self._check_unused(robot)
             await self.robots.remove(robot, author)
@@ -283,8 +294,8 @@ class ExecutionService:
             )
 
     def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:
-        """Pass a command of somebody else to the runs on that robot; return the event of it, with
-        the run that it concerns."""
+        """Pass a command that somebody else sent to a robot on to the runs on that robot. Return
+        the event that records the command, with the run that it concerns."""
         self._runs.late_activity.sent_by_others(command)
         runs = [each.run for each in self._runs.on(engine.registration.name).values()]
         for each in runs:
@@ -304,8 +315,8 @@ class ExecutionService:
     # --- after a restart ----------------------------------------------------------------------
 
     async def _take_up(self) -> None:
-        """Adopt the robots, open runs and foreign Stops that an earlier process left. Stops that
-        were wanted go on; no run is started."""
+        """Take over the robots, the open runs and the Stops of foreign graphs that an earlier
+        process left. Stops that were wanted go on; no run is started."""
         self._runs.last_number = (await self._journal.query(queries.last_number()))[0][0]
         context = RegistryContext(
             self._journal,
@@ -330,7 +341,9 @@ class ExecutionService:
         await self.robots.take_up_stops()
 
     def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
-        """Follow a run that an earlier process left; nothing of it is started."""
+        """Follow a run that an earlier process left open; nothing of the run is started. `seq` is
+        the number of its last stored event; `is_whole` says that all of its events could be
+        read."""
         link = self.robots.link(run.engine)
         opened = self._runs.open(run, link, owns_link=False, seq=seq)
         if run.simulated:

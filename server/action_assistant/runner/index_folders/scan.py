@@ -122,7 +122,8 @@ def _is_dangling(entry: "os.DirEntry[str]") -> bool:
 
 
 def _text(path: Path) -> bytes:
-    """Return the contents of a regular file, b"" of any other. Raises OSError."""
+    """Return the contents of a regular file; return b"" for a folder, a pipe or a device. Links are
+    followed. Raise OSError if the file cannot be read or is too large."""
     with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
             return b""  # an engine cannot read it either

@@ -112,7 +112,9 @@ def _opened(folder: Path) -> Iterator[int]:
 
 @contextmanager
 def _entered(top: int, path: str) -> Iterator[int]:
-    """Open the folder of a file, following no link. Raises OSError."""
+    """Open the folder that holds the file `path`, and yield its descriptor until the end of the
+    block. `path` is relative to the folder with the descriptor `top`. No symbolic link is
+    followed. Raise OSError if a folder cannot be opened or the path leads out of `top`."""
     found = os.dup(top)
     try:
         for name in path.split("/")[:-1]:

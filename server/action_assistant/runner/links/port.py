@@ -108,7 +108,8 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def doubt(self) -> str:
-        """Return why an answer of this engine is no proof, as a clause; "" when it is one."""
+        """Return why an answer of this engine proves nothing, as a clause; "" when an answer is a
+        proof."""
         if self.servers != 1:
             return f"{self.servers or 'no'} engines are seen on the path of its answers"
         if not self.newcomers:
@@ -193,33 +194,38 @@ class Link(Protocol):
         ...
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start message. `leaves` is called right before it leaves: a start that is given
-        up until then has certainly not left. Raises NotSent, EngineRefused."""
+        """Publish one start message. `leaves` is called right before the message leaves; a start
+        that is given up before that call has certainly not left. Raise NotSent if the message
+        has certainly not left, EngineRefused if the engine refuses the start."""
         ...
 
     async def stop(self, graph_name: str) -> None:
-        """Publish one stop message. Raises NotSent."""
+        """Publish one stop message. Raise NotSent if it could not be sent."""
         ...
 
     async def pause(self, graph_name: str) -> None:
-        """Publish one pause message. Raises NotSent."""
+        """Publish one pause message. Raise NotSent if it could not be sent."""
         ...
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Publish one resume message. Raises NotSent."""
+        """Publish one resume message. `continue_from` is the full name of an action that is started
+        when the graph goes on, "" for none. Raise NotSent if the message could not be sent."""
         ...
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Publish one modify message: the order's graph takes the place of the one of its name.
-        Raises NotSent, EngineRefused."""
+        """Publish one modify message: the order's graph takes the place of the running graph of the
+        same name. Raise NotSent if the message could not be sent, EngineRefused if the engine
+        refuses the change."""
         ...
 
     async def get(self) -> Answer:
-        """Ask what the engine holds. Raises NoAnswer; the caller sets the deadline."""
+        """Ask the engine for all graphs that it holds. The call has no timeout of its own. Raise
+        NoAnswer if the engine cannot answer."""
         ...
 
     async def run(self) -> None:
-        """Keep the link alive until cancelled. It hears and answers only while this runs."""
+        """Keep the link alive until cancelled. The link hears and answers only while this method
+        runs."""
         ...
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
@@ -273,20 +279,22 @@ class Reach(Protocol):
         ...
 
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
-        """A link to a robot. Never waits and never fails: a robot that cannot be reached has a link
-        that says why. The link hears and answers only while its `run` is kept going."""
+        """Return a link to a robot. The call never waits and never fails: for a robot that cannot
+        be reached, the link refuses every command and says why. The link hears and answers only
+        while its `run` method runs."""
         ...
 
     async def sighting(self) -> Sighting:
-        """Return the engines that are seen now, without waiting for others: on the domain of this
-        process's environment and on those of links. Raises RuntimeError."""
+        """Return the engines that are in sight now, on the domain of this process's environment and
+        on the domains of all links. The call does not wait for further engines to appear. Raise
+        RuntimeError if the domain cannot be joined."""
         ...
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Return the engines that are seen when discovery has had its time, which takes some seconds at
-        first. Raises RuntimeError."""
+        """Return the engines that are in sight once discovery has had its time; at first that takes
+        some seconds. Raise RuntimeError if the domain cannot be joined."""
         ...
 
     async def aclose(self) -> None:
-        """Leave all domains. The links have to be closed before."""
+        """Leave all domains. The caller has to close all links before."""
         ...

@@ -146,7 +146,9 @@ class ReviewService:
         return await self._run_in_worker(lambda: annotations.sum_of(found, graph, now, said))
 
     async def _said(self, run_id: str) -> list[str]:
-        """Return the texts of a run's events, each once, in order. Raises Unavailable."""
+        """Return the texts in the first events of a run that people may search for, in the order of
+        the events. A text that occurs several times is returned once. Raise Unavailable if the
+        journal cannot be read."""
         event = runner_event.c
         chosen = select(event.kind, event.body).where(
             event.stream == stream_of(run_id), event.kind != Observed.kind

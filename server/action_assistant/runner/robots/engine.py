@@ -131,27 +131,30 @@ class KnownEngine:
         return self._link.standing
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start message. Raises NotSent, EngineRefused."""
+        """Publish one start message. Raise NotSent if the message has certainly not left,
+        EngineRefused if the engine refuses the start."""
         await self._link.start(order, leaves)
 
     async def stop(self, graph_name: str) -> None:
-        """Publish one stop message. Raises NotSent."""
+        """Publish one stop message. Raise NotSent if it could not be sent."""
         await self._link.stop(graph_name)
 
     async def pause(self, graph_name: str) -> None:
-        """Publish one pause message. Raises NotSent."""
+        """Publish one pause message. Raise NotSent if it could not be sent."""
         await self._link.pause(graph_name)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Publish one resume message. Raises NotSent."""
+        """Publish one resume message. Raise NotSent if it could not be sent."""
         await self._link.resume(graph_name, continue_from)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Publish one modify message. Raises NotSent, EngineRefused."""
+        """Publish one modify message. Raise NotSent if it could not be sent, EngineRefused if the
+        engine refuses the change."""
         await self._link.modify(order, continue_from)
 
     async def get(self) -> Answer:
-        """Send a get and note the answer. Raises NoAnswer."""
+        """Ask the engine with a get for all graphs that it holds, and note the answer. Raise
+        NoAnswer if no answer comes."""
         began = self._tried_at = anyio.current_time()
         try:
             answer = await self._link.get()
@@ -241,21 +244,22 @@ class KnownEngine:
                 await anyio.sleep(0.5)
 
     def look_closely(self) -> None:
-        """Ask more often for a while: a run has ended there, or others have told the engine to do
-        something."""
+        """Ask the engine more often for a while, because a run has ended there or somebody else has
+        sent the engine a command."""
         now = _now()
         if now >= self._close_until:
             self._look.set()
         self._close_until = now + _AFTERWARDS_S
 
     def let_index(self) -> None:
-        """Let the engine read what was just written into its index folder, and only then ask it
-        again. Gets of runs and Stops go on meanwhile."""
+        """Let the engine read what was just written into its index folder, and ask it again only
+        after that. Gets of runs and of Stops go on meanwhile."""
         self._indexing_until = _now() + _INDEXES_S
         self._look.set()
 
     async def indexed(self) -> None:
-        """Wait until the engine has had time to read what was written last."""
+        """Wait until the engine has had time to read what the runner last wrote into its index
+        folder."""
         await anyio.sleep_until(self._indexing_until)
 
     def _hear(self, report: Report) -> None:
@@ -308,8 +312,8 @@ class KnownEngine:
         self._changed()
 
     async def index(self, run_in_worker: "RunInAnyWay[EngineIndex]") -> EngineIndex:
-        """Return the engine's index as of its last answer; it is decoded in a worker when it has
-        changed."""
+        """Return the actions and graphs that the engine has indexed, as of its last answer. A
+        changed index is decoded in a worker."""
         answer = self.answer
         if answer is None:
             return EngineIndex()
@@ -349,9 +353,12 @@ def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex
 
 
 def foreign_graphs(answer: Answer, own_runs: Collection[str]) -> list[str]:
-    """Return the graphs that an engine runs and that are no runs of this runner (`own_runs`: their
-    ids). A graph counts as running also before its first action, and between two actions. A
-    sub-graph counts for its graph."""
+    """Return the names of the graphs on an engine that somebody else has started. `own_runs` are
+    the ids of this runner's runs.
+
+    A graph counts as running also before its first action and between two actions. For a running
+    sub-graph the graph around it is named.
+    """
     held = {each.graph for each in answer.graphs}
     tops = {
         each.graph

@@ -128,8 +128,8 @@ class Recordings:
                     each.unlink()
 
     def due(self, kept_days: float) -> list[Path]:
-        """Return the files to remove, the oldest first: those that are too old, and those beyond
-        the bound of bytes. The newest file never is."""
+        """Return the files to remove, the oldest first: files older than `kept_days` days, and the
+        oldest files beyond the bound of bytes. The newest file is never removed."""
         named = ((path, _hour_of(path)) for path in self._folder.glob(f"*/*{_ENDING}"))
         dated = {path: hour for path, hour in named if hour is not None}
         found = sorted(dated, key=lambda path: path.name)
@@ -154,7 +154,8 @@ class Recordings:
         return await self._run_in_worker(read)
 
     async def file(self, robot: str, name: str) -> bytes:
-        """Return the compressed contents of a file. Raises NotFound."""
+        """Return the compressed contents of the file `name` of a robot. Raise NotFound if there is
+        no such file."""
         if name not in {each.name for each in await self.listed(robot)}:
             raise NotFound("There is no such recording.")
         return await self._run_in_worker((self._folder / robot / name).read_bytes)

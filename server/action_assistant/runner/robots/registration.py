@@ -102,8 +102,8 @@ def registration_of(row: Row[Any]) -> Registration:
 
 
 def check_registration(registration: Registration) -> None:
-    """Refuse a registration that ROS 2 does not allow, or whose profile is not valid. Raises
-    BadInput, Conflict."""
+    """Check that ROS 2 allows a registration and that its profile is valid. Raise BadInput if not,
+    Conflict if the name is that of the simulator."""
     if registration.name.lower() == SIMULATOR:
         raise Conflict("The simulator is always there; a robot needs a name of its own.")
     if not _NAME.fullmatch(registration.name):
@@ -123,8 +123,8 @@ def check_registration(registration: Registration) -> None:
 def with_engine(
     plain: Robot, engine: KnownEngine, stopping: Callable[[str, str], str | None]
 ) -> Robot:
-    """Return a robot with what is known of its engine. `stopping(robot, graph)` tells why a Stop is
-    not proven."""
+    """Return a robot with what is known of its engine. `stopping(robot, graph)` returns why a Stop
+    of that graph is not proven, None if no Stop of it is wanted."""
     answer, standing = engine.answer, engine.standing
     known = replace(
         plain,

@@ -58,12 +58,12 @@ class ForeignStops(Protocol):
     from here."""
 
     def trouble(self, robot: str, graph: str) -> str | None:
-        """Return why a Stop of this graph is not proven yet, "" at first; None when no Stop of it
-        is wanted."""
+        """Return why a Stop of this graph is not proven yet; "" as long as no reason is known, None
+        when no Stop of the graph is wanted."""
         ...
 
     def is_stopping(self, robot: str) -> bool:
-        """Return whether a graph is being stopped there."""
+        """Return whether any graph on this robot is being stopped."""
         ...
 
     def graphs(self) -> dict[str, list[str]]:
@@ -71,15 +71,16 @@ class ForeignStops(Protocol):
         ...
 
     def pending(self) -> Iterator[tuple[str, str]]:
-        """Yield the robot of each graph that is being stopped, and why that is not proven yet."""
+        """Yield, for each graph that is being stopped, its robot and the reason why the Stop is not
+        proven yet."""
         ...
 
     def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
-        """Begin to stop a graph. Never waits."""
+        """Begin to stop a graph. The call never waits."""
         ...
 
     def take_up(self, robot: str, asked: StopAsked) -> None:
-        """Continue a Stop that an earlier process has left without a proof. Never waits."""
+        """Continue a Stop that an earlier process has left without a proof. The call never waits."""
         ...
 
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
@@ -87,7 +88,7 @@ class ForeignStops(Protocol):
         ...
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Note the graphs that an engine shows in an answer or by feedback. Never waits."""
+        """Note the graphs that an engine shows in an answer or by feedback. The call never waits."""
         ...
 
 
@@ -153,8 +154,8 @@ class Robots:
             self.add(Registration(name=name))
 
     async def take_up_stops(self) -> None:
-        """Continue the Stops of foreign graphs that an earlier process left without a proof. Waits
-        for no engine; a robot whose log cannot be read is skipped."""
+        """Continue the Stops of foreign graphs that an earlier process left without a proof. The
+        call waits for no engine. A robot whose log cannot be read is skipped."""
         for name in self.names:
             try:
                 stored = await self.robot_log.newest(name, _TOLD)
@@ -167,8 +168,9 @@ class Robots:
     # --- the registry -------------------------------------------------------------------------
 
     async def register(self, registration: Registration, author: Author) -> Robot:
-        """Store a registration, new or changed, and link to the robot. Raises BadInput, Conflict,
-        Unavailable."""
+        """Store a new or changed registration, and link to the robot. Raise BadInput if it is not
+        valid, Conflict if it has the name of the simulator, Unavailable if the journal cannot
+        store it."""
         check_registration(registration)
         context = self._open_context()
         body = RobotRegistered(at=context.clock_us(), **msgspec.structs.asdict(registration))
@@ -179,7 +181,8 @@ class Robots:
         return self.robot(registration.name)
 
     async def remove(self, name: str, author: Author) -> None:
-        """Store that a robot is removed, and close its link. Raises NotFound, Unavailable."""
+        """Store that a robot is removed, and close its link. Raise NotFound if the robot is not
+        registered, Unavailable if the journal cannot store that."""
         self.registration(name)
         context = self._open_context()
         body = RobotRemoved(at=context.clock_us(), name=name)
@@ -190,7 +193,8 @@ class Robots:
         context.changed()
 
     def add(self, registration: Registration) -> None:
-        """Link to a robot that is stored, and close an older link to it."""
+        """Link to a robot whose registration is stored already. An older link to the robot is
+        closed if the registration has changed."""
         name = registration.name
         if self._registered.get(name) == registration and name in self._engines:
             return
@@ -255,9 +259,10 @@ class Robots:
     def stop_foreign_graphs(
         self, author: Author, own_runs: Callable[[str], Collection[str]], name: str | None = None
     ) -> list[str]:
-        """Begin to stop all foreign graphs, on one robot or on all of them, and return each as
-        "robot: graph". `own_runs(robot)`: ids of this runner's open runs there. Never waits. Raises
-        NotFound."""
+        """Begin to stop all graphs that others have started, on the robot `name` or on all robots,
+        and return each as "robot: graph". `own_runs(robot)` returns the ids of this runner's
+        open runs on a robot. The call never waits. Raise NotFound if the robot is not
+        registered."""
         if name is not None:
             self.registration(name)
         stopped: list[str] = []
@@ -280,7 +285,7 @@ class Robots:
             yield self.robot(name)
 
     def robot(self, name: str) -> Robot:
-        """Return one robot as people see it. Raises NotFound."""
+        """Return one robot as people see it. Raise NotFound if the robot is not registered."""
         known = self.registration(name)
         engine = self._engines.get(name)
         plain = Robot(
@@ -298,7 +303,7 @@ class Robots:
         return with_engine(plain, engine, self.foreign_stops.trouble)
 
     def unheard(self) -> dict[str, str]:
-        """Return the robots of which it is not known now what they run, with the reason."""
+        """Return the robots of which nobody knows at present what they run: name → reason."""
         found: dict[str, str] = {}
         for name in self.names:
             engine = self._engines.get(name)
@@ -314,8 +319,8 @@ class Robots:
         return sorted(self._registered)
 
     def last_answers(self) -> dict[str, int]:
-        """Return when each robot last answered, microseconds UTC; robots that never did are left
-        out."""
+        """Return when each robot last answered: name → microseconds UTC. Robots that never answered
+        are left out."""
         return {
             name: engine.answer.at
             for name, engine in self._engines.items()
@@ -323,15 +328,15 @@ class Robots:
         }
 
     def registration(self, name: str) -> Registration:
-        """Return the registration of a robot. Raises NotFound."""
+        """Return the registration of a robot. Raise NotFound if the robot is not registered."""
         known = self._registered.get(name)
         if known is None:
             raise NotFound(f"No robot is called {name!r}.")
         return known
 
     def reachable(self, name: str) -> KnownEngine:
-        """Return the engine of a robot for a start. Raises BadInput for an unknown name, Conflict
-        without a link."""
+        """Return the engine of a robot, so that a graph can be started on it. Raise BadInput if the
+        robot is not registered, Conflict if there is no link to it."""
         engine = self._engines.get(name)
         if engine is not None:
             return engine
@@ -345,16 +350,19 @@ class Robots:
         )
 
     def present(self, name: str) -> KnownEngine | None:
-        """Return the engine of a robot, None without a link. Raises NotFound."""
+        """Return the engine of a robot; None if there is no link to it. Raise NotFound if the robot
+        is not registered."""
         self.registration(name)
         return self._engines.get(name)
 
     def link(self, name: str) -> KnownEngine | None:
-        """Return the engine of a robot; None without a link or for an unknown name."""
+        """Return the engine of a robot; None if there is no link to it or the robot is not
+        registered."""
         return self._engines.get(name)
 
     async def index(self, name: str) -> EngineIndex:
-        """Return the index of a robot's engine; empty without a link. Raises NotFound."""
+        """Return the actions and graphs that a robot's engine has indexed; an empty index if there
+        is no link to the robot. Raise NotFound if the robot is not registered."""
         self.registration(name)
         engine = self._engines.get(name)
         return (
@@ -364,7 +372,8 @@ class Robots:
         )
 
     def held_graph(self, name: str, graph: str) -> str:
-        """Return a graph as the engine wrote it in its last answer. Raises NotFound."""
+        """Return the text of a graph as the robot's engine wrote it in its last answer. Raise
+        NotFound if the robot is not registered or the answer does not have the graph."""
         self.registration(name)
         engine = self._engines.get(name)
         answer = None if engine is None else engine.answer
@@ -374,7 +383,8 @@ class Robots:
         return text
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Return the engines in sight that are not registered, once discovery has had its time."""
+        """Return the engines in sight that are not registered. The call waits until discovery has
+        had its time."""
         if isinstance(self._reach, str):
             return ()
         return self._strangers(await self._reach.candidates())

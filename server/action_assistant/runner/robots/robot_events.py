@@ -166,8 +166,8 @@ _ALARMS: Final[Mapping[Command, str]] = {
 
 
 def alarm_of(command: ForeignCommand, robot: str, graph: str) -> tuple[str, str] | None:
-    """Return code and text of the alarm that a foreign command raises for a run of `graph`; None
-    where it does not concern the run."""
+    """Return code and text of the alarm that a command of somebody else raises for a run of
+    `graph`. Return None if the command does not concern the run."""
     if command.graph == graph:
         text = _ALARMS[command.command].format(graph=graph, robot=robot)
         return f"foreign_{command.command}", text
@@ -191,8 +191,8 @@ def event_of(stored: Event) -> RobotEvent | None:
 
 
 def left_unproven(events: Iterable[RobotEvent]) -> list[StopAsked]:
-    """Return the Stops that were neither proven nor given up, in events of one robot, oldest
-    first."""
+    """Return the Stops that were neither proven nor given up, oldest first. `events` are all of one
+    robot."""
     left: dict[str, StopAsked] = {}
     for event in events:
         match event:
@@ -214,12 +214,12 @@ class RobotLog:
         self._appenders: dict[str, StreamAppender] = {}
 
     def note(self, robot: str, event: RobotEvent, author: str) -> None:
-        """Queue an event for storing. Never waits."""
+        """Queue an event for storing. The call never waits."""
         self._appender(robot).add(draft_of(event, author))
 
     async def record(self, robot: str, event: RobotEvent, author: str) -> None:
-        """Store an event and wait until it is stored. Raises Unavailable after five seconds; it may
-        be stored later then."""
+        """Store an event and wait until it is stored. Raise Unavailable if that takes more than
+        five seconds; the event may still be stored later."""
         self.note(robot, event, author)
         try:
             with anyio.fail_after(_STORE_S):
@@ -242,8 +242,8 @@ class RobotLog:
         return sum(each.waiting for each in self._appenders.values())
 
     async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
-        """Return the newest events of a robot, at most `most`, oldest first, with their seqs.
-        Raises Unavailable."""
+        """Return the newest events of a robot with their seqs, oldest first, `most` of them at
+        most. Raise Unavailable if the journal cannot be read."""
         stream = stream_of_robot(robot)
         end = await self._journal.newest(stream)
         stored = await self._journal.read(stream, after=max(0, end - most))
@@ -251,7 +251,8 @@ class RobotLog:
         return [(seq, event) for seq, event in read if event is not None]
 
     async def graph(self, robot: str, seq: int) -> str:
-        """Return the graph of a recorded command. Raises NotFound, Unavailable."""
+        """Return the text of the graph in a recorded command. Raise NotFound if no graph was
+        recorded there, Unavailable if the journal cannot be read."""
         stored = await self._journal.read(stream_of_robot(robot), after=seq - 1, limit=1)
         event = event_of(stored[0]) if stored and stored[0].seq == seq else None
         if not isinstance(event, Commanded) or not event.umrf:

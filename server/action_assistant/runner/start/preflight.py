@@ -407,8 +407,12 @@ def _rest(view: EngineView) -> Item:
 
 
 def _is_settled(view: EngineView, shown: Snapshot) -> bool:
-    """Return whether a person has seen at rest exactly what is in doubt here: the graph of that run
-    or a part of it, in the same life of the engine, with no other action in ERROR."""
+    """Return whether a person has already confirmed that the graph `shown` is at rest.
+
+    The confirmation was given for a run: it counts if `shown` is the graph of that run or one of
+    its sub-graphs, if the engine was not restarted since, and if every action of `shown` in ERROR
+    was in ERROR at that time.
+    """
     marks = {each.graph: each.run for each in view.answer.graphs if each.run is not None}
     for each in view.settled:
         top = next((name for name, run in marks.items() if run == each.run), None)

@@ -158,7 +158,8 @@ def _check_sides(subject: Subject) -> None:
 
 
 def _check_bypasses(subject: Subject, reachability: "Reachability") -> None:
-    """Report all bypasses that can happen as one problem (H3), on an engine that has this hazard."""
+    """Report arrows that can bypass their child (hazard H3): the child is passed over because of an
+    outcome that its parent can really have. All such arrows are reported as one problem."""
     if "H3" not in subject.facts.hazards or subject.facts.bypass_fixed:
         return
     found: list[tuple[Relation, list[Precondition]]] = []

@@ -382,8 +382,11 @@ def _begun(subject: Subject, key: Key, outcome: Precondition) -> set[Key]:
 
 
 def _comes_after(subject: Subject, key: Key, others: list[Key]) -> bool:
-    """Return whether any of the `others`, for which the exit waits, can only be reached from the
-    entry through the action `key`."""
+    """Return whether at least one of the actions `others` cannot be reached from the entry except
+    through the action `key`.
+
+    The graph's exit waits for all of `others`, so it then comes after the action `key` as well.
+    """
     if not others:
         return False
     seen, stack = {ENTRY}, [ENTRY]

@@ -151,7 +151,9 @@ class _Search:
         self._results = [self._results_of(row) for row in net.edges]
 
     def found(self) -> tuple[_End, ...] | None:
-        """Return the ends after which the arrow is taken, in order; None if none were found."""
+        """Search for a course in which the wanted arrow is taken. Return the ends of actions, with
+        their results, that lead to it, in the order in which they happen; the tuple is empty if
+        the arrow is taken at the start. Return None if no course was found within the budget."""
         first = _first(self._net)
         instant = _RecordingInstant(self._net, first)
         instant.begin()

@@ -148,8 +148,9 @@ class _DeviatingCourse:
     # One instant
 
     def _at(self, at: float, root: int, result: Precondition) -> Outcome | None:
-        """Follow the events of one moment, here and in the baseline course. Return None if the
-        course continues."""
+        """Follow the events at the time `at`, both in this deviating course and in the baseline
+        course. `root` is the index of the action that ends then with `result`, negative for
+        none. Return the graph's end once it is decided, None while the course continues."""
         course = self.course
         here = bisect_left(course.times, at)
         usual = here < len(course.times) and course.times[here] == at

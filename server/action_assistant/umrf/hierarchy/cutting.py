@@ -382,7 +382,8 @@ def _with_values(
 
 
 def middle_of(places: Iterator[Position | None]) -> Position | None:
-    """Return the middle of the area that these positions cover; None if there is none."""
+    """Return the middle of the smallest rectangle that holds all positions. Positions that are None
+    do not count; return None if all of them are."""
     known = [place for place in places if place is not None]
     if not known:
         return None

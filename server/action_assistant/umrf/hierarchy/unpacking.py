@@ -71,8 +71,8 @@ def _at(graph: Graph, action: Action) -> tuple[HierarchyLevel, ...]:
 
 
 def _differences(graph: Graph, action: Action, inside: Graph) -> Iterator[FlatteningReason]:
-    """Yield the reasons for which the graph is not known to behave the same if only this action is
-    a sub-graph."""
+    """Yield the reasons why the graph may behave differently once the sub-graph `inside` is
+    unpacked in place of `action`. All other sub-graphs are taken to stay as they are."""
     name = _unused(graph, inside)
     alone = tuple(replace(a, name=name) if a.key == action.key else a for a in graph.actions)
     found = flattened(replace(graph, actions=alone), {name: replace(inside, name=name)})

@@ -143,7 +143,8 @@ class NameRefusal(msgspec.Struct, frozen=True):
 
 
 def snake_case(name: str) -> str:
-    """Return the name of package, folder and library, for example `ta_u_r_d_f` for `TaURDF`.
+    """Return a name in snake case, as it names a package, a folder and a library: `TaURDF` becomes
+    `ta_u_r_d_f`.
 
     Only ASCII letters change, as in the engine's locale.
     """

@@ -122,10 +122,13 @@ def hand_over(outputs: dict[str, Slot], remap: Sequence[Remap], inputs: dict[str
 def renamed(
     outputs: Collection[str], remap: Sequence[Remap], inputs: Collection[str]
 ) -> dict[str, str]:
-    """Return the output that reaches each input: input name → output name. Raises `RemapUnknown`.
+    """Return which output of the parent each input of the child gets its value from: input name →
+    output name. Inputs that get no value are left out. The outputs are renamed by `remap`, one
+    rename after the other.
 
-    The engine renames inside a sorted tree and does not restore its order, so that other outputs
-    may not be found any more.
+    The result imitates a fault of the engine: it renames within a sorted tree without restoring the
+    order, and afterwards fails to find some of the other outputs. Raise `RemapUnknown` if the
+    output to be renamed is not found.
     """
     if not remap:
         fewer, more = sorted((inputs, outputs), key=len)

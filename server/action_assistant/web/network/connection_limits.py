@@ -60,7 +60,9 @@ class ConnectionLimits:
 
     @contextmanager
     def admitted(self, person: str, address: str) -> Iterator[None]:
-        """One socket, as long as you are inside. Raises TooMany."""
+        """Count one open socket of this person and this address until the end of the `with` block.
+        Raise TooMany if either of them has too many sockets open, or has opened too many in a
+        short time."""
         if self._limits and not (self._keeps_one and not self._people[person]):
             self._check(person, address)
         self._people[person] += 1

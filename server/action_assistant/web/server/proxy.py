@@ -44,7 +44,8 @@ class Forwarded:
         self._proxies = proxies
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, with the address of the client that a trusted proxy names."""
+        """Pass a request on to the application. If the request comes from a trusted proxy, the
+        client's address is replaced by the address that the proxy names in its header."""
         if scope["type"] in _CALLS and self._proxies:
             peer: Any = scope.get("client")
             if peer and self.is_proxy(peer[0]):

@@ -56,7 +56,8 @@ def child(
 
 
 def _humbly(name: str, work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
-    """In the process: others first, when time or memory runs short."""
+    """Set up the new process and call `work` in it. When processor time runs short, other processes
+    go first (`nice`); when memory runs short, the system ends this process first."""
     make_streams_printable()
     set_up_worker(name)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for our parent, which ends us

@@ -248,7 +248,8 @@ def _likely(
 
 
 def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
-    """Return the finding for one robot. `elsewhere` are engines on another domain that may be it."""
+    """Return the finding about one robot. `standing` is what discovery shows of its engine;
+    `elsewhere` are engines on other domains that may be the engine of this robot."""
     if standing.generation == "older":
         return found(
             "robot-older",

@@ -114,8 +114,11 @@ class Domain:
     # --- the one question ---------------------------------------------------------------------
 
     async def ask(self, path: str) -> GetResult:
-        """Call the get service on a path and return the answer. The caller sets the deadline; an answer that
-        comes after a cancelled call is dropped. Raises NotAGraph, RuntimeError."""
+        """Call the get service of the name `path` and return the server's answer. The call has no
+        timeout of its own. If the caller cancels it, an answer that comes later is dropped.
+
+        Raise NotAGraph if a graph in the answer cannot be read, RuntimeError if the call fails.
+        """
         loop = asyncio.get_running_loop()
         answered: asyncio.Future[GetResult] = loop.create_future()
         client, asked_at = self.client(path), self._clock_us()

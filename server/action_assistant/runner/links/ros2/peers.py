@@ -54,8 +54,9 @@ def belonging(servers: tuple[Endpoint, ...], ends: tuple[Endpoint, ...]) -> tupl
 
 
 def foreign_middleware(domain: Domain, server: Endpoint) -> str:
-    """Return the name of a server's middleware if it is not that of this process, else "". A server on another
-    one may be seen and never answers."""
+    """Return the name of a server's middleware if it differs from the middleware of this process,
+    and "" if both are the same. Discovery may show a server with a different middleware, but
+    that server never answers."""
     theirs = server.gid[:4]
     if theirs == domain.process[:4]:
         return ""

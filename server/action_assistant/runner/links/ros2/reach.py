@@ -36,7 +36,8 @@ class Ros2:
         return rclpy.get_rmw_implementation_identifier()
 
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
-        """Return a link to a robot; for a robot on another middleware one that cannot be reached and says why."""
+        """Return a link to a robot. If the robot uses another middleware than this process, every
+        command on the link is refused, and the refusal says why."""
         if registration.rmw not in {"", self.rmw}:
             return UnreachableLink(
                 f"{registration.name} is registered with {registration.rmw}, but this runner speaks "
