@@ -253,7 +253,8 @@ def _ran(run: Run, asked: Intervention) -> tuple[RunningAction, ...]:
 
 
 def _at(action: ActionRun, moment: int) -> Visit | None:
-    """Return the visit that may have been going on at that moment."""
+    """Return the visit of an action that may have been going on at `moment` (microseconds UTC), or
+    None."""
     for visit in reversed(action.visits):
         if visit.not_before <= moment:
             ended = visit.not_after is not None and visit.not_after < moment
@@ -262,8 +263,9 @@ def _at(action: ActionRun, moment: int) -> Visit | None:
 
 
 def _surely_ran(run: Run, name: str, visit: Visit, asked: Intervention) -> bool:
-    """Return whether events show that a visit was going on at that moment. A visit that ended
-    *stopped* was, where nothing but this Stop can have stopped it."""
+    """Return whether events prove that a visit was going on when a person asked for something
+    (`asked`). For a Stop, a visit that ended *stopped* was going on if nothing but this Stop can
+    have stopped it."""
     if visit.start > asked.at:
         return False
     if visit.until is not None and visit.until >= asked.at:
@@ -375,8 +377,8 @@ def _given(action: Action, problem: Overridden) -> tuple[str, str]:
 
 
 def _was_given(visit: Visit, parameter: str, value: str) -> bool:
-    """Return whether a visit may have had this value: a parent may have given another one, which
-    the engine would have reported."""
+    """Return whether a visit may have had this value for a parameter. If the engine reported
+    another value, which a parent action gave, it had not."""
     reported = (visit.inputs or {}).get(parameter.replace("/", "::"))
     return reported is None or reported[:_LONGEST] == value
 
@@ -439,7 +441,9 @@ def _made_good(
 
 
 def _inmost(run: Run, found: dict[str, LevelPlace], wrong: EndedVisit) -> EndedVisit:
-    """Return the visit inside of this one that ended in the same way, and so on down."""
+    """Return the innermost visit that explains `wrong`: a visit inside of its action that ended in
+    the same way, then a visit inside of that one, and so on. Return `wrong` itself if there is
+    none inside."""
     _, name, around = wrong
     inside = [
         each
@@ -452,13 +456,13 @@ def _inmost(run: Run, found: dict[str, LevelPlace], wrong: EndedVisit) -> EndedV
 
 
 def _holds(around: Visit, visit: Visit) -> bool:
-    """Return whether one visit can have been going on within another."""
+    """Return whether `visit` can have been going on while `around` was going on."""
     ended = around.not_after
     return visit.start >= around.not_before and (ended is None or visit.not_before <= ended)
 
 
 def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
-    """Yield what a run waited for that stood still until its end."""
+    """Yield the reasons why a run stood still until its end, each with the action that waited."""
     alarm = next((each for each in reversed(run.alarms) if each.code == stall.STALLED), None)
     visits = (visit for action in run.actions.values() for visit in action.visits)
     if alarm is None or any(visit.start > alarm.at for visit in visits):
@@ -485,14 +489,17 @@ def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
 
 
 def _around(run: Run, going: set[str]) -> set[str]:
-    """Return those of these actions that only run because another one inside of them does."""
+    """Return those of the actions `going` that have another one of them inside: they run only
+    because the inner one does."""
     found = places_of(run)
     levels = {found[name].levels for name in going}
     return {name for name in going if found[name].way in levels}
 
 
 def _given_up(run: Run) -> int | None:
-    """Return the moment after which the actions prove nothing more."""
+    """Return the moment (microseconds UTC) from which on the states of actions prove nothing any
+    more: a Stop, the beginning of a silence, or the end of the run. Return None if there is
+    none."""
     if run.stop_requested_at is not None:
         return run.stop_requested_at
     return run.unknown_since if run.unknown_since is not None else run.ended_at
@@ -524,7 +531,8 @@ def _waiting(
 
 
 def _going(action: ActionRun, moment: int) -> Visit | None:
-    """Return the visit whose end had not been reported by that moment."""
+    """Return the last visit of an action if its end had not been reported by `moment` (microseconds
+    UTC), else None."""
     last = action.visits[-1] if action.visits else None
     if last is None or last.start > moment:
         return None
@@ -533,7 +541,8 @@ def _going(action: ActionRun, moment: int) -> Visit | None:
 
 
 def _over(action: ActionRun | None, moment: int) -> Visit | None:
-    """Return the last visit if its end had been reported by that moment."""
+    """Return the last visit of an action if its end had been reported by `moment` (microseconds
+    UTC), else None."""
     if action is None or not action.visits or _going(action, moment) is not None:
         return None
     last = action.visits[-1]
@@ -584,7 +593,7 @@ def _failed(action: ActionRun) -> Visit | None:
 
 
 def _said(action: ActionRun, visit: Visit) -> str:
-    """Return the last message of an action in a visit."""
+    """Return the last message that an action sent during a visit."""
     until = visit.not_after
     said = [
         each.text

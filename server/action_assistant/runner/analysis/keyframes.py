@@ -94,8 +94,8 @@ class SnapshotJournal(RunnerJournal, Protocol):
     """A journal that also stores snapshots of streams."""
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
-        """Return events with `after < seq <= upto`, in order and as (body, kind, at); kind is None
-        where it is `usual`. There are fewer when some are missing."""
+        """Return events with `after < seq <= upto`, in order and as (body, kind, at). The kind is
+        None for events of the kind `usual`. The list is shorter if events are missing."""
         ...
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
@@ -103,7 +103,8 @@ class SnapshotJournal(RunnerJournal, Protocol):
         ...
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
-        """Store the snapshot of a stream at `seq`. Raises Unavailable."""
+        """Store `state` as the snapshot of a stream at `seq`. Raise Unavailable if the journal
+        cannot store it."""
         ...
 
 
@@ -117,7 +118,8 @@ class KeyframeStore:
         self._locks: dict[str, asyncio.Lock] = {}
 
     async def keyframes(self, run: str) -> RunKeyframes:
-        """Return the keyframes of a run, up to its newest event. Raises NotFound, Unavailable."""
+        """Return the keyframes of a run, up to its newest event. Raise NotFound if there is no such
+        run, Unavailable if the journal cannot be read."""
         lock = self._locks.setdefault(run, asyncio.Lock())
         async with lock:
             found = await self._up_to_date(run)
@@ -125,7 +127,8 @@ class KeyframeStore:
         return found
 
     async def at(self, run: str, seq: int) -> Run:
-        """Return the run after its first `seq` events. Raises NotFound, BadInput."""
+        """Return the run as it was after its first `seq` events. Raise NotFound if there is no such
+        run, BadInput if `seq` is less than 1."""
         if seq < 1:
             raise BadInput("A run begins with its first event.", where={"path": "/seq"})
         key = (await self.keyframes(run)).before(seq)

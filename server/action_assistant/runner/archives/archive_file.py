@@ -149,7 +149,8 @@ def read(path: Path) -> Iterator[Event]:
 
 
 def title_of(path: Path) -> Title:
-    """Return the title of an archive file. Raises Damaged, OSError."""
+    """Return the title of an archive file. Raise Damaged if the file is no archive, OSError if it
+    cannot be read."""
     try:
         with gzip.open(path) as file:
             title = msgspec.json.decode(file.readline(_LONGEST), type=Title)
@@ -164,7 +165,8 @@ def title_of(path: Path) -> Title:
 
 
 def put(source: Path, target: Path) -> str:
-    """Copy a file as a whole or not at all, and return its SHA-256. Raises Damaged, OSError."""
+    """Copy a file as a whole or not at all, and return its SHA-256. Raise Damaged if the copy
+    differs, OSError if a file cannot be read or written."""
     make_folder(target.parent)
     part = target.with_name(f".{target.name}.part")
     try:
@@ -184,7 +186,7 @@ def put(source: Path, target: Path) -> str:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file, in hex. Raises OSError."""
+    """Return the SHA-256 of a file, in hex. Raise OSError if the file cannot be read."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

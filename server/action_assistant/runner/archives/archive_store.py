@@ -40,7 +40,7 @@ class Journaled(SnapshotJournal, Protocol):
     """The journal with the operations that retention needs."""
 
     async def end(self, stream: str) -> Head:
-        """Return the end of a stream: seq and chain."""
+        """Return the end of a stream: the seq of its last event, and its chain of hashes."""
         ...
 
     async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
@@ -49,7 +49,7 @@ class Journaled(SnapshotJournal, Protocol):
         ...
 
     async def delete_some(self, stream: str, by: int) -> bool:
-        """Delete some events of a stream that was taken out; return whether any are left."""
+        """Delete some events of a stream that was taken out; return whether any events are left."""
         ...
 
 
@@ -74,7 +74,8 @@ class ArchiveStore:
         return await self._journal.newest(stream)
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return rows of the tables. Raises Unavailable."""
+        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
+        cannot be read."""
         return await self._journal.query(statement)
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:

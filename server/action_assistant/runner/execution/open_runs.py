@@ -52,15 +52,16 @@ class OpenRuns:
         self._settled: dict[str, Settled] = {}
 
     def next_number(self) -> int:
-        """Return the number of one more run; each is given once."""
+        """Return the number for a new run. Each number is given once."""
         self.last_number += 1
         return self.last_number
 
     # --- opening and driving ------------------------------------------------------------------
 
     def open(self, run: Run, link: Link | None, *, owns_link: bool, seq: int) -> OpenRun:
-        """Open a stored run on a link and announce it. `seq` is that of its last stored event; a run
-        without a link, of a robot that is not registered any more, gets one that never answers."""
+        """Open a stored run on a link, and announce it. `seq` is the number of the run's last
+        stored event; `owns_link` says that the link is closed with the run. A run without a
+        link, whose robot is not registered any more, gets a link that never answers."""
         opened = OpenRun(
             run,
             link=link
@@ -124,7 +125,7 @@ class OpenRuns:
     # --- queries ------------------------------------------------------------------------------
 
     async def find(self, run: str) -> Run:
-        """Return a run, open or over. Raises NotFound."""
+        """Return a run, open or over. Raise NotFound if there is no such run."""
         opened = self.by_id.get(run)
         return opened.run if opened is not None else await self._history.run(run)
 

@@ -118,7 +118,8 @@ class OpenRun:
     # --- what people want ---------------------------------------------------------------------
 
     def stop(self, author: Author, stop_id: str) -> None:
-        """Want the run stopped, now and until it is. Never waits, never fails."""
+        """Record that a person wants the run stopped, and send stops until the run has ended. The
+        call never waits and never fails."""
         self._doubts.reach()
         if pressed := self._stopping.press(author, stop_id):
             self.tell(pressed, author.id)
@@ -130,14 +131,16 @@ class OpenRun:
         return self._doubts.places
 
     async def pause(self, author: Author) -> None:
-        """Want the run paused. Raises NotSent."""
+        """Record that a person wants the run paused, and tell the engine. Raise NotSent if the
+        message could not be sent."""
         self._doubts.reach()
         self.tell(PauseRequested(self._clock_us(), author), author.id)
         await self._link.pause(self.run.graph_name)
         self.look()
 
     async def resume(self, author: Author) -> None:
-        """Want the run to go on. Raises NotSent."""
+        """Record that a person wants the run to go on, and tell the engine. Raise NotSent if the
+        message could not be sent."""
         self.tell(ResumeRequested(self._clock_us(), author), author.id)
         await self._link.resume(self.run.graph_name)
         self.look()
@@ -145,8 +148,9 @@ class OpenRun:
     async def modify(
         self, author: Author, order: Order, version: str, digest: str, continue_from: str
     ) -> None:
-        """Want the run to go on with another graph. Raises NotSent, EngineRefused, and OutcomeUnknown
-        when nobody knows whether it does."""
+        """Record that a person gave the run another graph, and send it to the engine. Raise NotSent
+        if it could not be sent, EngineRefused if the engine refuses it, and OutcomeUnknown if
+        nobody knows whether the engine runs it."""
         asked = ModifyRequested(
             at=self._clock_us(),
             author=author,
@@ -207,7 +211,8 @@ class OpenRun:
     # --- what happens -------------------------------------------------------------------------
 
     def tell(self, event: RunEvent, author: str = "") -> None:
-        """Show an event to everybody and store it as soon as the journal can."""
+        """Show an event to everybody, and store it as soon as the journal can. `author` is the id
+        of a person, or "" for the engine."""
         changes = self._changes()
         changes.tell(event, author)
         self._apply(changes)
@@ -338,7 +343,7 @@ class OpenRun:
                 return
 
     def look(self) -> None:
-        """Have the engine asked now, without waiting for it."""
+        """Have the engine asked now; the call does not wait for the answer."""
         self._asks.set()
 
     async def _ask(self) -> None:
@@ -483,7 +488,8 @@ class OpenRun:
     # --- without a proof ----------------------------------------------------------------------
 
     def lose(self, why: str) -> None:
-        """Note that nobody knows whether the code of the run has ended, and why."""
+        """Note that nobody knows whether the code of the run has ended, and for which reason
+        (`why`)."""
         changes = self._changes()
         changes.lose(why)
         self._apply(changes)
@@ -503,7 +509,7 @@ class OpenRun:
         self._apply(changes)
 
     def alarm(self, code: str, text: str) -> None:
-        """Tell people something now, once."""
+        """Raise an alarm that people must see now, unless the run has the same alarm already."""
         changes = self._changes()
         changes.alarm(code, text)
         self._apply(changes)

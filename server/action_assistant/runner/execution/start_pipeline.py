@@ -146,8 +146,8 @@ class StartPipeline:
         self._prefixes = Workspace.of(os.environ).prefixes
 
     async def start(self, request: StartRequest, author: Author) -> Started:
-        """Carry out a start, at most once per request. Returns after the one message has left. Raises
-        Refused of many kinds; then nothing was sent."""
+        """Carry out a start, at most once per request id. Return after the one start message has
+        left. Raise a subclass of Refused if the start is refused; nothing was sent then."""
         stops = self._stops.count
         async with self._claims.once(request.request_id):
             known = await self._known(request)
@@ -161,8 +161,9 @@ class StartPipeline:
             return Started(run, fresh=True)
 
     async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
-        """Start one version on several robots: each start is accepted before the first message leaves.
-        Raises Refused; then nothing was sent to any of them."""
+        """Start one version on several robots. Every start is accepted before the first message
+        leaves. Raise a subclass of Refused if one start is refused; nothing was sent to any
+        robot then."""
         stops = self._stops.count
         requests = [group.for_engine(engine) for engine in sorted(group.engines)]
         if not group.request_id or SIMULATOR in group.engines:
@@ -183,8 +184,9 @@ class StartPipeline:
                 return await self._hand_over_group(accepted, author, stops)
 
     async def look(self, group: GroupRequest, starter: str) -> list[Preflight]:
-        """Return the pre-flight of a start by this person on each engine. Never raises Refused; nothing
-        is stored, and nothing but a get is sent."""
+        """Return the pre-flight of a start on each engine; `starter` is the id of the person who
+        would start. A refusal becomes an item of the pre-flight. Nothing is stored, and only a
+        get is sent."""
         found: dict[str, Preflight] = {}
         courses: list[Item] = []
 
@@ -207,18 +209,21 @@ class StartPipeline:
         return self._turns.setdefault(engine, anyio.Lock())
 
     def is_under_way(self, request_id: str) -> bool:
-        """Return whether this start, or start of a group, is being carried out at this moment."""
+        """Return whether the start, or the start of a group, with this request id is being carried
+        out at this moment."""
         return self._claims.under_way(request_id)
 
     async def _known(self, request: StartRequest) -> Run | None:
-        """Return the run that this request has become already. Raises Conflict for another start."""
+        """Return the run that an earlier start with this request id has become, or None. Raise
+        Conflict if that was another start."""
         run = await self._claims.run_of(request)
         return None if run is None else await self._runs.find(run)
 
     # --- read, check, ask the engine, decide ----------------------------------------------------
 
     async def _accept(self, request: StartRequest, starter: str) -> AcceptedStart:
-        """Take a request through the stages that may refuse it. Raises Refused of many kinds."""
+        """Take a request through all stages that may refuse it. Raise a subclass of Refused if one
+        stage does."""
         if request.engine == SIMULATOR:
             return await self._accept_simulation(request)
         robot = self._robots.reachable(request.engine)
@@ -240,8 +245,8 @@ class StartPipeline:
     async def _accept_all(
         self, requests: Sequence[StartRequest], starter: str
     ) -> list[AcceptedStart]:
-        """Accept the starts on several engines side by side. Raises Conflict, with all reasons, when one
-        of them is refused."""
+        """Accept the starts on several engines side by side. Raise Conflict, with the reasons of
+        all engines, if at least one start is refused."""
         accepted: dict[str, AcceptedStart] = {}
         refused: dict[str, Refused] = {}
 
@@ -279,7 +284,7 @@ class StartPipeline:
     async def _check(
         self, request: StartRequest, ready: Prepared, robot: KnownEngine, starter: str
     ) -> None:
-        """Refuse what can be refused before the engine is asked. Raises Conflict."""
+        """Make all checks that need no answer of the engine. Raise Conflict if one of them fails."""
         await self._approvals.require(robot.registration, ready.tree_digest, starter)
         overridden = request.override.codes if request.override else ()
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
@@ -317,7 +322,7 @@ class StartPipeline:
     async def _decide(
         self, request: StartRequest, ready: Prepared, robot: KnownEngine, view: EngineView
     ) -> AcceptedStart:
-        """Accept a start that no item stands in the way of. Raises Conflict."""
+        """Accept a start if no item of its pre-flight blocks it. Raise Conflict if one does."""
         items = await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes)
         free = self._free_item(request.engine, ready.name)  # again: time has passed
         accepted = AcceptedStart(
@@ -333,14 +338,15 @@ class StartPipeline:
         return accepted
 
     def _free_item(self, engine: str, graph_name: str) -> Item:
-        """Return whether another run keeps a robot from the start of a graph of this name."""
+        """Return the item that says whether another run keeps a robot from starting a graph of this
+        name."""
         longest_ms = self._robots.reachable(engine).facts.longest_loading_ms
         other = self._runs.occupying(engine, graph_name)
         return preflight.free_item(engine, other, graph_name, longest_ms, self._clock_us())
 
     async def _behaviours_for(self, ready: Prepared) -> BehaviourFolder:
-        """Return the folder of behaviours, after every behaviour of a graph was found to be usable.
-        Raises Conflict."""
+        """Return the folder of behaviours, after a check that the behaviours of all actions of a
+        graph can be used. Raise Conflict if there is no folder or a behaviour cannot be used."""
         where: dict[str, object] = {"path": "/behaviours"}
         folder = self._sources.behaviours
         if folder is None:
@@ -356,7 +362,8 @@ class StartPipeline:
         return folder
 
     def _simulated_facts(self, request: StartRequest) -> EngineFacts:
-        """Return the facts of the simulator, or of the robot that it plays. Raises NotFound."""
+        """Return the facts of the simulator, or of the robot that the simulator plays. Raise
+        NotFound if that robot is not registered."""
         if request.like is None:
             return _SIMULATOR_FACTS
         facts = facts_of(self._robots.registration(request.like).profile)
@@ -448,8 +455,8 @@ class StartPipeline:
         return [] if item is None else [item]
 
     async def _course_items(self, group: GroupRequest) -> Sequence[Item]:
-        """Return whether the graph takes its expected courses. This warns and never blocks a start, not
-        even when it cannot be found out."""
+        """Return the item that says whether the graph takes its expected courses. The item only
+        warns and never blocks a start, even if the courses could not be checked."""
         if self._sources.courses is None or group.graph is None:
             return ()
         try:

@@ -129,9 +129,9 @@ def _entered(top: int, path: str) -> Iterator[int]:
 
 
 def _mode(folder: int, path: str) -> int:
-    """Return the permissions for a file: those of the one that it replaces, or of a new one those
-    of its folder, so that the engine can read it whatever the umask is. Raises OSError,
-    _Changed."""
+    """Return the permissions for a new file: those of the file that it replaces, else those of its
+    folder, so that the engine can read it whatever the umask is. Raise OSError if they cannot be
+    read, _Changed if the file to replace is gone."""
     if not path:
         return os.fstat(folder).st_mode & 0o666
     try:
@@ -143,8 +143,8 @@ def _mode(folder: int, path: str) -> int:
 
 @contextmanager
 def _fresh(folder: int, text: bytes, mode: int) -> Iterator[str]:
-    """Write a file with this text to the disk, under a temporary name that is removed afterwards.
-    Raises OSError."""
+    """Write a file with this text to the disk, and yield its temporary name; the file of that name
+    is removed afterwards. Raise OSError if it cannot be written."""
     name = f".action-assistant-{secrets.token_hex(8)}.new"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     opened = os.open(name, flags, 0o600, dir_fd=folder)
@@ -199,7 +199,8 @@ def _changed(path: str) -> str:
 
 
 def _require_same(folder: int, name: str, old: str, changed: str) -> None:
-    """Raise _Changed unless the file still has the old contents; OSError."""
+    """Raise _Changed unless the file still has the contents with the hash `old`; raise OSError if
+    it cannot be read."""
     try:
         if _sha_of(folder, name) == old:
             return

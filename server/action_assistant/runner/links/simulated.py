@@ -154,7 +154,8 @@ class SimulatedLink:
         return self._made.behaviours is not None
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Start a graph now; the first start also starts the process. Raises NotSent, EngineRefused."""
+        """Start a graph now; the first start also starts the process. Raise NotSent if the process
+        cannot take the start, EngineRefused if the engine refuses it."""
         leaves()
         with anyio.CancelScope(shield=True):  # so that a Stop that comes meanwhile finds an engine
             if self._process is None and not self._why:
@@ -174,11 +175,13 @@ class SimulatedLink:
         self._say(next(self._numbers), "resume", graph_name, continue_from)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Change a running graph now. Raises NotSent, EngineRefused."""
+        """Change a running graph now. Raise NotSent if the process cannot take the change,
+        EngineRefused if the engine refuses it."""
         await self._told("modify", order, continue_from)
 
     async def get(self) -> Answer:
-        """Return all graphs that the engine holds now. Raises NoAnswer."""
+        """Return all graphs that the engine holds now. Raise NoAnswer if the engine or its process
+        has ended, or hangs."""
         if self._process is None and not self._why:  # nothing was started yet
             at = self._clock_us()
             return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=())

@@ -131,14 +131,16 @@ class ReviewService:
         return await self._answer(ReviewService.made_keyframes, run_id)
 
     async def made_keyframes(self, run_id: str) -> int:
-        """Make the keyframes of a run; return the seq of the last one. Raises NotFound."""
+        """Make the keyframes of a run, and return the seq of its last keyframe. Raise NotFound if
+        there is no such run."""
         return (await self.keyframe_store.keyframes(run_id)).keys[-1].seq
 
     async def _summed(self, run_id: str) -> annotations.SummedUp:
         return await self._answer(ReviewService.summed, run_id, self._clock_us())
 
     async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
-        """Return the sum of a run that is over. `now`: microseconds UTC. Raises NotFound."""
+        """Return the sum of a run that is over. `now` is the present time in microseconds UTC.
+        Raise NotFound if there is no such run."""
         found = (await self.keyframe_store.keyframes(run_id)).keys[-1].run
         good = found.end == "finished" and found.result == "on_true"
         graph = None if good else await self._graph(run_id)  # only a run that went badly has causes
@@ -162,7 +164,8 @@ class ReviewService:
         return list(texts)
 
     async def whole(self, run_id: str) -> views.RunWhole:
-        """Return a run that is over, with the graph as it was sent. Raises NotFound."""
+        """Return a run that is over, with the graph as it was sent. Raise NotFound if there is no
+        such run."""
         sent = await self.sent(run_id)
         found, place = await self.known(run_id), await self.place(run_id)
         return views.whole_view(found, sent, place=place)
@@ -174,7 +177,7 @@ class ReviewService:
         return (key.run if robots_too else views.with_newest_visits(key.run)), key.seq
 
     async def known(self, run_id: str) -> Run:
-        """Return a run, open or over. Raises NotFound."""
+        """Return a run, open or over. Raise NotFound if there is no such run."""
         opened = self._control.open.get(run_id)
         return (
             opened.run
@@ -185,7 +188,8 @@ class ReviewService:
     # --- one run ------------------------------------------------------------------------------
 
     async def causes(self, run_id: str) -> list[CauseShown]:
-        """Return the proven causes of a run's end, the weightiest first. Raises NotFound."""
+        """Return the proven causes of a run's end, the weightiest first. Raise NotFound if there is
+        no such run."""
         found, graph = await self.known(run_id), await self._graph(run_id)
         named = await self._run_in_worker(
             lambda: [(each, cause_sentence(each, found)) for each in causes(found, graph)[:_CAUSES]]
@@ -207,15 +211,18 @@ class ReviewService:
         return shown
 
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return rows of the tables. Raises Unavailable."""
+        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
+        cannot be read."""
         return await self._journal.query(statement)
 
     async def events(self, run_id: str, after: int, limit: int) -> Sequence[Event]:
-        """Return stored events of a run with `seq > after`. Raises Unavailable."""
+        """Return the stored events of a run with `seq > after`, at most `limit`. Raise Unavailable
+        if the journal cannot be read."""
         return await self._control.history.events(run_id, after, limit)
 
     async def sent(self, run_id: str) -> Sent:
-        """Return the graph as it was sent, and the values of its actions. Raises NotFound."""
+        """Return the graph as it was sent, and the values of its actions. Raise NotFound if there
+        is no such run."""
         return sent_of(await self._control.history.requested(run_id))
 
     async def place(self, run_id: str) -> Row[Any] | None:
@@ -239,11 +246,12 @@ class ReviewService:
         return raw_of(run_, here, gone, until)
 
     async def replay(self, run_id: str, after: int) -> RunReplay:
-        """Return a page of the run's replay. Raises NotFound."""
+        """Return one page of a run's replay: the events from the last keyframe at or before
+        `after`. Raise NotFound if there is no such run."""
         return await run_replay(self.keyframe_store, run_id, after=after)
 
     async def umrf(self, run_id: str) -> bytes:
-        """Return the graph as it was sent. Raises NotFound."""
+        """Return the text of the graph as it was sent. Raise NotFound if there is no such run."""
         return (await self._control.history.umrf(run_id)).encode()
 
     async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> RunMarks:
@@ -263,7 +271,7 @@ class ReviewService:
         return RunMarks(bool(pinned), note, [row.label for row in labels])
 
     async def compare(self, a: str, b: str) -> RunComparison:
-        """Compare two runs. Raises NotFound."""
+        """Compare two runs, given by their ids. Raise NotFound if one of them does not exist."""
         one, other = await self.known(a), await self.known(b)
         sent_a, sent_b = await self._sent_tree(a), await self._sent_tree(b)
         return await self._run_in_worker(lambda: compare(one, other, sent_a, sent_b))
@@ -274,7 +282,8 @@ class ReviewService:
         return SentTree(sent.umrf, inside, sent.script)
 
     async def export(self, run_id: str, form: Format) -> bytes:
-        """Return the run as a file of this format. Raises NotFound."""
+        """Return the run as the contents of a file in this format. Raise NotFound if there is no
+        such run."""
         found = await self.known(run_id)
         if form == "csv":
             return await self._run_in_worker(lambda: exports.intervals(found))
@@ -308,7 +317,8 @@ class ReviewService:
     # --- many runs ----------------------------------------------------------------------------
 
     async def statistics(self, graph: str, engine: str | None, last: int) -> statistics.Statistics:
-        """Return statistics of the newest runs of a graph."""
+        """Return statistics of the newest runs of a graph, at most `last` runs. With `engine`, only
+        runs on that engine count."""
         rows = await self._journal.query(statistics.runs_of(graph, engine, min(last, _LAST)))
         ids = [row.id for row in rows]
         sums: list[Row[Any]] = []
@@ -400,7 +410,7 @@ class ReviewService:
         return msgspec.json.decode(event.body, type=expected_runs.Expected)
 
     async def retire(self, name: str, author: Author) -> None:
-        """Remove an expected course. Raises NotFound."""
+        """Remove the expected course of this name. Raise NotFound if there is none."""
         if not await self._journal.query(select(expectation).where(expectation.c.name == name)):
             raise NotFound(f"Nothing is expected under the name {name!r}.")
         retired = expected_runs.Retired(self._clock_us(), name, author)

@@ -18,7 +18,8 @@ class RunnerJournal(Store, Protocol):
     """The journal of the runner: streams, and queries of its tables."""
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return rows of the tables. Raises Unavailable."""
+        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
+        cannot be read."""
         ...
 
 
@@ -36,8 +37,8 @@ class RunHistory:
         self._past = past
 
     async def followed(self, run: str) -> tuple[Run | None, int]:
-        """Return a run with all its visits, so that it can go on, and the seq of its last event.
-        Raises msgspec.DecodeError."""
+        """Return a run with all its visits, so that it can be followed further, and the seq of its
+        last event. Raise msgspec.DecodeError if a stored event is damaged."""
         if self._past is not None:
             return await self._past(run, True)
         return await self.replayed(run)
@@ -58,7 +59,7 @@ class RunHistory:
         return replay(events_read), events[-1].seq if events else 0, len(events_read) == len(read)
 
     async def run(self, run: str) -> Run:
-        """Return a run as people are shown it. Raises NotFound."""
+        """Return a run as people are shown it. Raise NotFound if there is no such run."""
         if self._past is not None:
             return (await self._past(run, False))[0]
         found, _ = await self.replayed(run)
@@ -67,11 +68,12 @@ class RunHistory:
         return found
 
     async def umrf(self, run: str) -> str:
-        """Return the graph as it was sent. Raises NotFound."""
+        """Return the text of the graph as it was sent. Raise NotFound if there is no such run."""
         return (await self.requested(run)).umrf
 
     async def requested(self, run: str) -> Requested:
-        """Return the first event of a run, its accepted start. Raises NotFound."""
+        """Return the first event of a run, its accepted start. Raise NotFound if there is no such
+        run."""
         first = await self._journal.read(stream_of(run), limit=1)
         event = decode(first[0].kind, first[0].body) if first else None
         if not isinstance(event, Requested):
@@ -83,7 +85,8 @@ class RunHistory:
         return await self._journal.read(stream_of(run), after=after, limit=limit)
 
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return rows of the tables. Raises Unavailable."""
+        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
+        cannot be read."""
         return await self._journal.query(statement)
 
 
@@ -95,8 +98,9 @@ def _decoded(event: Event) -> RunEvent | None:
 
 
 async def sent_of(store: Store, run: Run) -> str | None:
-    """Return the graph that a run has now, as it was sent or changed since; None when no stored
-    event has it. Raises Unavailable."""
+    """Return the text of the graph that a run has now: the one that was started, or the last change
+    of it. Return None if no stored event has the text. Raise Unavailable if the journal cannot
+    be read."""
     stored = await store.read(stream_of(run.id))
     sent = {Requested.kind, ModifyRequested.kind}
     for each in reversed(stored):

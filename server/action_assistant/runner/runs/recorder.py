@@ -28,8 +28,9 @@ class Store(Protocol):
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Store drafts and return the seq of the last one. Raises Conflict when the stream does not
-        end at `expected`, Unavailable."""
+        """Store drafts at the end of a stream, and return the seq of the last draft. Raise Conflict
+        if the stream does not end at `expected`, Unavailable if the journal cannot store
+        anything."""
         ...
 
     async def read(

@@ -63,8 +63,9 @@ class Approvals:
         self._reading = anyio.Lock()
 
     async def give(self, request: ApprovalRequest, author: Author) -> ApprovalGiven:
-        """Store an approval; a second one of the same person is the first one again. Raises
-        BadInput, Unavailable."""
+        """Store an approval. If the same person has approved the graph before, return that earlier
+        approval. Raise BadInput if the digest has the wrong form, Unavailable if the journal
+        cannot store it."""
         if not _DIGEST.issuperset(request.digest):
             raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
         for known in await self.given_for(request.digest):
@@ -118,7 +119,8 @@ class Approvals:
         )
 
     async def require(self, robot: Registration, digest: str, starter: str) -> None:
-        """Raise Conflict where the robot asks for an approval that nobody else has given."""
+        """Raise Conflict if the robot needs an approval of this graph and nobody but the starter
+        has given one."""
         item = await self.item(robot, digest, starter)
         if item is not None and item.verdict == "blocked":
             raise Conflict(item.text, where={"path": "/engine", "item": item.code})

@@ -52,8 +52,8 @@ class IdempotentStarts:
 
     @asynccontextmanager
     async def once(self, request: str) -> AsyncIterator[None]:
-        """Hold the lock of this request id: whoever asks again at the same time waits for the
-        first."""
+        """Hold the lock of this request id until the end of the block. A second caller with the
+        same id waits for the first one."""
         lock = self._locks.get(request)
         if lock is None:
             lock = self._locks[request] = anyio.Lock()
@@ -61,12 +61,13 @@ class IdempotentStarts:
             yield
 
     def under_way(self, request: str) -> bool:
-        """Return whether this start, or start of a group, is being carried out at this moment."""
+        """Return whether the start, or the start of a group, with this request id is being carried
+        out at this moment."""
         return request in self._locks
 
     async def run_of(self, request: StartRequest) -> str | None:
-        """Return the id of the run that a request has become; None when there is none. Raises
-        Conflict when the id belongs to another start."""
+        """Return the id of the run that a request has become; None if it has become none yet. Raise
+        Conflict if the request id belongs to another start."""
         rows = await self._journal.query(queries.by_request(request.request_id))
         if not rows:
             return None
@@ -80,8 +81,8 @@ class IdempotentStarts:
         return found
 
     async def store(self, requested: Requested) -> Run:
-        """Append a start to the journal and return its run. A start that cannot be stored is not
-        sent. Raises Unavailable."""
+        """Append a start to the journal, and return its run. Raise Unavailable if the start cannot
+        be stored; the caller then sends nothing."""
         stream = stream_of(requested.run)
         draft = Draft(requested.kind, requested.author.id, encode(requested))
         try:

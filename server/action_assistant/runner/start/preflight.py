@@ -231,7 +231,8 @@ def robot_items(view: EngineView, graph: Graph) -> tuple[Item, ...]:
 
 
 def require_clear(items: Sequence[Item], overridden: Collection[str]) -> None:
-    """Refuse a start that an item blocks. Raises Conflict."""
+    """Refuse a start that an item blocks and that does not override it. Raise Conflict with the
+    reasons."""
     for item in items:
         if not is_blocking(item, overridden):
             continue

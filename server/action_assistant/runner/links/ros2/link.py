@@ -105,7 +105,7 @@ class Ros2Link:
     # --- commands -----------------------------------------------------------------------------
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start message. Raises NotSent."""
+        """Publish one start message. Raise NotSent if the message has certainly not left."""
         domain = self._reachable("start", self._topics.start)
         message = UmrfGraphStart(
             umrf_graph_name=order.graph.name,
@@ -125,15 +125,15 @@ class Ros2Link:
         self._listened_to(domain, self._topics.stop)
 
     async def pause(self, graph_name: str) -> None:
-        """Publish one pause message. Raises NotSent."""
+        """Publish one pause message. Raise NotSent if it could not be sent."""
         domain = self._reachable("pause", self._topics.pause)
         message = UmrfGraphPause(umrf_graph_name=graph_name, targets=[self._name])
         with _sent_or_not():
             await domain.outlets.pause.send(lambda: message)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Publish one resume message. Raises NotSent, also for `continue_from`: over ROS 2 a graph goes on where
-        it was."""
+        """Publish one resume message. Raise NotSent if it could not be sent, or if `continue_from`
+        names an action: over ROS 2 a graph only goes on where it was."""
         if continue_from:
             raise NotSent("over ROS 2 a graph goes on where it was; no action can be named")
         domain = self._reachable("resume", self._topics.resume)
@@ -142,8 +142,7 @@ class Ros2Link:
             await domain.outlets.resume.send(lambda: message)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Publish one modify message with the graph of `order`. `continue_from`: the field of the
-        same name in the message. Raise NotSent if the message cannot be published."""
+        """Publish one modify message. Raise NotSent if it could not be sent."""
         domain = self._reachable("modify", self._topics.modify)
         message = UmrfGraphModify(
             umrf_graph_name=order.graph.name,
@@ -159,7 +158,8 @@ class Ros2Link:
         return self._domain
 
     def _reachable(self, command: str, topic: str) -> Domain:
-        """Return the domain, if this robot can take a command. Raises NotSent."""
+        """Return the domain of this robot. Raise NotSent if nobody of this robot listens to
+        `topic`, or its engine has an older generation of messages."""
         domain = self._joined()
         self._listened_to(domain, topic)
         if generation_of(domain, domain.servers(self._path)) == "older":
@@ -173,7 +173,8 @@ class Ros2Link:
     # --- the one question ---------------------------------------------------------------------
 
     async def get(self) -> Answer:
-        """Ask the one engine on the path for all graphs that it holds. Raises NoAnswer."""
+        """Ask the one engine on the path for all graphs that it holds. Raise NoAnswer if discovery
+        does not show exactly one engine there, or if its answer cannot be used."""
         if self._domain is None:
             raise NoAnswer(self._standing.why)
         domain = self._domain
