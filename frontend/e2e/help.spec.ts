@@ -32,7 +32,7 @@ test("Help is searched, and leads to what to do at STOP UNCONFIRMED", async ({ b
   await expect(found).toBeVisible();
   await found.click();
   await help.waitForURL(/operators-guide\.html(\?.*)?#stop-unconfirmed$/);
-  await expect(help.getByText("Take it as if the robot moves.")).toBeInViewport();
+  await expect(help.getByText("Assume that the robot moves.")).toBeInViewport();
 
   // On a phone the table of what the page says stays within it.
   await help.setViewportSize({ width: 390, height: 844 });

@@ -26,6 +26,7 @@ from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES
 from action_assistant.editor.history import change_index
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
+from action_assistant.web.monitoring import loop_lag
 from action_assistant.web.workers import lanes
 from editor.process import BEARER
 from support.openapi import documents
@@ -128,7 +129,9 @@ async def lifespan(app: Any) -> AsyncIterator[None]:
 async def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Served]:
     """An editor that counts, with real workers and a real database."""
     monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", TOKEN)
-    monkeypatch.setattr(change_index, "_PERIOD", 3600.0)  # nothing happens by itself
+    # Nothing happens by itself, or what is counted would grow with the time that workers take.
+    monkeypatch.setattr(change_index, "_PERIOD", 3600.0)
+    monkeypatch.setattr(loop_lag, "_TICK_S", 3600.0)
     settings = EditorSettings(
         data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}", port=8000, limits=False
     )

@@ -350,13 +350,13 @@ def test_a_restore_into_postgres_that_was_killed_goes_on_where_it_was(
     url, place = postgres.new_database(), tmp_path / "place"
     staged = unpacked(file, tmp_path / "staged")
     place.mkdir()
-    for step, events in ((2, 0), (3, 0), (4, 3), (6, 3)):  # first the mark, then the graphs
+    for step, events in ((3, 0), (4, 0), (5, 3), (7, 3)):  # first the mark, then the graphs
         process = multiprocessing.get_context("fork").Process(
             target=put, args=(staged, place, file, url, step)
         )
         process.start()
         process.join(60)
-        assert (place / settings.RESTORING).exists() == (step > 2)
+        assert (place / settings.RESTORING).exists() == (step > 3)
         assert asyncio.run(position(url)) == events
         shutil.rmtree(place / ".restore-x")
     assert here("restore", file, "--data", place, "--database", url) == 0

@@ -65,7 +65,7 @@ async def written(path: Path) -> None:
                 del person.map[next(iter(person.map.keys()))]
             await settle(*people)
             if n == 30:
-                await room._snapshots.keep(room.seq, room._replica)
+                await room._snapshots.store_now(room.seq, room._replica)
                 old = await journal.snapshot("graph/g")
         for person in people:
             person.leave()
