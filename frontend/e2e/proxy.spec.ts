@@ -176,7 +176,7 @@ for (const [kind, path] of CASES) {
       await page.getByRole("textbox", { name: "Search" }).first().fill("unconfirmed");
       await page.keyboard.press("Enter");
       await page.getByRole("link", { name: /> STOP UNCONFIRMED$/ }).click();
-      await expect(page.getByText("Take it as if the robot moves.")).toBeVisible();
+      await expect(page.getByText("Assume that the robot moves.")).toBeVisible();
       await page.getByRole("link", { name: "Open Action Assistant" }).click();
       await expect(page).toHaveURL(`${proxy.url}/`);
       await context.close();
