@@ -1461,7 +1461,8 @@ export interface EditorApi {
     };
     /**
      * Script
-     * @description Behaviours by key: one entry for each call, and the last one repeats.
+     * @description Behaviours of actions by key. A key has one behaviour for each call of the action; the last
+     *     one repeats.
      */
     Script: {
         /** @default {} */

@@ -1417,7 +1417,8 @@ export interface RunnerApi {
     RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
      * Script
-     * @description Behaviours by key: one entry for each call, and the last one repeats.
+     * @description Behaviours of actions by key. A key has one behaviour for each call of the action; the last
+     *     one repeats.
      */
     Script: {
         /** @default {} */

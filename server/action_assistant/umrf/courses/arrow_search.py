@@ -32,19 +32,21 @@ _FAR: Final = 1 << 30
 
 
 class ArrowReached(msgspec.Struct, frozen=True, tag_field="verdict", tag="reached"):
-    """The arrow is taken under this script."""
+    """The arrow can be taken; it is taken under this script."""
 
     script: Script
 
 
 class ArrowUnreachable(msgspec.Struct, frozen=True, tag_field="verdict", tag="unreachable"):
-    """The arrow cannot be taken: this many states were examined, and there are no others."""
+    """The arrow can never be taken: all states of the graph that could lead to it were examined,
+    `states` in number."""
 
     states: int
 
 
 class ArrowUndecided(msgspec.Struct, frozen=True, tag_field="verdict", tag="undecided"):
-    """The search ended after this many states without a result; `why` is the reason."""
+    """The search ended without a result after it had found `states` states; `why` says the reason
+    in a sentence."""
 
     states: int
     why: str
@@ -57,7 +59,8 @@ ArrowSearch: TypeAlias = ArrowReached | ArrowUnreachable | ArrowUndecided
 
 
 class _End(NamedTuple):
-    """The end of one action. `result` is used if the action runs."""
+    """The end of one action, by index. `result` counts only for an action that runs, not for one
+    that is being stopped or given up."""
 
     action: int
     result: Precondition
@@ -103,11 +106,11 @@ def search_arrow(
     budget: int = BUDGET,
     inside: Mapping[str, Graph] | None = None,
 ) -> ArrowSearch:
-    """Search for a script under which an arrow is taken, with the graphs of `inside` as sub-graphs.
+    """Search for a script under which the arrow `wanted` is taken.
 
-    The ends of a sub-graph are not searched: it is assumed to end with any result, and the
-    simulator proves whether the script works. `budget`: how many states of single actions to
-    examine.
+    `inside`: the graphs that can be sub-graphs, by name. How a sub-graph ends is not searched: it
+    is assumed that it can end with any result, and the simulator then proves whether the script
+    works. `budget`: how many states of single actions are examined at most.
     """
     net = Network(graph)
     indices = {action.key: net.index.get(action.full_name, -2) for action in graph.actions}
@@ -214,7 +217,7 @@ class _Search:
         return list(found.values())
 
     def script(self, ends: Sequence[_End]) -> Script:
-        """Return the behaviours under which actions end like this, one after the other."""
+        """Return the script under which actions end in this order with these results."""
         visits: dict[int, list[_Visit]] = {}
         before = _first(self._net)
         for step, end in enumerate((None, *ends)):
@@ -243,7 +246,8 @@ class _Search:
 
 
 class _Visit(NamedTuple):
-    """One run of an action, from step to step; -1 stands for never."""
+    """One run of an action: the numbers of the steps at which it begins, is stopped and ends. -1
+    stands for never."""
 
     begun: int
     stopped: int = -1
@@ -252,8 +256,8 @@ class _Visit(NamedTuple):
 
 
 def _behaviours(visits: Sequence[_Visit], last: int) -> Iterator[Behaviour]:
-    """Yield one behaviour for each run. A run that is not asked to end otherwise ends with on_true
-    after all the others."""
+    """Yield one behaviour for each run of an action. A run without an end in the search ends with
+    on_true after the step `last`."""
     for visit in visits:
         if visit.stopped >= 0:
             ended = visit.ended if visit.ended >= 0 else last + 1
@@ -283,7 +287,7 @@ def _way(
 
 
 def _distances(net: Network, to: int) -> list[int]:
-    """Return for each action the least number of arrows from it to this one."""
+    """Return for each action the least number of arrows from this action to the action `to`."""
     above: dict[int, list[int]] = {}
     for index, row in enumerate(net.edges):
         for edge in row:

@@ -40,11 +40,12 @@ class Outcome(NamedTuple):
 
 
 class BaselineCourse:
-    """The history of the course. By instant: `times`, `roots` (the action that ended), `touched`,
-    and sums after each instant.
+    """The course in which every action ends with on_true, with its history.
 
-    By action, `instants` and `states`: the instants at which it was asked or ended, and its state
-    after each.
+    By number of the instant: `times` in ms, `roots` (the index of the action that ended; -1 for the
+    entry), `touched` (the actions whose state was set), and counts after the instant. By index of
+    the action: `instants`, at which it was asked or ended, and `states`, its state after each of
+    them.
     """
 
     def __init__(self, net: Network) -> None:
@@ -74,7 +75,7 @@ class BaselineCourse:
         self.outcome = Outcome("never") if self._never_starts() else self._followed()
 
     def state(self, index: int, before: int) -> State:
-        """Return the state of an action before the instant with the number `before`."""
+        """Return the state of an action just before the instant with the number `before`."""
         own = self.instants[index]
         found = len(own) if before > (own[-1] if own else -1) else bisect_left(own, before)
         return self.states[index][found - 1] if found else self.initial[index]
@@ -153,8 +154,8 @@ class BaselineCourse:
         self.last.append(self._last)
 
     def _seen(self, at: float) -> tuple[object, ...]:
-        """Return a value that is equal at the same point of two laps: who ended, and all states,
-        relative to the round."""
+        """Return a value by which two laps are compared: the action that ended last, and all
+        states, with times relative to their round."""
         start = at // self.net.round_ms * self.net.round_ms
         states = [
             state._replace(due=state.due - start) if state.does in DUE else state
@@ -166,7 +167,11 @@ class BaselineCourse:
 
 
 def stuck(net: Network, waiting: Mask, ended: State, last: int) -> Outcome:
-    """Return the outcome of a graph in which nothing runs any more although it has not ended."""
+    """Return the outcome of a graph in which nothing runs any more although it has not ended.
+
+    `waiting`: the actions that wait, as a mask. `ended`: the state of the exit. `last`: the index
+    of the last action that asked the exit.
+    """
     lacking = frozenset(
         name for bit, name in net.required[net.exit].items() if not ended.links & bit
     )

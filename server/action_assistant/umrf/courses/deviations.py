@@ -24,15 +24,16 @@ _FEW: Final = 8
 
 
 class SimultaneousEnds(Exception):
-    """Raised when two actions end at one moment: their order is known to the engine only."""
+    """Raised if two actions end at the same moment, since only the engine knows in which order they
+    end."""
 
 
 _Key = tuple[int, frozenset[tuple[int, State]]]
 
 
 class DeviatingCourses:
-    """All courses in which one action ends otherwise. `work`: how many states were examined, as a
-    measure of the time taken."""
+    """Computes courses in which one action ends otherwise than in the baseline course. `work`: how
+    many states were examined so far, as a measure of the time taken."""
 
     def __init__(self, course: BaselineCourse) -> None:
         self.course = course
@@ -56,8 +57,8 @@ class DeviatingCourses:
                 self.alone[index] = course.outcome
 
     def outcome(self, index: int, result: Precondition) -> Outcome:
-        """Return how the graph ends if the first run of an action ends with `result`. Raises
-        `SimultaneousEnds`."""
+        """Return how the graph ends if the first run of the action at `index` ends with `result`.
+        Raises `SimultaneousEnds` if two actions end at the same moment."""
         instant = self.course.first_end(index)
         if instant is None:
             return self.course.outcome

@@ -24,8 +24,8 @@ from action_assistant.umrf.semantics.steps import (
 
 
 class CourseCheck(msgspec.Struct, frozen=True):
-    """The first step in which a graph departs from an expected course, None if it does not, and the
-    arrows that it took."""
+    """The result of comparing a graph with an expected course. `apart`: the first step that
+    differs, or None. `taken`: the arrows that the graph took."""
 
     apart: Departure | None
     taken: TakenArrows
@@ -46,10 +46,10 @@ def check_expected(
     now: Graph,
     inside: Mapping[str, Graph] | None = None,
 ) -> CourseCheck:
-    """Simulate a graph as it is now under the script of a course that an earlier version took, and
-    compare.
+    """Simulate the graph `now` under the script of a course that its earlier version `was` took,
+    and compare the new course with that `course`.
 
-    `was`: the earlier graph; `inside`: the graphs that are sub-graphs of `now`.
+    `inside`: the graphs that can be sub-graphs of `now`, by name.
     """
     old = {action.full_name: action.key for action in was.actions}
     new = _identities(was, now)
@@ -72,9 +72,10 @@ def check_expected(
 
 
 def _identities(was: Graph, now: Graph) -> dict[str, Key]:
-    """Return the action of the earlier graph that each full name stands for.
+    """Return, by full name of each action of `now`, the key by which the comparison knows it: the
+    key of the action of `was` that it continues.
 
-    In a file without identities actions are matched by name alone.
+    Actions are matched by key, and by full name if the keys of `was` are no identities.
     """
     keys = {action.key for action in was.actions if AID.fullmatch(action.key)}
     names = {action.full_name: action.key for action in was.actions}
@@ -86,14 +87,16 @@ def _identities(was: Graph, now: Graph) -> dict[str, Key]:
 
 
 def keyed(steps: Sequence[ExpectedStep], keys: Mapping[str, Key]) -> list[ExpectedStep]:
-    """Return steps in which actions of the top graph have their keys as names."""
+    """Return the steps with the key instead of the full name for each action of the top graph.
+    `keys`: keys by full name."""
     return [
         step if step.graph else replace(step, node=keys.get(step.node, step.node)) for step in steps
     ]
 
 
 def scripted_by_key(script: Script, graph: Graph) -> Script:
-    """Return the script with its actions under their keys, which survive a renaming."""
+    """Return the script in which the behaviours of the graph's actions stand under their keys,
+    which survive a renaming."""
     found = dict(script.behaviours)
     for action in graph.actions:
         for name in (action.full_name, action.name, f"{graph.name}/{action.full_name}"):
@@ -106,8 +109,8 @@ def scripted_by_key(script: Script, graph: Graph) -> Script:
 
 
 def scripted_by_name(script: Script, graph: Graph) -> Script:
-    """Return a script by keys (`scripted_by_key`) with the full names that these actions have in
-    this graph."""
+    """Return a script of `scripted_by_key` with the full names that the actions have in this graph
+    in place of their keys."""
     names = {action.key: action.full_name for action in graph.actions}
     return Script({names.get(key, key): calls for key, calls in script.behaviours.items()})
 

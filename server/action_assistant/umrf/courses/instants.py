@@ -31,11 +31,12 @@ GIVING_UP_MS: Final = 5_000.0
 
 
 class State(NamedTuple):
-    """The state of one action at one moment. `due`: when its activity ends, if it is one of `DUE`.
+    """The state of one action at one moment. `does`: its activity; `due`: the time in ms at which
+    this activity ends by itself, if it is one of `DUE`.
 
     `links`: the required parents that have reported. `has`: the inputs that hold a value. `got`:
-    those of them whose value came from a parent and is cleared after the run. `filled`: its outputs
-    have values. `waiting`: it was asked and was not ready.
+    the inputs whose value came from a parent and is cleared after the run. `filled`: the outputs
+    have values. `waiting`: the action was asked and was not ready.
     """
 
     does: int = IDLE
@@ -81,13 +82,13 @@ class Instant:
         self.others: list[int] = []
 
     def begin(self) -> None:
-        """Start the graph: its entry asks its children."""
+        """Start the graph, whose entry then asks its children for their responses."""
         self._inform(-1, "on_true", self._net.entry)
         self._settle()
 
     def ends(self, index: int, result: Precondition) -> None:
-        """End the action at this index, which runs, stops or is given up. `result` is used if it
-        runs."""
+        """End the action at this index. An action that runs ends with `result`; one that is being
+        stopped ends with on_stopped, and one that is given up with on_error."""
         state = self._state(index)
         match state.does:
             case 1:
@@ -197,7 +198,8 @@ class Instant:
         return False
 
     def _bypass(self, index: int, child: int, result: Precondition) -> None:
-        """Bypass a child, once for each result: further paths to the same bypass change nothing."""
+        """Bypass a child with a result, and pass the result on. The same bypass is done once in an
+        instant, since another path to it changes nothing."""
         if child == self._net.exit:
             self._finish(index)
         elif (child, result) not in self._bypassed:

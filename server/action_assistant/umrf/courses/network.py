@@ -29,12 +29,12 @@ STOP_MS: Final = 50.0
 
 
 class EdgeQuestion(NamedTuple):
-    """One edge, as the end of its parent asks it. `responses`: the child's response to each
-    outcome.
+    """One edge of a graph, by which a parent that ends asks a child for its response. `child`: the
+    index of the child; `responses`: the child's response to each outcome.
 
-    `link`: the parent's bit among the child's required parents. `given`: the child's inputs that
-    the parent's outputs fill, before and after the parent has run; None where the renaming kills
-    the engine.
+    `link`: the parent's bit among the child's required parents. `given`: the inputs of the child
+    that the parent's outputs fill, before and after the parent has first run; None if the renaming
+    kills the engine.
     """
 
     child: int
@@ -44,12 +44,14 @@ class EdgeQuestion(NamedTuple):
 
 
 class Network:
-    """Holds a graph as numbers. Masks have a bit for each parent or input of one action.
+    """Holds a graph as numbers. A mask of parents or inputs has one bit for each parent or input of
+    one action.
 
-    `names`: full names by index; `index`: the reverse. `needs`: the required parents, `wants`: the
-    required inputs, `has`: the inputs that hold a value from the start. `able`: False for names
-    that the engine never runs. `late`: the time at which an action ends within a round of
-    `round_ms`. `edges`: the questions of each action's end; None where the engine aborts.
+    `names`: full names by index; `index`: indices by full name. `needs`: the required parents of
+    each action, `wants`: its required inputs, `has`: its inputs that hold a value from the start.
+    `able`: False for actions whose name the engine never runs. `late`: the time in ms at which each
+    action ends within a round of `round_ms`. `edges`: the edges of each action; None in place of an
+    edge at which the engine aborts.
     """
 
     def __init__(self, graph: Graph, *, slower_first: bool = False) -> None:
@@ -92,8 +94,8 @@ class Network:
             self.edges.append(row)
 
     def due(self, index: int, now_ms: float) -> float:
-        """Return the time at which an action that begins now ends: at its own time within the next
-        round."""
+        """Return the time in ms at which an action ends that begins now: its own time within the
+        next round."""
         return (now_ms // self.round_ms + 1) * self.round_ms + self.late[index]
 
     @cached_property
@@ -104,23 +106,25 @@ class Network:
 
     @cached_property
     def circling(self) -> dict[str, Mask]:
-        """Return for each outcome the actions that a bypass with it leads back to."""
+        """Return for each outcome, as a mask, the actions that are bypassed again by their own
+        bypass with this outcome."""
         return {outcome: self._circling(outcome) for outcome in PRECONDITIONS}
 
     @cached_property
     def plain(self) -> dict[str, Mask]:
-        """Return for each outcome the actions whose bypass causes nothing but further bypasses."""
+        """Return for each outcome, as a mask, the actions whose bypass causes only further bypasses
+        and halts nothing."""
         return {outcome: self._plain(outcome) for outcome in PRECONDITIONS}
 
     @cached_property
     def ends(self) -> dict[str, Mask]:
-        """Return for each outcome the actions whose bypass leads to the exit by bypasses alone."""
+        """Return for each outcome, as a mask, the actions from which bypasses lead to the exit."""
         mask = (1 << len(self.nodes)) - 1
         return {o: self._leading(o, {self.exit}) & mask for o in PRECONDITIONS}
 
     @cached_property
     def last(self) -> list[int]:
-        """Return the actions with an arrow to the exit."""
+        """Return the indices of the actions with an arrow to the exit."""
         rows = enumerate(self.edges)
         return [index for index, row in rows if any(e and e.child == self.exit for e in row)]
 
@@ -135,7 +139,8 @@ class Network:
         return every & ~self._leading(outcome, other)
 
     def _leading(self, outcome: Precondition, to: set[int]) -> Mask:
-        """Return the set `to` together with all actions that lead into it by bypasses."""
+        """Return, as a mask, the actions of `to` and all actions from which bypasses with this
+        outcome lead to them."""
         found, stack = set(to), list(to)
         while stack:
             for index in self._bypassing(outcome).get(stack.pop(), ()):
@@ -145,7 +150,8 @@ class Network:
         return sum(1 << index for index in found)
 
     def _bypassing(self, outcome: Precondition) -> dict[int, list[int]]:
-        """Return for each bypassed action the actions that bypass it."""
+        """Return, for each action that can be bypassed with this outcome, the actions that bypass
+        it."""
         if outcome not in self._bypasses:
             found: dict[int, list[int]] = {}
             for index, row in enumerate(self.edges):
@@ -178,8 +184,11 @@ def _asked(
     bits: Sequence[dict[str, Mask]],
     slots: Sequence[dict[str, Mask]],
 ) -> EdgeQuestion | None:
-    """Return an edge as a question. None where the engine aborts: the child is missing or does not
-    list this parent."""
+    """Return an edge in numbers; None if the engine aborts at this edge, since the child is missing
+    or does not list the parent.
+
+    `outputs`: the parent's outputs that have a value before its first run, and all of its outputs.
+    """
     link = edge.child.links.get(parent.full_name) if edge.child is not None else None
     if edge.child is None or link is None:
         return None

@@ -107,7 +107,7 @@ def _going_on(net: Network, engine: Engine, name: str) -> Mask:
 
 
 class _TraceReader:
-    """Reads from a trace which actions wait, and how the graph ends."""
+    """Reads trace events, and keeps which actions wait and how the graph ends."""
 
     def __init__(self, net: Network) -> None:
         self.net = net
@@ -117,7 +117,8 @@ class _TraceReader:
         self._asked = -1
 
     def take(self, traces: list[Trace]) -> Kind | None:
-        """Read trace events, and return the end of the graph if it is among them."""
+        """Read the next trace events, and return how the graph ends if one of them tells; None
+        otherwise."""
         kind: Kind | None = None
         for trace in traces:
             match trace:

@@ -64,7 +64,8 @@ class Engine(Graphs):
 
     @property
     def due(self) -> float | None:
-        """The time in ms at which something happens next by itself; None if nothing will."""
+        """The time in ms at which the engine's next event happens without a command; None if there
+        will be none."""
         if self._out or self._tasks:
             return self.now
         return self._heap[0][0] if self._heap else None
@@ -75,7 +76,7 @@ class Engine(Graphs):
         return self._busy
 
     def advance(self, to_ms: float) -> list[Trace]:
-        """Run the engine up to and including `to_ms`, and return the trace in order."""
+        """Carry out all events up to and including the time `to_ms`, and return the trace in order."""
         self._run_until(to_ms)
         return self._taken()
 
@@ -94,10 +95,11 @@ class Engine(Graphs):
         *,
         by_name: bool = False,
     ) -> list[Trace]:
-        """Start a graph. Raises `GraphRefused`.
+        """Start a graph, and return the trace. Raises `GraphRefused` if the engine refuses the
+        graph.
 
         `states`: run states that the file carries, by key of the action. `by_name`: the engine
-        takes the graph from its own index, and matches it each time.
+        takes the graph from its own index, and therefore matches it at each start.
         """
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)
@@ -133,23 +135,25 @@ class Engine(Graphs):
         return self._taken()
 
     def asked(self) -> list[Trace]:
-        """Handle a get of all graphs (`umrf_graph_get`): a graph that was built in part only kills
-        the engine."""
+        """Handle a get of all graphs (`umrf_graph_get`), and return the trace. The get kills the
+        engine if a graph was built only in part."""
         deadly = next((graph for graph in self.graphs.values() if graph.deadly), None)
         if deadly is not None and not self.crashed:
             self._crash(deadly, "H6", "A broken graph is asked for: the engine aborts.")
         return self._taken()
 
     def stop(self, graph_name: str, at_ms: float) -> list[Trace]:
-        """Stop a graph. A graph that does not run stays as it is."""
+        """Stop the graph that runs as `graph_name`, and return the trace. Do nothing if no such
+        graph runs."""
         return self._on(graph_name, at_ms, self._stop_graph)
 
     def pause(self, graph_name: str, at_ms: float) -> list[Trace]:
-        """Pause a graph that is RUNNING."""
+        """Pause the graph that runs as `graph_name` if it is RUNNING, and return the trace."""
         return self._on(graph_name, at_ms, self._pause_graph)
 
     def resume(self, graph_name: str, at_ms: float, continue_from: str = "") -> list[Trace]:
-        """Resume a PAUSED or HALTED graph. `continue_from` is the full name of a node to run."""
+        """Resume the graph that runs as `graph_name` if it is PAUSED or HALTED, and return the
+        trace. `continue_from`: the full name of an action to run."""
         return self._on(graph_name, at_ms, partial(self._resume_graph, continue_from=continue_from))
 
     def modify(self, graph: Graph, at_ms: float, continue_from: str = "") -> list[Trace]:

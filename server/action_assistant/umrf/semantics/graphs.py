@@ -28,9 +28,9 @@ from action_assistant.umrf.semantics.trace import HazardEvent, NodeStateEvent
 
 
 class GraphRefused(Exception):
-    """Raised where the engine throws instead of starting or modifying a graph.
+    """Raised if the engine throws an exception instead of starting or modifying a graph.
 
-    The trace up to then is returned by the next call of the engine.
+    The next call of the engine returns the trace up to that moment.
     """
 
     def __init__(self, message: str) -> None:
@@ -39,7 +39,8 @@ class GraphRefused(Exception):
 
 
 class Graphs(Core):
-    """Runs the commands on graphs and sub-graphs one after the other. `Engine` decides when."""
+    """Runs commands on graphs and sub-graphs one after the other. `Engine` decides when each
+    command comes."""
 
     def __init__(
         self,
@@ -64,7 +65,7 @@ class Graphs(Core):
             command()
 
     def _free(self) -> None:
-        """Run the waiting commands, now that the command which held the engine is done."""
+        """Run the commands that wait, since the command that kept the engine busy is done."""
         self._busy = False
         while self._waiting and not self._busy and not self.crashed and not self.locked:
             try:
@@ -97,7 +98,8 @@ class Graphs(Core):
         return running
 
     def _resolves(self, graph: Running) -> bool:
-        """Return whether the engine has every action that it has to run itself."""
+        """Return whether the engine can resolve every action that it has to run itself, as an
+        action or as a sub-graph."""
         own = {"", self.actor} if self.actor else {node.actor for node in graph.nodes.values()}
         known = self.signatures or {}
 

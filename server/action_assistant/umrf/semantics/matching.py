@@ -41,7 +41,8 @@ class IndexedGraphs:
         self._known: dict[str, tuple[set[str], set[str]]] = {}
 
     def fitting(self, name: str, inputs: Collection[str], outputs: Collection[str]) -> Graph | None:
-        """Return the graph of that name if it has exactly these inputs and outputs, else None."""
+        """Return the indexed graph with this name if its inputs and outputs are exactly these flat
+        names; None otherwise."""
         sub = self._library.get(name)
         if sub is None:
             return None
@@ -51,8 +52,8 @@ class IndexedGraphs:
 
 
 class _Level:
-    """One graph while its actions are resolved. `above`: the names of the graphs around it and its
-    own; `used`: names that the engine does not look for any more here."""
+    """One graph while its actions are resolved. `above`: its own name and the names of the graphs
+    around it. `used`: names of graphs that the engine has taken off its list here."""
 
     def __init__(self, graph: Graph, above: frozenset[str], used: frozenset[str]) -> None:
         self.above = above | {graph.name}
@@ -64,13 +65,14 @@ class _Level:
 def unresolved(
     graph: Graph, library: Mapping[str, Graph], is_other: Callable[[Action], bool]
 ) -> Iterator[Unresolved]:
-    """Yield the sub-graphs for which an engine refuses a graph although it has indexed them.
+    """Yield the sub-graphs for which an engine refuses this graph although it has indexed them.
 
-    The engine goes through the actions by full name. It takes a graph off its list once it has used
-    it, for the later actions of the same graph and for everything inside, but not for graphs beside
-    it. So one sub-graph twice in one graph is refused, and so is one beside a later one that
-    contains it; the same sub-graph inside two different ones is not (measured). `is_other` returns
-    True for what is no sub-graph of this engine: a plain action, or one of another actor.
+    The engine goes through the actions by full name. Once it has used a graph, it takes this graph
+    off its list for the later actions of the same graph and for all graphs inside, but not for
+    graphs beside it. So the engine refuses one sub-graph twice in one graph, and a sub-graph beside
+    a later one that contains it; it accepts the same sub-graph inside two different ones
+    (measured). `is_other` returns True for an action that is no sub-graph of this engine: a plain
+    action, or an action of another actor.
     """
     indexed = IndexedGraphs(library)
     levels = [_Level(graph, frozenset(), frozenset())]
@@ -107,7 +109,7 @@ def has_action(node: Node, known: Signature | None) -> bool:
 
 
 def _expected(sub: Graph) -> tuple[set[str], set[str]]:
-    """Return the names of the inputs that a graph takes and of the outputs that it gives."""
+    """Return the names of the inputs and of the outputs that a graph has as a sub-graph."""
     entries = {r.child for r in sub.relations if r.parent == ENTRY}
     exits = sorted((r.child_order, r.parent) for r in sub.relations if r.child == EXIT)
     ends = {key for _, key in exits}

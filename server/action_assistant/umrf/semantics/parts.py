@@ -46,7 +46,7 @@ class NodeLink:
 
 
 class Edge:
-    """Holds one item of a parent's `children`. `child` is None where no such action exists."""
+    """Holds one item of a parent's `children`. `child` is None if the graph has no such action."""
 
     __slots__ = ("child", "label", "remap")
 
@@ -126,11 +126,13 @@ class Node:
 
     @property
     def active(self) -> bool:
-        """True while the engine counts the action as active: it runs, is paused or stops."""
+        """True while the engine counts the action as active: while it runs, is paused or is being
+        stopped."""
         return self.state in ACTIVE
 
     def activity(self, at_ms: float) -> int:
-        """Return what the action does at this time, as a number of `transitions`."""
+        """Return what the action does at this time (ms), as one of the numbers that `transitions`
+        defines."""
         match self.state:
             case "RUNNING":
                 return RUNS
@@ -142,12 +144,12 @@ class Node:
                 return THREAD_LEFT if self.loading or self.busy_until > at_ms else IDLE
 
     def holds_thread(self, at_ms: float) -> bool:
-        """Return whether a thread of the action lives at this time, also one that the engine has given up as
-        ERROR and one that still loads."""
+        """Return whether the engine has a thread for the action at this time (ms). Also an action
+        that still loads has one, and one whose code continues after the engine has shown ERROR."""
         return self.activity(at_ms) != IDLE
 
     def link(self, parent: str, link: NodeLink) -> None:
-        """Add a parent, unless an earlier listing has it."""
+        """Add a parent by its full name. A parent that is listed already keeps its earlier link."""
         if parent not in self.links:
             self.links[parent] = link
             self.waiting_links += link.required
@@ -164,12 +166,12 @@ class Node:
 
 
 class Running:
-    """Holds one graph in an engine. `name` is the name it runs under, `own` the one it calls
-    itself.
+    """Holds one graph in an engine. `name`: the name under which it runs; `own`: the name in its
+    own text.
 
-    `above` and `home`: the action that this sub-graph stands for and the graph of that action; None
-    for a top graph. `running`: nodes in state RUNNING; `active`: nodes that are active; `held`:
-    paused ones; `loading`: nodes that load and will run.
+    `above` and `home`: the action that this sub-graph stands for, and the graph of that action;
+    None for a top graph. `running`, `active`, `held` and `loading` count nodes: those in state
+    RUNNING, those that are active, those that are paused, and those that load and will then run.
     """
 
     def __init__(self, name: str, graph: Graph, above: "Node | None", home: "Running | None"):
@@ -200,8 +202,8 @@ class Running:
         self.linked: dict[Node, list[Node] | None] = {}
 
     def own_names(self) -> set[str]:
-        """Return the names of this graph and of all graphs around it, and of the actions that stand
-        for them."""
+        """Return the names that sub-graphs of this graph cannot have: the names of this graph and
+        of all graphs around it, and of the actions that stand for these graphs."""
         found, graph = set[str](), self
         while True:
             found.add(graph.own)
@@ -218,8 +220,11 @@ class Running:
 
 
 def build(running: Running, behaviours: Mapping[Key, tuple[Behaviour, ...]]) -> None:
-    """Fill a graph with nodes and edges. If two actions have one full name, the later one is
-    lost."""
+    """Fill an empty graph with the nodes and edges of its text. If two actions have the same full
+    name, the later one is lost.
+
+    `behaviours`: the behaviours of each action, by key.
+    """
     graph = running.graph
     nodes = {a.key: Node(a, a.full_name, behaviours[a.key]) for a in graph.actions if not a.missing}
     for node in nodes.values():
@@ -315,8 +320,8 @@ def restructure(running: Running, new: Running) -> None:
 
 
 def exit_owner(graph: Graph) -> Action | None:
-    """Return the action whose outputs the exit takes in: the last one of `graph_exit` that has any
-    outputs."""
+    """Return the action whose outputs become the inputs of the exit: the last action of
+    `graph_exit` that has any outputs; None if no action has."""
     by_key = {action.key: action for action in graph.actions if not action.missing}
     ends = [r for r in graph.relations if r.child == EXIT and r.only != "children"]
     ends.sort(key=lambda r: (r.child_order, name_order(r)), reverse=True)

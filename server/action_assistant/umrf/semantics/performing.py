@@ -33,10 +33,10 @@ class Call(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Returned(msgspec.Struct, frozen=True, kw_only=True):
-    """The end of a call of which no code runs any more. `result`: one of `OUTCOMES`.
+    """The end of a call, sent when none of its code runs any more. `result`: one of `OUTCOMES`.
 
-    `outputs`: values of the types that the call named, by flat name. `message`: a text about the
-    end for people.
+    `outputs`: the values of outputs, of the types that the call named, by flat name. `message`: a
+    text about the end for people.
     """
 
     number: int
@@ -65,10 +65,10 @@ class Performer(Protocol):
         """Let a paused call continue."""
 
     def give_up(self, number: int) -> str | None:
-        """End a call by force, since the engine's stop timeout has passed, and return a message
-        about it.
+        """End the code of a call by force, since the engine's stop timeout has passed, and return a
+        message about it for people.
 
-        The end is reported as a return like any other.
+        The end is then reported like any other return.
         """
 
 
@@ -131,8 +131,8 @@ class PerformedCalls:
         return None
 
     def take(self, number: int) -> tuple[Running, Node, Execution] | None:
-        """Remove a call that has ended, and return its graph, node and execution; None if it is not
-        known."""
+        """Remove the call with this number, which has ended, and return its graph, node and
+        execution; None if there is no such call."""
         return self._going.pop(number, None)
 
     def _number(self, node: Node) -> int:

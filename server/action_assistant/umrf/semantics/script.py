@@ -42,7 +42,8 @@ DEFAULT: Final = Behaviour()
 
 
 class Script(msgspec.Struct, frozen=True):
-    """Behaviours by key: one entry for each call, and the last one repeats."""
+    """Behaviours of actions by key. A key has one behaviour for each call of the action; the last
+    one repeats."""
 
     behaviours: dict[str, tuple[Behaviour, ...]] = {}
 
@@ -80,7 +81,8 @@ def script_json(script: Script) -> dict[str, Any]:
 
 
 def script_from(value: object) -> Script:
-    """Read a script from JSON values. Raises `ValueError` that names the place."""
+    """Read a script from parsed JSON. Raises `ValueError`, with the place in its message, if the
+    value is no script."""
     if not isinstance(value, dict) or not isinstance(value.get("behaviours", {}), dict):
         raise ValueError("A script is an object with “behaviours”, an object.")
     unknown = sorted(map(str, value.keys() - {"behaviours"}))

@@ -21,13 +21,14 @@ _CHECKED: Final = {"string", "number", "bool"}
 
 
 class Opaque(msgspec.Struct, frozen=True):
-    """A value whose type only the actions know."""
+    """A value of a type that is not native to the engine, so that only the actions know what it
+    holds."""
 
     type: str
 
 
 class Missing:
-    """The value of a parameter that has none."""
+    """The value that stands for no value; `MISSING` is its only instance."""
 
     def __repr__(self) -> str:
         return "no value"
@@ -37,7 +38,7 @@ MISSING: Final = Missing()
 
 
 class Slot:
-    """One parameter of an action while its graph runs."""
+    """One input or output of an action while its graph runs, with its current value."""
 
     __slots__ = ("allowed", "name", "received", "required", "type", "updatable", "value")
 
@@ -58,17 +59,18 @@ class Slot:
         return self.value is not MISSING
 
     def default(self) -> Any:
-        """Return the value that an action leaves here if it gives none.
+        """Return the value that an output gets if its action gives none: the value of the file,
+        else the first allowed value, else the neutral value of the type.
 
-        This is the value of the file, else the first allowed value, else the neutral value of the
-        type. Generated packages begin with the same.
+        Generated packages begin with the same value.
         """
         if self.has_value():
             return self.value
         return self.allowed[0] if self.allowed else NEUTRAL.get(self.type, Opaque(self.type))
 
     def receive(self, kind: str, value: Any) -> None:
-        """Take a value from a parent, unless its type, a lock or the allowed values forbid it."""
+        """Take a value of type `kind` from a parent, unless the types differ, the slot is locked,
+        or the value is not among the allowed ones."""
         if value is MISSING or kind != self.type or not self.updatable:
             return
         if self.allowed and kind in _CHECKED and value not in self.allowed:
@@ -77,19 +79,20 @@ class Slot:
         self.received = True
 
     def end_of_run(self) -> None:
-        """Clear a value that came from a parent. The value of the file does not return."""
+        """Clear the value if it came from a parent. The value of the file does not return."""
         if self.received:
             self.value = MISSING
             self.received = False
 
 
 class RemapUnknown(Exception):
-    """Raised for a renaming of an output that the parent does not have: the engine aborts."""
+    """Raised for a renaming whose source is not found among the parent's outputs; the engine aborts
+    in this case."""
 
 
 def slots_of(parameters: Iterable[Parameter]) -> dict[str, Slot]:
-    """Return the parameters of one side by flat name, in the order in which an engine sorts
-    them."""
+    """Return one slot for each of these parameters (inputs or outputs of an action), by flat name
+    and sorted as in the engine."""
     found: dict[str, Slot] = {}
     for parameter in parameters:
         leaf = parse_small(parameter.text)
@@ -100,8 +103,8 @@ def slots_of(parameters: Iterable[Parameter]) -> dict[str, Slot]:
 
 
 def fill_outputs(outputs: dict[str, Slot], given: dict[str, Any] | None) -> None:
-    """Fill the outputs of an action that has run: the value that the script gives, else the default
-    of the output."""
+    """Fill the outputs of an action that has run. Each output gets its value in `given` (by flat
+    name), or its default if `given` has none."""
     for name, slot in outputs.items():
         value = (given or {}).get(name)
         if value is None:
@@ -110,9 +113,10 @@ def fill_outputs(outputs: dict[str, Slot], given: dict[str, Any] | None) -> None
 
 
 def hand_over(outputs: dict[str, Slot], remap: Sequence[Remap], inputs: dict[str, Slot]) -> None:
-    """Copy a parent's outputs into the child's inputs of the same name, after renaming.
+    """Copy a parent's outputs into the child's inputs: `remap` renames outputs first, then equal
+    names meet.
 
-    Raises `RemapUnknown`.
+    Raises `RemapUnknown` if a renamed output is not found.
     """
     for name, place in renamed(outputs, remap, inputs).items():
         source = outputs[place]
@@ -174,8 +178,8 @@ class _Tree:
             self._insert_greatest(index)
 
     def find(self, names: Sequence[str], name: str) -> int | None:
-        """Search the tree for a name by the comparisons that its order promises, and return its
-        index among `names` or None."""
+        """Search the tree as if the names were still sorted, and return the index of `name` among
+        `names`; None if this search does not find it."""
         place, best = self.root, None
         while place is not None:
             if names[place] < name:
