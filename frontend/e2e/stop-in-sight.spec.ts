@@ -20,9 +20,10 @@ interface Run {
   state: string;
 }
 
-const newest = async () =>
-  (await product.ask<Run[]>("/api/runs?limit=1", {}, product.runnerUrl))[0] as Run;
-const stateIs = (state: string) => expect.poll(async () => (await newest()).state).toBe(state);
+/** The newest run; right after a start there may be none yet. */
+const newest = async (): Promise<Run | undefined> =>
+  (await product.ask<Run[]>("/api/runs?limit=1", {}, product.runnerUrl))[0];
+const stateIs = (state: string) => expect.poll(async () => (await newest())?.state).toBe(state);
 const stopOf = (page: Page) => page.getByRole("button", { name: /^Stop / });
 
 /** A run of a minute, seen by the page of its graph. */
@@ -31,7 +32,7 @@ async function running(page: Page, graph: string): Promise<string> {
   await saved(page);
   await start(page);
   await stateIs("running");
-  return (await newest()).id;
+  return (await newest())?.id ?? "";
 }
 
 /** Go to another address in place, as links do. */
