@@ -1,4 +1,4 @@
-"""What a token bucket gives out, and how long its debt lasts."""
+"""A token bucket gives out what it holds, and its debt lasts until it has refilled."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -1,4 +1,4 @@
-"""What a session changed is told as whoever compares the graph before and after it finds it."""
+"""The summary of a session names the same changes as a comparison of the graph before and after it."""
 
 import random
 

@@ -1,4 +1,4 @@
-"""Which listeners to starts may be a second engine that does not serve its get yet."""
+"""A listener to starts may be a second engine that does not serve its get yet, unless it is known."""
 
 import pytest
 

@@ -104,8 +104,7 @@ async def test_a_graph_without_lookups_can_be_started_any_number_of_times() -> N
 
 @virtual
 async def test_a_name_that_somebody_else_has_used_is_held_as_well() -> None:
-    """The same holds for a graph that has left the engine's index since, and for one without
-    sub-graphs."""
+    """A name is held even if its graph has left the engine's index since, or has no sub-graphs."""
     network = scene()
     async with network.played() as control:
         text = codec.write(sequence("outer"))

@@ -1,4 +1,4 @@
-"""What the threads of an engine's process prove: that no code of a run goes on, or can begin."""
+"""The threads of an engine's process prove that no code of a run goes on or can begin, or prove nothing."""
 
 import os
 import subprocess

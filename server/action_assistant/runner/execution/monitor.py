@@ -75,10 +75,13 @@ class Monitor:
     """Decides what the messages and answers of an engine mean for one run.
 
     Each method that takes one in adds the changes that follow from it to those of the run; so they are
-    told even if a fault keeps it from drawing further conclusions. `jobs` are left to be worked on beside. `trouble` says why the Stop of the run is not
-    proven yet; `seen_at` when its engine last showed it (µs UTC); `umrf` is what the engine has been
-    given last, where that is known. `rested_at` is when the run was last seen to be over, for one that
-    moves again; `exact` an engine that hides nothing.
+    told even if a fault keeps it from drawing further conclusions. It collects jobs that are worked on
+    beside the looks.
+
+    `trouble` says why the Stop of the run is not proven yet. `seen_at` is when the engine last showed the
+    run (µs UTC). `umrf` is the graph that the engine was given last, if that is known. `rested_at` is when
+    the run was last seen to be over, for a run that moves again. `exact` stands for an engine whose
+    answers show everything.
     """
 
     def __init__(

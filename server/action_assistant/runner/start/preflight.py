@@ -82,8 +82,11 @@ class Preflight(msgspec.Struct, frozen=True):
 
 
 class Settled(msgspec.Struct, frozen=True):
-    """A run of this runner that a person has seen at rest. `places`: the actions that were in ERROR
-    then, by running name of their graph and full name; `incarnation`: the life of the engine."""
+    """A run of this runner that is known to be at rest: a person saw it, or its code was seen to end.
+
+    `places` holds the actions that were in ERROR then, by running name of their graph and full name.
+    `incarnation` names the life of the engine.
+    """
 
     engine: str
     run: str
@@ -93,8 +96,8 @@ class Settled(msgspec.Struct, frozen=True):
 
 class EngineView(msgspec.Struct, frozen=True, kw_only=True):
     """An engine at the moment of a pre-flight. `took_ms`: milliseconds until it answered a get sent
-    for it; `open_runs`: ids of this runner's runs that have no end yet; `settled`: runs that people
-    have seen at rest; `index_folder`: the folder that it indexes, where the runner may write
+    for it; `open_runs`: ids of this runner's runs that have no end yet; `settled`: runs that are
+    known to be at rest; `index_folder`: the folder that it indexes, where the runner may write
     there."""
 
     name: str
@@ -408,9 +411,9 @@ def _rest(view: EngineView) -> Item:
 
 
 def _is_settled(view: EngineView, shown: Snapshot) -> bool:
-    """Return whether a person has already confirmed that the graph `shown` is at rest.
+    """Return whether the graph `shown` is already known to be at rest.
 
-    The confirmation was given for a run: it counts if `shown` is the graph of that run or one of
+    That is known of a run, by a person's word or by the end of its code. It counts if `shown` is the graph of that run or one of
     its sub-graphs, if the engine was not restarted since, and if every action of `shown` in ERROR
     was in ERROR at that time.
     """

@@ -1,4 +1,4 @@
-"""When the stop messages of one run leave: from the first press on, again and again.
+"""Decide when the stop messages of one run leave: from the first press on, again and again.
 
 Nothing here waits for anything but its own turn: a message leaves while a get hangs and while the journal
 is down. Whoever sends them ends this when rest is proven (`OpenRun`).

@@ -78,7 +78,7 @@ def side_by_side(count: int, source: str, name: str = "wide") -> Graph:
 
 
 def processes() -> list[psutil.Process]:
-    """Of behaviours that go on, and their supervisors, as far as tests of this process have begun them."""
+    """Return the processes of running behaviours and of their supervisors that this test process began."""
     found = []
     for each in psutil.process_iter():
         with suppress(psutil.Error):
