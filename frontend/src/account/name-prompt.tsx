@@ -42,7 +42,7 @@ export function NamePrompt() {
         onFocus={(event) => event.currentTarget.select()}
         onChange={(event) => setName(event.currentTarget.value)}
       />
-      <Button type="submit" variant="filled" disabled={name.trim() === ""}>
+      <Button type="submit" variant="filled" flex="none" disabled={name.trim() === ""}>
         Save
       </Button>
       <CloseButton
