@@ -84,7 +84,7 @@ abstract class Engine extends Speaker {
 }
 
 /** A stand-in whose actions do as `behaviours` say, by their names: always, or call by call. `quirks`:
- * `NAME=VALUE`. */
+ * `NAME=VALUE`. Its snapshots all arrive: a lost one may leave a Stop unconfirmed, by chance. */
 export class StandIn extends Engine {
   private readonly actions: string;
 
@@ -101,7 +101,7 @@ export class StandIn extends Engine {
     this.begin([
       ...["-m", "action_assistant", "simulate-robot", this.name],
       ...["--domain", String(DOMAIN), "--namespace", this.name, "--script", script],
-      ...quirks.flatMap((quirk) => ["--quirk", quirk]),
+      ...["loss=0", ...quirks].flatMap((quirk) => ["--quirk", quirk]),
       ...(this.actions === "" ? [] : ["--actions", this.actions]),
     ]);
   }

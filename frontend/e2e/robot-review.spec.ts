@@ -178,7 +178,7 @@ async function disturbed(): Promise<void> {
 test.beforeAll(async ({ browser }) => {
   test.setTimeout(90_000);
   await product.start();
-  david.start(product.data, DOES, "loss=0"); // else more of the quick visits go unseen
+  david.start(product.data, DOES);
   eve.start(product.data, DOES);
   for (const robot of [david, eve]) {
     const body = JSON.stringify({
