@@ -207,7 +207,8 @@ def _with_ids_last(arguments: Sequence[str]) -> list[str]:
 
 
 def _check(entry: CommandEntry, name: str) -> None:
-    """Refuse what cannot be done here before anything of it is. Raises CannotStart."""
+    """Check that a command can run on this system, and load secrets from files. Raise CannotStart
+    if it cannot run or the environment has an error."""
     if entry.posix and sys.platform == "win32":
         raise CannotStart(
             f"`{name}` needs Linux or macOS: on Windows use WSL, or a server elsewhere. Files can be "

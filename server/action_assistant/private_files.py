@@ -25,7 +25,8 @@ def opener(path: str, flags: int) -> int:
 
 
 def make_folder(path: Path) -> None:
-    """Make it if need be, and those above it. Raises OSError."""
+    """Create a folder and its missing parents, readable only by this user. Raise OSError if that
+    fails."""
     if not path.is_dir():
         make_folder(path.parent)
         path.mkdir(mode=0o700, exist_ok=True)
@@ -35,9 +36,10 @@ def replace_file(
     path: Path, content: bytes, *, part: Path | None = None, is_durable: bool = True
 ) -> None:
     """Write a private file so that others find the old content or the new one, never a part of it.
+    Raise OSError if it cannot be written.
 
-    The content is written to `part` first (by default the path with `.part` appended). With `is_durable` it
-    survives a power cut; the rename does so once the folder is flushed, too (`sync`). Raises OSError.
+    The content is written to `part` first (by default the path with `.part` appended). With
+    `is_durable` it survives a power cut; call `sync` on the folder to make the rename durable, too.
     """
     part = part or path.with_name(f"{path.name}.part")
     part.unlink(missing_ok=True)  # it may have other rights

@@ -267,8 +267,8 @@ def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
 
 
 def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:
-    """Return how long runs and raw messages are kept, and the folder of archives. Raise
-    CannotStart."""
+    """Return how long runs and raw messages are kept, and the folder of archives. Raise CannotStart
+    if a variable is malformed."""
     return Keep(
         folder=Path(environ.get("ACTION_ASSISTANT_ARCHIVE") or data / ARCHIVE).resolve(),
         runs=_days("ACTION_ASSISTANT_KEEP_RUNS", environ),
@@ -292,8 +292,8 @@ def _days(name: str, environ: Mapping[str, str]) -> float | None:
 def index_folders(
     given: Sequence[str] = (), environ: Mapping[str, str] = os.environ
 ) -> dict[str, Path]:
-    """The folders that robots index, each as ROBOT=DIR: what the command line says, else the
-    environment. Raises CannotStart."""
+    """Return the index folder of each robot, from ROBOT=DIR texts of the command line or else of
+    the environment. Raise CannotStart if a text is malformed or names a robot twice."""
     written = given or environ.get(INDEX_FOLDERS, "").split(os.pathsep)
     found: dict[str, Path] = {}
     for each in filter(str.strip, written):
@@ -325,7 +325,7 @@ def reached(
     environment.
 
     Behind a public address, the proxies of this computer are trusted unless others are named. Raise
-    CannotStart.
+    CannotStart if an address is malformed.
     """
     written = url if url is not None else environ.get("ACTION_ASSISTANT_PUBLIC_URL", "")
     public = public_url(written) if written.strip() else None
@@ -348,7 +348,8 @@ def check_host(
 
 
 def data_folder(path: Path) -> Path:
-    """A data folder, made if need be, proven writable and closed to other users. Raises CannotStart."""
+    """Return a data folder, created if needed, writable and closed to other users. Raise
+    CannotStart if it cannot be made so."""
     settled(path)
     return own_folder(path)
 

@@ -78,7 +78,8 @@ def _on_server(server: Server, given: list[str]) -> Difference:
 
 
 def _place(server: Server, asked: str) -> _Moment | _Version:
-    """A moment of a graph, or a version with its UMRF. Raises No."""
+    """Read an argument of the command: a graph, `GRAPH@SEQ`, or a version, which is fetched with
+    its UMRF. Raise RequestRefused if the server knows none of these."""
     name, at, seq = asked.rpartition("@")
     try:
         if at and seq.isdecimal():

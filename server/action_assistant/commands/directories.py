@@ -66,7 +66,8 @@ class Directory(Protocol):
 
 
 def opened(root: Path) -> Directory:
-    """A folder that is there; that one may be behind a link. Raises OSError."""
+    """Open an existing folder; its own path may lead through a symbolic link. Raise OSError if it
+    cannot be opened."""
     return HeldDirectory.opened(root) if HOLDS else NamedDirectory.opened(root)
 
 
@@ -78,7 +79,7 @@ class HeldDirectory:
 
     @classmethod
     def opened(cls, root: Path) -> Self:
-        """The folder at a path. Raises OSError."""
+        """Open the folder at a path. Raise OSError if it cannot be opened."""
         return cls(os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC))
 
     def names(self) -> list[str]:
@@ -167,7 +168,7 @@ class NamedDirectory:
 
     @classmethod
     def opened(cls, root: Path) -> Self:
-        """The folder at a path. Raises OSError."""
+        """Return the folder at a path. Raise OSError if it cannot be listed."""
         os.scandir(root).close()
         return cls(root)
 
@@ -296,7 +297,8 @@ def _given(file: int, owner: Owner | None) -> bool:
 
 
 def _write_rest(half: BinaryIO, content: bytes) -> None:
-    """Write what a file lacks of a content. Raises OSError."""
+    """Append to a file the part of `content` that it lacks. Raise OSError if the file holds
+    anything else or cannot be written."""
     _refuse_special(os.fstat(half.fileno()))
     there = half.read(len(content) + 1)
     if not content.startswith(there):

@@ -77,7 +77,8 @@ def read(text: str, key: Ed25519PublicKey | None) -> HeadLine:
 
 
 def signing_key(path: Path, data: Path) -> Ed25519PrivateKey:
-    """Read the owner's private key, a PEM file outside of the data folder. Raises CannotStart."""
+    """Read the owner's private ed25519 key, a PEM file outside of the data folder. Raise
+    CannotStart if the file is not such a key."""
     text = _key_file(path, data)
     try:
         key = serialization.load_pem_private_key(text, password=None)
@@ -89,7 +90,8 @@ def signing_key(path: Path, data: Path) -> Ed25519PrivateKey:
 
 
 def proving_key(path: Path, data: Path) -> Ed25519PublicKey:
-    """Read a public key, or the public part of a private one. Raises CannotStart."""
+    """Read the public ed25519 key from a PEM file with a public or private key. Raise CannotStart
+    if the file is not such a key."""
     text = _key_file(path, data)
     if b"PRIVATE KEY" in text:
         return signing_key(path, data).public_key()
@@ -103,7 +105,8 @@ def proving_key(path: Path, data: Path) -> Ed25519PublicKey:
 
 
 def _key_file(path: Path, data: Path) -> bytes:
-    """Read a file that whoever can write into the data folder does not have by that. Raises CannotStart."""
+    """Read a key file. Raise CannotStart if it lies in the data folder, where whoever alters the
+    logs could also sign them, or cannot be read."""
     if path.resolve().is_relative_to(data.resolve()):
         raise CannotStart(
             f"{path} is in the data folder: whoever can alter the logs could sign anew. Keep the key "

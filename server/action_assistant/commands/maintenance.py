@@ -247,7 +247,8 @@ def _for_each(
     journals: Sequence[_KnownJournal],
     handler: Callable[[Branch, Journal], Awaitable[bool]],
 ) -> int:
-    """Do it to every journal; 1 unless all went well. Raises CannotStart."""
+    """Call `handler` for every journal; return 0 if each call returned True, else 1. Raise
+    CannotStart if a journal cannot be opened."""
 
     async def one(branch: Branch, url: str, fold: Fold) -> bool:
         journal = await Journal.open(url, branch=branch, fold=fold, copies=data / FOLDER)

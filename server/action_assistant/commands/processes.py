@@ -176,7 +176,8 @@ def _logging(parser: argparse.ArgumentParser) -> None:
 
 
 def reached(options: argparse.Namespace) -> settings.Reachability:
-    """Return how others reach this server. Raise CannotStart."""
+    """Return the public address and trusted proxies of this server. Raise CannotStart if an option
+    is malformed."""
     return settings.reached(options.public_url, options.trusted_proxies)
 
 
@@ -209,7 +210,7 @@ def _identity(
 
 
 def _log(process: str, options: argparse.Namespace, *secrets: str) -> None:
-    """From here on this process writes its log as it was told to. Raises CannotStart."""
+    """Set up the log of this process by the options. Raise CannotStart if an option is malformed."""
     chosen = log_settings(options.log_format, options.log_level)
     hand_on(chosen)
     set_up(process, chosen, *secrets)

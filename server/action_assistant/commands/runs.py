@@ -69,7 +69,8 @@ def _since(options: argparse.Namespace) -> int:
 
 
 def _seq(server: Server, run: dict[str, Any]) -> int:
-    """The change of the graph that a run had. Raises No."""
+    """Return the change number (seq) of the graph that a run was started from. Raise RequestRefused
+    if the run has no version of a graph."""
     if run["graph"] is None or run["version"] is None:
         raise RequestRefused("This run is of no version of a graph here.")
     version = server.editor("GET", f"/api/versions/{run['version']}").json()
@@ -78,7 +79,8 @@ def _seq(server: Server, run: dict[str, Any]) -> int:
 
 
 def _last_good(server: Server, run: dict[str, Any]) -> int:
-    """The change of the last run before that went well. Raises No."""
+    """Return the change number (seq) of the graph in the last earlier run that went well. Raise
+    RequestRefused if there is no such run."""
     query = {"graph": run["graph"]}
     for each in server.runner("GET", "/api/runs", params=query).json():
         went_well = each["state"] == "finished" and each["result"] in {None, "on_true"}

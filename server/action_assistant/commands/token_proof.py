@@ -30,7 +30,7 @@ class AfterProof(httpx.Auth):
 
     def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
         """Add the token to a request, after a challenge if the server was not proven yet. Raise
-        CannotStart."""
+        CannotStart if the server does not prove that it holds the token."""
         base = str(request.url).partition(_API)[0]
         if base not in self._proven:
             challenge = secrets.token_urlsafe(32)

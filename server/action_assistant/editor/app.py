@@ -57,7 +57,8 @@ SMALL: Final = 100_000
 async def open_services(
     settings: EditorSettings, revoked: Revocations | None = None
 ) -> AsyncIterator[EditorServices]:
-    """The editor without its HTTP side. Raises CannotStart."""
+    """Open the services of the editor without its HTTP side, and close them afterwards. Raise
+    CannotStart if the database cannot be used."""
     revoked = revoked or Revocations(settings.data)
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold, at_once=True)
     try:
@@ -91,7 +92,8 @@ async def open_services(
 
 
 def create_app(settings: EditorSettings) -> ASGIApp:
-    """The whole editor process. Raises CannotStart."""
+    """Return the editor as an ASGI application. Raise CannotStart if its database or data folder
+    cannot be used."""
     database_location.check(settings.data, settings.database, switch=settings.switch_database)
     Journal.prepare(settings.database, "editor", copies=settings.data / before_upgrade.FOLDER)
     database_location.check(settings.data, settings.database, switch=settings.switch_database)

@@ -72,14 +72,17 @@ class Database(Protocol):
         """Return all exception types that the driver raises."""
 
     def open(self, branch: Branch, before: Before = no_copy) -> WriterSession:
-        """Become the only writer, migrate, connect. `before` is called where tables are about to
-        change. Raises CannotStart."""
+        """Take the lock of the only writer, migrate the tables, and connect. Call `before` if
+        tables are about to change. Raise CannotStart if the database cannot be used or another
+        process holds the lock."""
 
     def look(self, question: Callable[[Connection], object]) -> None:
-        """Ask what is there already, before anything is made or altered. Raises CannotStart."""
+        """Call `question` with a connection to the existing database; create and change nothing.
+        Raise CannotStart if the database cannot be read."""
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
-        """Run a change of the schema in one transaction. Raises CannotStart."""
+        """Run a change of the schema in one transaction. Raise CannotStart if the database cannot
+        be used."""
 
     def connect(self) -> WriterSession:
         """Connect again after a failure; whatever the last session left unfinished is over then."""
@@ -99,7 +102,8 @@ class Database(Protocol):
         """Some stored events with their chain as they stand, and from where to go on."""
 
     def bytes_in_use(self, connection: Connection) -> dict[str, int]:
-        """Bytes of the database, and of a log beside it, by `database` and `wal`. Raises OSError."""
+        """Return the size in bytes of the database and, if it has one, of its write-ahead log,
+        under the keys `database` and `wal`. Raise OSError if a file cannot be read."""
 
     def complaints(self, connection: Connection) -> list[str]:
         """Return the faults that the database itself finds in its files."""

@@ -33,9 +33,10 @@ def database_of(url: str) -> Database:
 
 
 def migrate(url: str, branch: Branch, revision: str = "head", *, before: Before = no_copy) -> str:
-    """Upgrade the database and return its revision. Raises CannotStart.
+    """Upgrade the database and return its revision. Raise CannotStart if it cannot be used or
+    belongs to another process.
 
-    All of it is one transaction: killed half-way, the database is as it was.
+    All of it is one transaction: killed half-way, the database is unchanged.
     """
     database = database_of(url)
     database.look(recognize)
@@ -43,8 +44,8 @@ def migrate(url: str, branch: Branch, revision: str = "head", *, before: Before 
 
 
 def ask_once(url: str, question: Callable[[Connection], T]) -> T:
-    """An answer as of one moment, for which nothing is made or changed. To be called where no loop runs.
-    Raises CannotStart."""
+    """Answer a question from one consistent snapshot of a database; create and change nothing. Call
+    it only where no event loop runs. Raise CannotStart if the database cannot be read."""
     database = database_of(url)
     try:
         return asyncio.run(_asked_once(database, question))
@@ -53,8 +54,8 @@ def ask_once(url: str, question: Callable[[Connection], T]) -> T:
 
 
 def ask_from_worker(url: str, question: Callable[[Connection], T]) -> T:
-    """Answer a question in a worker process, from the database that another process writes, as of one
-    moment. Raises Unavailable."""
+    """Answer a question in a worker process, from one consistent snapshot of the database that
+    another process writes. Raise Unavailable if it cannot be read."""
     database = database_of(url)
     try:
         return asyncio.run(_asked_once(database, question))

@@ -114,7 +114,8 @@ class Journal(JournalReader):
         copies: Path | None = None,
         at_once: bool = False,
     ) -> "Journal":
-        """Open a journal in a database. Raises CannotStart."""
+        """Open a journal in a database. Raise CannotStart if the database cannot be used or another
+        process holds it."""
         try:
             session = await asyncio.to_thread(database.open, branch, _before(copies))
         except BaseException:
@@ -153,7 +154,8 @@ class Journal(JournalReader):
         return self._following()
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
-        """Cache what a stream adds up to at `seq`. Raises Unavailable."""
+        """Cache the state of a stream after the event `seq`. Raise Unavailable if the journal
+        cannot be written."""
 
         def keep(transaction: Transaction) -> None:
             seal = seal_of(body_of(transaction.connection, stream, seq), state)
@@ -166,8 +168,8 @@ class Journal(JournalReader):
         await self._write(keep)
 
     async def derive(self, work: Callable[[Connection], T]) -> T:
-        """Write to tables that follow from events, some time after these were stored; all or nothing.
-        Raises Unavailable."""
+        """Run `work` in one transaction, to write tables that are computed from stored events.
+        Raise Unavailable if the journal cannot be written."""
         return await self._write(lambda transaction: work(transaction.connection))
 
     async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
@@ -214,7 +216,7 @@ class Journal(JournalReader):
         """Return the first damage of each stream; an empty list for a sound log.
 
         Every changed and every missing event is found. `tell` is called with the number of events
-        that were inspected. Raise Unavailable.
+        read so far. If the journal cannot be read, that is the last damage of the list.
         """
         inspector = Inspector(taken_out)
         after = 0
@@ -252,7 +254,8 @@ class Journal(JournalReader):
         return self._writer.metrics
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
-        """Answer a question about stored data, on a thread of this process. Raises Unavailable."""
+        """Answer a question about stored data, on a thread of this process. Raise Unavailable if
+        the journal cannot be read."""
         return await self._ask(question)
 
     @property

@@ -22,10 +22,11 @@ class Holder(NamedTuple):
 
 
 def own(path: Path) -> int:
-    """Lock a database for this process; closing the descriptor lets go. Raises CannotStart.
+    """Lock a database for this process; return the descriptor of the lock, whose closing releases
+    it. Raise CannotStart if another process holds the lock or the folder cannot be written.
 
-    Versions before this one made locks that others could open, and so hold. Such a lock is put aside:
-    a process of another user, root apart, cannot be one that writes files of ours.
+    Earlier versions made lock files that other users could open and hold. Such a lock is replaced
+    if a process of another user (not root) holds it, since that process cannot write our files.
     """
     lock = path.with_name(f"{path.name}.lock")
     try:

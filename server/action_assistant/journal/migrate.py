@@ -33,8 +33,9 @@ def revisions_of(branch: str) -> list[str]:
 def upgrade_to(
     branch: Branch, revision: str = "head", *, before: Before = no_copy
 ) -> Callable[[Connection], str]:
-    """A change of the schema that ends at a revision, and returns it. `before` is called first where
-    there are tables already that change. Raises CannotStart."""
+    """Return a function that brings the schema to `revision` and returns the revision it ends at.
+    It calls `before` if existing tables are about to change, and raises CannotStart for a
+    database of another process or of a newer version."""
 
     def upgrade(connection: Connection) -> str:
         name = _name_of(connection)

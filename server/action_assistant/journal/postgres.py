@@ -164,7 +164,8 @@ class Postgres:
         return session
 
     def own(self, branch: Branch) -> PostgresSession:
-        """Lock the database for this process, whatever is in it. Raises CannotStart."""
+        """Lock the database for this process, whatever tables it has, and connect. Raise
+        CannotStart if it cannot be used or another process holds the lock."""
         mark = hashlib.sha256(f"action-assistant journal {branch}".encode()).digest()
         self._key = int.from_bytes(mark[:8], "big", signed=True)
         try:
@@ -177,7 +178,8 @@ class Postgres:
         alters them."""
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
-        """Run a change of the schema in one transaction. Raises CannotStart."""
+        """Run a change of the schema in one transaction. Raise CannotStart if the database cannot
+        be used."""
 
         async def change() -> T:
             engine = create_async_engine(self._url, poolclass=NullPool)

@@ -58,7 +58,7 @@ class JournalReader:
     """Reads events from a database. Subclasses decide how a question reaches it."""
 
     async def _ask(self, question: Callable[[Connection], T]) -> T:
-        """Return the answer to a question. Raise Unavailable."""
+        """Return the answer to a question. Raise Unavailable if the database cannot be read."""
         raise NotImplementedError
 
     async def read(

@@ -46,8 +46,8 @@ def taken_out(event: Event) -> tuple[str, Head] | None:
 
 
 def delete_some(connection: Connection, stream: str, by: int) -> bool:
-    """Delete the newest events of a stream that the removal number `by` names; whether any are left.
-    Raises Conflict."""
+    """Delete the newest events of a stream, one slice of them; return whether any are left. `by` is
+    the number of the removal event that names the stream; raise Conflict if it does not."""
     event = editor_event.c
     said = select(event.body).where(event.stream == STREAM, event.seq == by)
     body = connection.execute(said).scalar()

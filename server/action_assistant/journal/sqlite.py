@@ -174,7 +174,8 @@ class Sqlite:
                 engine.dispose()
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
-        """Run a change of the schema in one transaction. Raises CannotStart."""
+        """Run a change of the schema in one transaction. Raise CannotStart if the file cannot be
+        used."""
         self._make()
         engine = sqlite_engine(self._path, wait=2 * _WAIT, module=self._driver)
         try:

@@ -61,7 +61,8 @@ _SWITCH_S: Final = 0.0005
 async def open_services(
     settings: RunnerSettings, services: RunnerServices | None = None
 ) -> AsyncIterator[RunnerServices]:
-    """Open all services of the routes, and close them afterwards. Raises CannotStart."""
+    """Open all services of the routes, and close them afterwards. Raise CannotStart if the database
+    or a folder cannot be used."""
     services = services or RunnerServices()
     if settings.behaviours is not None:
         services.behaviours = BehaviourFolder.opened(settings.behaviours)
@@ -186,7 +187,8 @@ def _database(settings: RunnerSettings) -> str:
 
 
 def create_app(settings: RunnerSettings) -> ASGIApp:
-    """Return the runner as an ASGI application. Raises CannotStart."""
+    """Return the runner as an ASGI application. Raise CannotStart if the database or the folder of
+    behaviours cannot be used."""
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
     for robot, folder in settings.index_folders.items():

@@ -16,7 +16,8 @@ def take(descriptor: int) -> bool:
 
 
 def wait_for(descriptor: int) -> None:
-    """Lock an open file as soon as nobody else holds its lock. Raise OSError or CannotStart."""
+    """Lock an open file, waiting until nobody else holds its lock. Raise OSError or CannotStart if
+    it cannot be locked."""
     _locking(descriptor, wait=True)
 
 

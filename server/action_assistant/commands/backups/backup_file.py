@@ -95,7 +95,7 @@ class Packer:
         return JournalCopy(events, held.sha256, held.bytes)
 
     def file(self, name: str, path: Path) -> BackupPart:
-        """Take in a file. Raises OSError."""
+        """Add one file to the backup under `name`. Raise OSError if it cannot be read or written."""
         self.files[name] = self._take(name, path)
         return self.files[name]
 
@@ -151,14 +151,16 @@ class Package:
             raise
 
     def prove(self, progress: Progress) -> None:
-        """Read all its parts, and keep none. Raises CannotStart."""
+        """Read every part of the backup and compare its SHA-256; write nothing. Raise CannotStart
+        if a part is damaged."""
         self._check_total()
         for name in self.parts:
             with Path(os.devnull).open("wb") as nowhere:
                 self._copy(name, nowhere, f"reading back {name}", progress)
 
     def unpack(self, folder: Path, progress: Progress) -> None:
-        """All its parts into a folder, each proven. Raises CannotStart."""
+        """Write all parts into `folder`, and compare the SHA-256 of each. Raise CannotStart if a
+        part is damaged or the disk has too little space."""
         total = self._check_total()
         free = shutil.disk_usage(folder).free
         if total + _ROOM > free:
@@ -173,14 +175,16 @@ class Package:
                 self._copy(name, here, f"unpacking {name}", progress)
 
     def _check_total(self) -> int:
-        """The size of all parts. Raises CannotStart."""
+        """Return the unpacked size of all parts in bytes. Raise CannotStart if it is impossible for
+        a file of this size."""
         total = sum(entry.file_size for entry, _ in self.parts.values())
         if total > _TIGHTEST * self._source.stat().st_size + _CHUNK:
             raise self._damaged("its parts lie over each other")
         return total
 
     def _copy(self, name: str, here: IO[bytes], text: str, progress: Progress) -> None:
-        """One part, proven. Raises CannotStart."""
+        """Write one part into the file `here` and compare its SHA-256. Raise CannotStart if it is
+        damaged."""
         entry, sha256 = self.parts[name]
         try:
             with self._zip.open(entry) as there:

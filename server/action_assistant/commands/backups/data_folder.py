@@ -124,8 +124,11 @@ def checked(
     expected: int | None = None,
     anew: bool = False,
 ) -> int:
-    """The number of events of a copy, each of which is sound; its tables are those of this version.
-    `expected`: how many there have to be. `anew`: it begins another epoch. Raises CannotStart."""
+    """Verify the copy of a journal, bring its tables to this version, and return the number of its
+    events. Raise CannotStart if an event is damaged or the number is not `expected`.
+
+    `anew`: begin another epoch in the copy.
+    """
     from action_assistant.editor.log import epochs
 
     async def look() -> int:

@@ -131,7 +131,8 @@ def _elsewhere(data: Path, sources: Mapping[Branch, str]) -> str | None:
 
 
 def _check_room(data: Path, sources: Mapping[Branch, str], folder: Path) -> None:
-    """A copy of each journal, and all of it packed, at worst as large as it is. Raises CannotStart."""
+    """Check that the disk has space for a copy of each journal and for the packed backup. Raise
+    CannotStart if it has less."""
     journals = sum(_size(source) for source in sources.values())
     kept = settings.keep(data).folder
     files = [path for top in _ARCHIVES for path in (kept / top).rglob("*.gz")]

@@ -31,7 +31,7 @@ class RetentionRule(msgspec.Struct, frozen=True):
 
 
 def parse_retention(text: str) -> RetentionRule:
-    """`7d,4w,6m`, or `all`. Raises ValueError."""
+    """Parse `7d,4w,6m` (days, weeks, months) or `all`. Raise ValueError for any other text."""
     if text == "all":
         return RetentionRule(None, None, None)
     counts = {"d": 0, "w": 0, "m": 0}

@@ -55,7 +55,8 @@ class RegularBackups(msgspec.Struct, frozen=True):
 
 
 def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, OffSite | None]:
-    """Make one, write down what became of it, and let old ones go. Raises CannotStart."""
+    """Make a backup, record its outcome, and delete superfluous older backups. Raise CannotStart if
+    the backup fails."""
     try:
         with _alone(plan.into):
             target = _free(plan.into)

@@ -102,7 +102,8 @@ def _tell(found: Findings, done: BackupRehearsed) -> int:
 
 
 def _look(source: Path, folder: Path, found: Findings, progress: Progress) -> None:
-    """Unpack and prove everything, and read it as the program does. Raises CannotStart."""
+    """Unpack a backup into `folder`, verify all of it as a restore would, and add the results to
+    `found`. Raise CannotStart if a part or a journal is damaged."""
     package = Package(source)
     try:
         about = package.about

@@ -63,7 +63,8 @@ class RestoreUnderWay(msgspec.Struct, frozen=True):
 
 
 def restore(options: argparse.Namespace) -> int:
-    """Run the command `restore`. Raise CannotStart."""
+    """Run the command `restore` and return its exit code. Raise CannotStart if the backup is
+    damaged or its target is in use."""
     from action_assistant.editor.log import database_location
 
     data, source = options.data.resolve(), options.file.resolve()
@@ -202,7 +203,8 @@ def _end_of(folder: Path, about: BackupManifest) -> RestoreUnderWay:
 
 
 def _is_there(url: str, under: RestoreUnderWay, about: BackupManifest) -> bool:
-    """Return whether a database already holds the same backup. Raise CannotStart."""
+    """Return whether the database at `url` already holds this backup, from a restore that was
+    interrupted. Raise CannotStart if it cannot be read."""
     if "editor" not in about.journals or under.sha256 != about.journals["editor"].sha256:
         return False
 

@@ -40,7 +40,8 @@ _DAMAGED: Final = {sqlite3.SQLITE_ERROR, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_
 
 
 def go_back(data: Path, database: str | None, files: list[Path]) -> int:
-    """Run `migrate --back`. Raise CannotStart."""
+    """Run `migrate --back`: put copies of journals in place of the journals, or list the copies if
+    no file is named. Raise CannotStart if a copy or a database cannot be used."""
     settings.settled(data)
     if not files:
         return _list(data)

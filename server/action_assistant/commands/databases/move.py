@@ -55,7 +55,7 @@ class TableSum(NamedTuple):
 
 def differences(one: str, other: str, progress: Progress) -> list[str]:
     """Return one sentence for each table of the editor that differs between two databases. Raise
-    CannotStart."""
+    CannotStart if one cannot be read."""
     found = [ask_once(url, lambda c: dict(_sums(c, progress))) for url in (one, other)]
     return [
         f"{name}: {found[0][name].rows} rows and {found[1][name].rows}"
@@ -152,8 +152,9 @@ def _move(options: argparse.Namespace) -> int:
 
 
 def _moved(data: Path, source: str, target: str) -> tuple[int, Path | None]:
-    """Take the graphs there while nobody else can write; how many events, and where what was in the
-    folder is now. Raises CannotStart."""
+    """Copy the graphs to another database while no other process can write. Return the number of
+    events and the path to which the files of the data folder were moved, if any. Raise
+    CannotStart if a database cannot be used."""
     progress = Progress()
     database = database_of(source)
     try:
@@ -276,7 +277,8 @@ def _check_room(folder: Path, source: str) -> None:
 def _switch(
     data: Path, source: str, copied: str, target: str, progress: Progress, file: Path | None = None
 ) -> None:
-    """The other database counts from now on, if it holds the same. Raises CannotStart."""
+    """Make the copied database the one that this data folder uses. Raise CannotStart if its tables
+    differ from the source or the choice cannot be stored."""
     from action_assistant.editor.log import database_location
 
     unlike = differences(source, copied, progress)

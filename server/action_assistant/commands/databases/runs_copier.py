@@ -72,7 +72,8 @@ FROM {SCHEMA}.event WHERE stream LIKE 'run/%'
 
 
 async def once(copier: "RunsCopier", name: str) -> int:
-    """Copy what is new. Raises CannotStart."""
+    """Copy the events that are new, and return the exit code: 1 if some are missing. Raise
+    CannotStart if a database cannot be used."""
     try:
         copied = await copier.catch_up()
     except _FAULTS as error:

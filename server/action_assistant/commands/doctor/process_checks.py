@@ -77,7 +77,7 @@ def client(verify: ssl.SSLContext | bool) -> httpx.Client:
 
 
 def health(asking: httpx.Client, base: str) -> ProcessAnswer:
-    """Return the answer to `/healthz`. Raise httpx.HTTPError."""
+    """Return the answer of a process to `/healthz`. Raise httpx.HTTPError if there is no answer."""
     answer = asking.get(f"{base}/healthz")
     now = time.time()
     try:

@@ -54,11 +54,12 @@ def contents(root: Path, paths: Iterable[str]) -> FolderContents:
 
 
 def write_all(root: Path, steps: Sequence[FileStep], known: Mapping[str, bytes]) -> None:
-    """Does the steps in their order, or none of them; makes the folders that they need. `known` is what
-    the files are known to hold: one that holds anything else by now stops it all. Raises CannotStart.
+    """Carry out all steps in their order, or none of them; create missing folders. `known` gives
+    the expected content of each file. Raise CannotStart if a file has another content by now or
+    cannot be written.
 
-    Everything is written into new files beside first, where nothing is lost if the disk is full; what
-    then remains is renaming, and each file is the old one or the new one at any moment.
+    All contents are written into new files first, so that a full disk does no harm. Then the files
+    are renamed: each file is the old one or the new one at any time.
     """
     try:
         root.mkdir(parents=True, exist_ok=True)

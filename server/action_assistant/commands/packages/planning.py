@@ -78,7 +78,8 @@ class PackagesPlan(msgspec.Struct, frozen=True):
 
 
 def plan(root: Path, packages: Mapping[str, Mapping[str, bytes]]) -> PackagesPlan:
-    """`packages`: what is generated now, by folder and path. Raises CannotStart."""
+    """Plan how generated packages go into the folder `root`. `packages`: contents by package folder
+    and path. Raise CannotStart if a folder cannot be read."""
     regenerations: dict[str, Regeneration] = {}
     there: dict[str, bytes] = {}
     barred: dict[str, str] = {}

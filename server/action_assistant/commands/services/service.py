@@ -178,7 +178,8 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
-    """Return the service that these options describe. Raise CannotStart."""
+    """Return the service that these options describe. Raise CannotStart if an option cannot be used
+    in a unit file."""
     settings.check_environment()  # files of secrets stay named, and are read by the service
     if options.database and ("@" in options.database or "password" in options.database):
         raise CannotStart(
@@ -261,7 +262,8 @@ def _user(options: argparse.Namespace) -> str:
 
 
 def _program() -> tuple[str, ...]:
-    """Return the command that starts this program as long as it is installed. Raise CannotStart."""
+    """Return the command that starts this program. Raise CannotStart if the program runs from uv's
+    cache, which is not permanent."""
     python = Path(sys.executable)
     if any(part in {"archive-v0", "environments-v2"} for part in python.parts) or (
         "uv" in python.parts and ".cache" in python.parts

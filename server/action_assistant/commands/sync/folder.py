@@ -199,8 +199,9 @@ class Folder:
         return self._trouble
 
     def _resumed(self, name: str, file: SyncedFile) -> SyncedFile | None:
-        """Return a file without what is coming: it has come, or it never will. None for a new file that was
-        not made. Raises OSError."""
+        """Complete or undo an exchange of a file that was interrupted, and return its entry without
+        the pending state. Return None if it was a new file that was never created. Raise OSError
+        if a file cannot be read or moved."""
         coming = file.coming
         if coming is None:
             return file
@@ -230,7 +231,8 @@ class Folder:
     def _look_after(
         self, name: str, aside: str, old: str, what: str = "was written while it was exchanged"
     ) -> None:
-        """Remove a file that was put aside, or keep it if somebody has written into it. Raises OSError."""
+        """Remove a file that was put aside; keep it under another name if somebody has written into
+        it since. Raise OSError if that fails."""
         text = self.read(aside)
         if text is None:
             return
@@ -318,7 +320,7 @@ class Folder:
         return True
 
     def _store(self, known: dict[str, SyncedFile]) -> None:
-        """Replace the state by another one, on the disk when this returns. Raises OSError."""
+        """Replace the stored state of the folder, durably. Raise OSError if it cannot be written."""
         fresh = _fresh(secrets.token_hex(8))
         rights: tuple[int, Owner] | tuple[None, None] = (None, None)
         with suppress(FileNotFoundError):
@@ -329,8 +331,9 @@ class Folder:
         self.known = known
 
     def _remembered(self, path: Path) -> dict[str, SyncedFile]:
-        """Return the entries of the state. One that names no file of this folder, or is no entry, is told,
-        not believed, and kept as it is. Raises CannotStart."""
+        """Return the entries of the stored state. An entry that is malformed or names no file of
+        this folder is reported, not used, and kept. Raise CannotStart if the state cannot be
+        read."""
         try:
             text = self.read(_STATE)
             entries = {} if text is None else msgspec.json.decode(text, type=dict[str, msgspec.Raw])

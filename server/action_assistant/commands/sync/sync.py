@@ -73,8 +73,8 @@ def _sync(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Keep a second `sync` out of a folder, where the system and the file system have locks. Raises
-    CannotStart."""
+    """Lock a folder against a second `sync`, where the file system has locks. Raise CannotStart if
+    another `sync` holds the lock."""
     with ExitStack() as held:
         if fcntl is not None:
             at = os.open(folder, os.O_RDONLY)

@@ -214,7 +214,8 @@ class QuietSocket(HttpxWebsocket):
 
 
 def watch(options: argparse.Namespace) -> int:
-    """Print changes until Ctrl-C. Raises CannotStart."""
+    """Run the command `watch`: print changes of a graph until Ctrl-C. Raise CannotStart if the
+    server cannot be reached."""
     try:
         with running(options) as server:
             graph = server.graph_id(options.graph)

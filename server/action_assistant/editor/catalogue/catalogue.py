@@ -101,7 +101,7 @@ class Catalogue:
         return found
 
     async def get(self, graph: str) -> GraphView:
-        """Return one graph as lists show it. Raises NotFound."""
+        """Return one graph as lists show it. Raise NotFound if there is none with this id."""
         await self._checks.names.refresh()
         return await self._view(await self._row(graph))
 

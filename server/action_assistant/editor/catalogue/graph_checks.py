@@ -268,7 +268,8 @@ class GraphChecks:
         return Inside(tuple(graphs), named.several, named.cut, named.hidden)
 
     async def _sight(self, graph: str, seq: int) -> GraphAtSeq:
-        """A graph at a moment. Raises Unavailable."""
+        """Return a graph at a change, or its newest readable state if its history is damaged after
+        that. Raise Unavailable if the journal cannot be read."""
         try:
             return await self._reader.at(graph, seq)
         except Refused:  # its history is damaged after that

@@ -91,7 +91,8 @@ class GraphNames:
         return name in self._graphs or bool(self._actions[name])
 
     async def refresh(self) -> None:
-        """Take in what has been stored by now. Raises Unavailable."""
+        """Read the names that were stored since the last call. Raise Unavailable if the journal
+        cannot be read."""
         await asyncio.shield(self._begun())  # others wait for it too
 
     @asynccontextmanager

@@ -141,7 +141,8 @@ class Versions:
         return InsideView(sight.seq, *digests, graphs, inside.several, inside.cut)
 
     async def get(self, version: str) -> VersionView:
-        """One version, with its UMRF. Raises NotFound."""
+        """Return one version with its UMRF and its pinned sub-graphs. Raise NotFound if there is
+        none with this id."""
         chosen = select(editor_tables.version).where(editor_tables.version.c.id == version)
         rows = await self._journal.query(chosen)
         if not rows:

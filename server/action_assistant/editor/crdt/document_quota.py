@@ -60,7 +60,8 @@ def refuse_too_much(graph: Graph, dialect: str) -> None:
 
 
 def refuse_too_wide(maps: Mapping[str, Mapping[str, object]]) -> None:
-    """Refuse a graph for what all its actions and arrows say together. Raises TooLarge."""
+    """Refuse a graph whose actions and arrows have too many fields together. Raise TooLarge above
+    MOST_FIELDS."""
     fields = sum(map(len, maps.values()))
     if fields > MOST_FIELDS:
         raise TooLarge(
@@ -71,7 +72,7 @@ def refuse_too_wide(maps: Mapping[str, Mapping[str, object]]) -> None:
 
 
 def refuse_too_long(update: bytes) -> None:
-    """Refuse the first update of a document that no room would take. Raises TooLarge."""
+    """Refuse an encoded document that is too large for a room. Raise TooLarge above MOST_BYTES."""
     if len(update) > MOST_BYTES:
         raise TooLarge(f"A graph may have {MOST_BYTES >> 20} MiB.", where={"path": ""})
 

@@ -49,8 +49,9 @@ class LogTail:
         self._ended = False
 
     async def next(self) -> EventColumns | None:
-        """The next events, as many as one should put together at once; None when there are no more.
-        Which of them are as they were written `sound` says. Raises Unavailable."""
+        """Return the next events, in a batch of limited count and size; None when there are no
+        more. `sound` says which of them are undamaged. Raise Unavailable if the log cannot be
+        read."""
         slices: list[StoredColumns] = []
         count = size = 0
         while not self._ended and count < TOGETHER and size < TOGETHER_BYTES:

@@ -169,7 +169,8 @@ class ByteReader:
 
 
 def parse(data: bytes) -> Message | None:
-    """A message; None for kinds that we do not know. Raises Malformed."""
+    """Parse a message of the WebSocket; return None for an unknown kind. Raise Malformed if its
+    content does not match its kind."""
     # Most are updates of less than 128 bytes.
     if data[:2] == _UPDATE and len(data) > 2 and data[2] <= min(0x7F, len(data) - 3):
         return Edit(data[3 : 3 + data[2]])

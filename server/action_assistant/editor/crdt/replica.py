@@ -87,11 +87,12 @@ class Replica:
         holder: Callable[[int], str | None] = lambda _: None,
         read: UpdateOutline | None = None,
     ) -> UpdateEffect:
-        """Apply an update. `holder` may know whose a client is that has written nothing yet; `read`
-        is its outline, where that is known.
+        """Apply an update and return its effect. `holder` gives the person of a client id that has
+        not written yet; `read` is the outline of the update if the caller has it.
 
-        Raises Malformed, ForeignClient, QuotaExceeded, TooMuchWaits; the document is then as before. Raises
-        Panicked; then it is not to be gone on with.
+        Raise Malformed, ForeignClient, QuotaExceeded or TooMuchWaits for an update that is refused;
+        the document is unchanged then. Raise Panicked if the CRDT library fails; the replica must
+        not be used then.
         """
         if self._waiting and update in self._waiting:
             return UpdateEffect.NOTHING
@@ -229,7 +230,8 @@ class Replica:
         return took
 
     def go_on(self, kept: "ReplicaState", state: bytes) -> None:
-        """Take up the rest of a snapshot, whose document `state` was applied in pieces. Raises Malformed."""
+        """Restore the state beside the document from a snapshot, after the document `state` was
+        applied in pieces. Raise Malformed if `state` cannot be read."""
         self._state = state if len(state) > _KEPT_BYTES else None
         self.opening.opened(self.pieces_s, len(state))
         self._quota.took(len(state))

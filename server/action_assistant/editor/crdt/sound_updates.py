@@ -38,7 +38,8 @@ class Clients:
     after them."""
 
     def __init__(self, bodies: Sequence[bytes], authors: Sequence[str]) -> None:
-        """Read the clients of updates and their authors. Raises Malformed."""
+        """Read the client ids of updates and their authors. Raise Malformed if an update cannot be
+        read."""
         self.authors: Final[dict[int, str]] = {}
         self.ends: Final[dict[int, int]] = {}
         last: dict[bytes, bytes] = {}  # of each client that is alone in an update
@@ -62,7 +63,8 @@ class Clients:
 
 
 def lies_deep(bodies: Sequence[bytes]) -> bool:
-    """Tell whether any struct of these updates lies inside of another one, not in a root. Raises Malformed."""
+    """Return whether any struct of these updates lies inside another one instead of in a root.
+    Raise Malformed if an update cannot be read."""
     return any(
         any(each.inside for each in stored_outline(body).placed)
         for body in map(bodies.__getitem__, _doubtful(bodies))

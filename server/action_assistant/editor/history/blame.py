@@ -73,21 +73,23 @@ class Blame:
         return await self._index.text(fields_of, graph, owner, upto if seq is None else seq)
 
     async def of_field(self, graph: str, owner: str, field: str, seq: int | None) -> bytes:
-        """Return all values that a field has had, the newest first; what one person typed in one go is one:
-        `FieldValue`s. Raises Unavailable."""
+        """Return the JSON of all values that a field has had up to `seq` (None: now), newest first,
+        as `FieldValue`s. What one person typed in one go is one value. Raise Unavailable if the
+        journal cannot be read."""
         upto = await bring_up(self._index, graph, seq)
         at = upto if seq is None else seq
         return await self._index.text(values_of, graph, owner, field, at)
 
     async def changes(self, graph: str, after: int, upto: int, limit: int) -> bytes:
-        """Return the newest changes of keys with `after < seq <= upto`, in order of time: `DocumentStep`s.
-        Raises Unavailable."""
+        """Return the JSON of the newest `limit` changes of keys with `after < seq <= upto`, oldest
+        first, as `DocumentStep`s. Raise Unavailable if the journal cannot be read."""
         await self._index.upto(graph, upto)
         return await self._index.text(steps, graph, after, upto, limit)
 
 
 def fields_of(connection: Connection, graph: str, owner: str, at: int) -> list[FieldBlame]:
-    """Return who gave each field of an owner its value. Raises NotFound."""
+    """Return who gave each field of an action or arrow its value at the change `at`. Raise NotFound
+    if it did not exist then."""
     found = index_queries.at(connection, graph, at, {owner})
     if not found:
         raise NotFound(f"There is nothing {owner!r} in this graph at that moment.")

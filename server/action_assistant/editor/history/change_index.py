@@ -46,8 +46,9 @@ class ChangeIndex:
         self._catching_up: defaultdict[str, anyio.Lock] = defaultdict(anyio.Lock)
 
     async def upto(self, graph: str, seq: int | None = None) -> int:
-        """Bring the index of a graph up to a change, or to its newest; return where it ends then, which is
-        earlier only where the log is damaged. Raises Unavailable."""
+        """Bring the index of a graph up to the change `seq`, or to its newest change. Return the
+        last indexed seq, which is less than that only where the log is damaged. Raise
+        Unavailable if the journal cannot be read or written."""
         wanted = await self._journal.newest(graph_stream(graph)) if seq is None else seq
         async with self._catching_up[graph]:
             done = await self.head(graph)

@@ -129,8 +129,8 @@ def names_between(
 def stretch_of(
     connection: Connection, graph: str, after: int, upto: int, limit: int, *, whole: bool = False
 ) -> list[LoggedChange]:
-    """Return the changes between two moments, `whole`: after those that left the first one. Raises
-    TooLarge."""
+    """Return the changes of a graph with `after < seq <= upto`; with `whole`, precede them by the
+    changes that make up the state at `after`. Raise TooLarge if there are more than `limit`."""
     found = index_queries.between(connection, graph, after, upto, limit + 1)
     if len(found) > limit:
         raise TooLarge("That is too long ago; name a later moment that was good.")

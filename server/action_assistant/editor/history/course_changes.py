@@ -76,7 +76,8 @@ def followed_between(
     named_at: int,
     inside: Inside,
 ) -> Followed:
-    """Search the changes of a graph between two of its moments, as `followed` does. Raises TooLarge."""
+    """Search the changes of a graph between the changes `good` and `bad`, as `followed` does. Raise
+    TooLarge if there are more than `limit`."""
     changes = stretch_of(connection, graph, good, bad, limit)
     base = index_queries.at(connection, graph, good)
     return followed(base, changes, script, named_at, inside=inside)

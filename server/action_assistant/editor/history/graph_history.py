@@ -96,8 +96,8 @@ class GraphHistory:
         self._index = index
 
     async def of(self, graph: str, *, limit: int, before: int | None) -> bytes:
-        """Return up to `limit` entries, newest first; with `before` only what was before that change:
-        `HistoryEntry`s. Raises Unavailable."""
+        """Return the JSON of up to `limit` `HistoryEntry`s of a graph, newest first; with `before`,
+        only those before that change. Raise Unavailable if the journal cannot be read."""
         if last := await self._index.value(last_edit_of, graph, limit, before):
             await self._index.upto(graph, last)
         return await self._index.text(history_of, graph, limit, before)

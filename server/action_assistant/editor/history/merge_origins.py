@@ -50,8 +50,9 @@ class MergedBy(msgspec.Struct, frozen=True):
 
 
 async def bring_up(index: ChangeIndex, graph: str, seq: int | None = None) -> int:
-    """Bring the index of a graph up to a change, or to its newest, and those of all graphs from which
-    something came into it; return where the first ends then. Raises Unavailable."""
+    """Bring the index of a graph up to the change `seq` (None: the newest), and also the indexes of
+    all graphs from which changes were merged into it. Return the last indexed seq of `graph`.
+    Raise Unavailable if the journal cannot be read."""
     done = await index.upto(graph, seq)
     asked = {(graph, done)}
     waiting = list(await index.value(sources, graph))

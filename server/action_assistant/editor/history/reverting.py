@@ -39,8 +39,8 @@ class RevertedEdits(msgspec.Struct, frozen=True):
 def reverting_edits(
     connection: Connection, graph: str, state: bytes, author: str, first: int, last: int, limit: int
 ) -> RevertedEdits | None:
-    """Revert what a person changed from the change `first` to `last`, as `reverting` does; None where that is
-    nothing. Raises TooLarge."""
+    """Return the edits that revert what `author` changed from the change `first` to `last`; None if
+    there is nothing to revert. Raise TooLarge if there are more than `limit` changes."""
     changes = index_queries.between(connection, graph, first - 1, last, limit + 1, author)
     if len(changes) > limit:
         raise TooLarge("That is too much to take back at once; go back to the moment before.")
@@ -50,8 +50,8 @@ def reverting_edits(
 
 
 def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, owner: str) -> bytes:
-    """Return the update that makes one thing as it was after the change `seq`, as `as_it_was` does. Raises
-    NotFound."""
+    """Return the update that restores one action or arrow to its state after the change `seq`.
+    Raise NotFound if it did not exist then."""
     then = index_queries.at(connection, graph, seq)
     if not owner or all(owner_of(*change.place) != owner for change in then):
         raise NotFound(f"There was nothing {owner!r} in this graph after its change {seq}.")

@@ -77,7 +77,8 @@ def listed(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
 
 
 def contents(sight: GraphAtSeq, kind: DocumentKind, package: str) -> bytes:
-    """JSON of `PackageContents`. Raises NotFound."""
+    """Return the JSON of `PackageContents`: the generated files of one package. Raise NotFound if
+    no action has this package."""
     action = _chosen(sight, kind, (package,))[0]
     files = tuple(
         PackageFile(path, content.decode()) for path, content in package_files(action).items()
@@ -86,8 +87,8 @@ def contents(sight: GraphAtSeq, kind: DocumentKind, package: str) -> bytes:
 
 
 def archive(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> bytes:
-    """A ZIP file with a folder for each of these packages; of all that can be made if none is named.
-    The same bytes for the same actions. Raises NotFound."""
+    """Return a ZIP file with a folder for each named package, or for every package if none is
+    named; equal actions give equal bytes. Raise NotFound if no action has such a package."""
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as file:
         for action in _chosen(sight, kind, packages):
@@ -115,7 +116,8 @@ def _actions(graph: Graph, kind: DocumentKind) -> tuple[Action, ...]:
 
 
 def _chosen(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> tuple[Action, ...]:
-    """The actions of packages that can be made, in the order of the graph. Raises NotFound."""
+    """Return the actions whose packages are named, or all actions that have a package, in the order
+    of the graph. Raise NotFound if there is no such action."""
     graph = _of(sight, kind)
     refused = {refusal.action for refusal in _refusals(graph, kind)}
     able = {

@@ -149,7 +149,8 @@ class LibraryEdits:
             ]
 
     async def take(self, action: str, graph: str, aid: str | None, author: str) -> GraphView:
-        """The action takes over the parameters that a graph's use of it has. Raises NotFound."""
+        """Give an action of the library the parameters that its use in a graph has. Raise NotFound
+        if the action, the graph or the use does not exist."""
         await self._catalogue.require(action, "action")
         await self._catalogue.require(graph, "graph")
         source = await self._graph_reader.now(graph)
@@ -185,12 +186,14 @@ class LibraryEdits:
         return await self._catalogue.get(action)
 
     async def built(self, action: str, build: h.ActionBuilt, author: str) -> None:
-        """Store the report of a build of an action's package. Raises NotFound."""
+        """Store the report of a build of an action's package. Raise NotFound if the action does not
+        exist."""
         await self._catalogue.require(action, "action")
         await self._journal.append(h.about_stream(action), [h.draft(h.BUILT, author, build)])
 
     async def last_build(self, action: str) -> h.ActionBuilt | None:
-        """Return the last report of a build of an action's package; None if there is none. Raises NotFound."""
+        """Return the last report of a build of an action's package; None if it was never built.
+        Raise NotFound if the action does not exist."""
         await self._catalogue.require(action, "action")
         event = editor_tables.editor_event.c
         chosen = (

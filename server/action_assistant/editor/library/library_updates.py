@@ -83,7 +83,8 @@ def preview(body: bytes) -> bytes:
 
 
 def of_graphs(name: str, sights: Sequence[GraphAtSeq]) -> Action:
-    """Return an action as graphs use it, without values. Raises NotFound."""
+    """Return an action with the parameters that its uses in these graphs have, without values.
+    Raise NotFound if no graph uses it."""
     uses = [use for sight in sights for use in uses_of(read(sight).moment.graph, name)]
     if not uses:
         raise NotFound(f"No graph has an action {name!r}.", where={"path": "/name"})
@@ -127,8 +128,9 @@ def updating(sight: GraphAtSeq, graph: GraphAtSeq, renames: Renames) -> bytes:
 
 
 def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
-    """The update of the library's document that takes over the parameters of a graph's use: of the one
-    that is named, or of the first that differs. Values stay the library's. Raises NotFound."""
+    """Return the update of the library's document that gives an action the parameters of its use in
+    `graph`: of the action `aid`, or of the first use that differs. The library keeps its values.
+    Raise NotFound if the graph has no such use."""
     action = _action_of(sight)
     found = [
         use

@@ -84,8 +84,8 @@ def remembered(data: Path) -> str | None:
 
 
 def check(data: Path, url: str, *, switch: bool) -> None:
-    """Refuse a database that lacks the graphs of this folder, unless told to `switch`. Raises
-    CannotStart."""
+    """Refuse a database that lacks the graphs of this folder, unless `switch` is set. Raise
+    CannotStart in that case."""
     if switch:
         return
     known = remembered(data)
@@ -170,8 +170,8 @@ def _graphs(url: str) -> int | None:
 
 
 def _holds(url: str, mark: Path) -> bool:
-    """Tell whether a database holds the last event that this folder has seen. If so it is the same database by
-    another name, or a copy. Raises CannotStart."""
+    """Return whether a database holds the last event that this folder has seen: it is the same
+    database by another name, or a copy. Raise CannotStart if it cannot be read."""
     if _is_nowhere(url):
         return False
     try:

@@ -49,7 +49,7 @@ class EpochMark(msgspec.Struct, frozen=True):
 
 
 async def begin(journal: Journal, why: Why) -> str:
-    """Begin an epoch; its id. Raises Unavailable."""
+    """Begin an epoch and return its id. Raise Unavailable if the journal cannot be written."""
     begun = EpochBegun(secrets.token_hex(8), why)
     await journal.append(_STREAM, [h.draft(h.EPOCH, h.SERVER, begun)])
     return begun.id

@@ -122,13 +122,13 @@ class Invitations:
         return self.get(made)
 
     def get(self, invitation: str) -> Invitation:
-        """Return one invitation. Raises NotFound."""
+        """Return one invitation. Raise NotFound if there is none with this id."""
         return self._view(self._one(invitation))
 
     async def revoke(self, invitation: str, by: PersonRef) -> Invitation:
-        """End a link and every session that came in by it, at once and for good, whatever becomes of
-        the log. Raises NotFound; Unavailable when neither log nor folder could take it up: then it
-        holds here until this process ends."""
+        """Revoke an invitation and end all sessions that came in by it, at once and for good. Raise
+        NotFound if it does not exist; raise Unavailable if neither the journal nor the folder
+        could store that, so that it holds only until this process ends."""
         link = self._one(invitation)
         if link.revoked_at is None:
             self._end(link, by)
@@ -207,7 +207,8 @@ class Invitations:
         return Invited(invitation, link.role, self._people.person(link.made_by.id).name)
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
-        """Record that a person came in by a link, the first time they do. Raises Unavailable."""
+        """Record the first time that a person comes in by an invitation. Raise Unavailable if the
+        journal cannot be written."""
         guests = self._one(invitation).guests
         if any(each.person.id == person.id for each in guests):
             return

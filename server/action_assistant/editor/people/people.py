@@ -34,7 +34,8 @@ class People:
         return cls(journal, {row.id: row.name for row in rows})
 
     async def seen(self, person: PersonRef) -> None:
-        """Store the name of a person who acts, if it is new or has changed. Raises Unavailable."""
+        """Store the name of a person if it is new or has changed. Raise Unavailable if the journal
+        cannot be written."""
         if self._names.get(person.id) == person.name:
             return
         before = self._names.get(person.id)

@@ -126,7 +126,8 @@ class ComparedRoom(Protocol):
         ...
 
     async def quiet(self) -> Replica:
-        """Wait until no edit is being stored, and return the document. Raises Unavailable."""
+        """Wait until no edit is being stored, and return the document. Raise Unavailable if the
+        room is closed."""
         ...
 
 

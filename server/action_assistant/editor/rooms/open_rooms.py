@@ -53,8 +53,8 @@ class Rooms:
 
     @asynccontextmanager
     async def enter(self, stream: str) -> AsyncIterator[Room]:
-        """Yield the room of a stream, and load it if needed. It is not unloaded while you are inside. Raises
-        Unavailable."""
+        """Yield the room of a stream, loaded if needed; it stays loaded inside of the `async with`.
+        Raise Unavailable if it cannot be loaded."""
         self._holders[stream] = self._holders.get(stream, 0) + 1
         timer = self._timers.pop(stream, None)
         if timer is not None:

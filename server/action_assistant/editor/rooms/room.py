@@ -181,8 +181,8 @@ class Room:
         return await done
 
     async def quiet(self) -> Replica:
-        """Wait until no edit is being stored, and return the document. Until the next `await` it is what is
-        committed. Raises Unavailable."""
+        """Wait until no edit is being stored, and return the document, which is the committed one
+        until the next `await`. Raise Unavailable if the room is closed."""
         await self._idle.wait()
         if self._ended:
             raise Unavailable(_CLOSING)

@@ -136,7 +136,7 @@ def unpacking_look(
 
 
 def name_of_action(sight: GraphAtSeq, action: Key) -> str:
-    """Return the name of an action. Raises NotFound."""
+    """Return the name of an action. Raise NotFound if the graph no longer has it."""
     for each in read(sight).moment.graph.actions:
         if each.key == action and not each.missing:
             return each.name

@@ -103,7 +103,7 @@ class SentTree(msgspec.Struct, frozen=True):
 
 
 def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison:
-    """Compare two runs, which may be of different graphs. Raises nothing."""
+    """Compare two runs, which may be of different graphs."""
     graph_b = _graph(sent_b.umrf)
     graph_a, identities = aligned(_graph(sent_a.umrf), graph_b)
     graph = difference((0, graph_a), (0, graph_b))

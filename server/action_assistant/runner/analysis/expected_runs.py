@@ -220,7 +220,8 @@ def fold(event: Event) -> Sequence[Executable]:
 
 
 def name_of(given: str) -> str:
-    """Return the name of an expectation with single spaces. Raises BadInput."""
+    """Return the name of an expectation with single spaces. Raise BadInput unless it has 1 to 100
+    characters."""
     name = " ".join(given.split())
     if not 1 <= len(name) <= 100:
         raise BadInput("A name has 1 to 100 characters.", where={"path": "/name"})
@@ -298,8 +299,8 @@ def expectation_view(saved: Expected) -> Expectation:
 
 
 def check_alike(found: Run, course: tuple[ExpectedStep, ...]) -> None:
-    """Refuse a run that the simulator does not repeat: its expectation would fail without any
-    change. Raises Conflict."""
+    """Refuse a run that the simulator does not repeat, since its expectation would fail without any
+    change. Raise Conflict then. `course`: the simulated steps."""
     simulated: dict[str, list[str]] = {}
     for step in course:
         if step.what == "result":

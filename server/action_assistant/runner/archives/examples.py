@@ -34,7 +34,8 @@ def written(events: Iterable[Event]) -> bytes:
 
 
 def read(text: bytes) -> tuple[Requested, tuple[Draft, ...]]:
-    """Return the first event of a file, and those that follow. Raises BadInput."""
+    """Return the first event of a file of recorded events, and the events that follow. Raise
+    BadInput if it is no recorded run."""
     try:
         lines = [msgspec.json.decode(each, type=_Line) for each in text.splitlines() if each]
         first = decode(lines[0].kind, bytes(lines[0].body)) if lines else None

@@ -89,8 +89,8 @@ class Retention:
                 await anyio.sleep(_EVERY_S)
 
     async def sweep(self, run_days: float | None, raw_days: float | None) -> SweepResult:
-        """Archive some of the runs and raw messages that are older than so many days; None keeps
-        them. Raises Unavailable."""
+        """Archive a batch of the runs and raw messages that are older than so many days; None keeps
+        them all. Raise Unavailable if the journal cannot be read or written."""
         async with self._one:
             await self._finish()
             found = SweepResult()

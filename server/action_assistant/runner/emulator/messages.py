@@ -161,7 +161,8 @@ class Refusal(Exception):
 
 
 def graph_plan_of(text: str) -> GraphPlan:
-    """Read a graph as the engine's parser does. Raises Refusal."""
+    """Read a graph as the engine's parser does. Raise Refusal, with the engine's own message, if
+    that parser would refuse it."""
     try:
         tree = json.loads(text)
     except ValueError as wrong:
@@ -257,8 +258,9 @@ def engine_inside(
 
 
 def asked_for(message: Start, index: EmulatedIndex, held: Container[str]) -> GraphPlan:
-    """Return the graph that a start is about. `held` are the names of graphs that the engine holds, for which
-    it does not look in its index. Raises Refusal."""
+    """Return the graph that a start message names or carries. `held`: names of graphs that the
+    engine already holds. Raise Refusal, with the engine's own message, if the index lacks it or
+    its name conflicts with an indexed graph."""
     if not message.graph_json:
         plan = index.graphs.get(message.graph_name)
         if plan is None:

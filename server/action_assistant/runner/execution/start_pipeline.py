@@ -295,8 +295,9 @@ class StartPipeline:
             )
 
     async def _ask(self, robot: KnownEngine) -> EngineView:
-        """Ask an engine with a get that is sent now, on the path that would confirm a Stop, after it has
-        read what was just written for it. Raises NoAnswer."""
+        """Send a get to the engine, on the path that would confirm a Stop, after it has read its
+        new index files; return its answer with what is known of it. Raise NoAnswer if none comes
+        in time."""
         await robot.indexed()
         name, began = robot.registration.name, anyio.current_time()
         open_runs = frozenset(self._runs.on(name))  # before the get: a run may move again meanwhile

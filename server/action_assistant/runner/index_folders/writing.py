@@ -227,7 +227,8 @@ def _link(folder: int, old: str, new: str) -> None:
 
 
 def _sha_of(folder: int, name: str) -> str:
-    """Return the SHA-256 of a regular file, in hex; "" of anything else. Raises OSError."""
+    """Return the SHA-256 of a regular file, in hex; "" for anything else. Raise OSError if it
+    cannot be opened."""
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with os.fdopen(os.open(name, flags, dir_fd=folder), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):

@@ -96,7 +96,8 @@ _MESSAGES = msgspec.json.Decoder(tuple[_Said | str, ...])
 def snapshot(
     text: str, *, at: int, source: Literal["get", "feedback"], asked_at: int | None = None
 ) -> Snapshot:
-    """Read one graph as an engine wrote it, seen at `at` (microseconds UTC). Raises NotAGraph."""
+    """Read one graph as an engine wrote it, seen at `at` (microseconds UTC). Raise NotAGraph if the
+    text is no such JSON."""
     try:
         graph = _GRAPH.decode(text)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as error:

@@ -81,7 +81,8 @@ class Simulators:
         clock_us: Callable[[], int],
         behaviours: BehaviourFolder | None = None,
     ) -> "SimulatedLink":
-        """Return a link to a new simulated engine, whose process begins with its first start. Raises TooMany."""
+        """Return a link to a new simulated engine, whose process begins with its first start. Raise
+        TooMany if too many simulated engines are alive."""
         going = [each for each in self._links if each.is_alive]
         if len(going) >= MOST:
             raise TooMany(f"{MOST} simulated runs go on already; stop some, or wait.")

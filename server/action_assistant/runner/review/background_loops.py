@@ -161,8 +161,8 @@ class Deriving(Protocol):
     """A journal whose tables may be added to."""
 
     async def derive(self, work: Callable[[Connection], Any]) -> Any:
-        """Run `work` with a connection that may write tables which follow from events. Raises
-        Unavailable."""
+        """Run `work` with a connection that may write tables which follow from events. Raise
+        Unavailable if the journal cannot be written."""
         ...
 
 

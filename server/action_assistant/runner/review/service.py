@@ -172,7 +172,8 @@ class ReviewService:
 
     async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
         """Return a run and the seq of its last event. `robots_too`: with all of its visits, so that
-        it can go on; else with those that people are shown. Raises NotFound."""
+        the fold can continue; else with the newest visits that people are shown. Raise NotFound
+        if there is no such run."""
         key = (await self.keyframe_store.keyframes(run_id)).keys[-1]
         return (key.run if robots_too else views.with_newest_visits(key.run)), key.seq
 
@@ -231,8 +232,9 @@ class ReviewService:
         return await self._journal.place(stream_of(run_id))
 
     async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> RawMessages:
-        """Return the raw messages of the run's robot from its time. `recordings`: all of that robot
-        that are here; `now`: microseconds UTC. Raises NotFound."""
+        """Return the raw messages of the run's robot from the time of the run. `recordings`: all
+        recordings of that robot on this computer; `now`: microseconds UTC. Raise NotFound if
+        there is no such run."""
         run_ = await self.known(run_id)
         until = run_.ended_at or now
         first, last = hours(run_.started_at or run_.requested_at, until)
@@ -255,7 +257,7 @@ class ReviewService:
         return (await self._control.history.umrf(run_id)).encode()
 
     async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> RunMarks:
-        """Pin, note or label a run, and return its marks. Raises NotFound."""
+        """Pin, note or label a run, and return its marks. Raise NotFound if there is no such run."""
         await self.known(run_id)
         marked = annotations.Marked(self._clock_us(), author, marks)
         await self._journal.append(annotations.stream_about(run_id), [annotations.draft(marked)])

@@ -88,8 +88,8 @@ class WorkerQueries:
         return text
 
     async def newest(self, run: str) -> int:
-        """Return the seq of the last stored event of a run; 0 when there is none. Raises
-        Unavailable."""
+        """Return the seq of the last stored event of a run; 0 when there is none. Raise Unavailable
+        if the journal cannot be read."""
         await self._settled([run])
         return await self._journal.newest(stream_of(run))
 
@@ -169,7 +169,7 @@ class _ReadOnlyJournal(FileJournalReader):
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Refuse to write. Raises Unavailable."""
+        """Raise Unavailable always: a worker writes nothing."""
         raise Unavailable("A worker writes nothing.")
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
@@ -190,7 +190,7 @@ class _NoOngoingRuns:
         self.history = RunHistory(journal)
 
     def next_number(self) -> int:
-        """Refuse to number a run. Raises NotImplementedError."""
+        """Raise NotImplementedError always: a worker numbers no runs."""
         raise NotImplementedError
 
     def watch(self, watcher: Callable[[OngoingRun], None]) -> None:

@@ -335,8 +335,8 @@ def encode(event: RunEvent) -> bytes:
 
 
 def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:
-    """Decode stored bodies of one stream, most of which are of the kind `usual`: an event without a
-    kind is of that one. Raises msgspec.DecodeError."""
+    """Decode stored events of one stream; one without a kind is of the kind `usual`. Raise
+    msgspec.DecodeError if a body does not match its kind."""
     read = _DECODERS[usual].decode
     try:
         return [read(body) if kind is None else decode(kind, body) for body, kind, _ in events]
@@ -345,8 +345,8 @@ def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:
 
 
 def decode(kind: str, body: bytes) -> RunEvent:
-    """Decode the stored body of an event of this kind; return `Unknown` if the kind is not known.
-    Raises msgspec.DecodeError if the body does not match its kind."""
+    """Decode the stored body of an event of this kind; return `Unknown` if this version does not
+    know the kind. Raise msgspec.DecodeError if the body does not match its kind."""
     known = _DECODERS.get(kind)
     try:
         return Unknown() if known is None else known.decode(body)

@@ -213,7 +213,7 @@ def prepared(
 
 
 def _check_size(text: bytes, graph: Graph, subgraphs: Sequence[RunSubgraph], inside: Inner) -> None:
-    """Refuse sizes that the editor refuses to publish. Raises TooLarge."""
+    """Refuse a start larger than the editor would publish. Raise TooLarge then."""
     texts = len(text) + sum(len(each.umrf.encode()) for each in subgraphs)
     actions = sum(len(each.actions) for each in (graph, *inside.values()))
     too_large = excess(RunSize(texts, actions, len(inside)))

@@ -133,7 +133,8 @@ def planned(
 def _require_sound(
     place: int, graph: Graph, inside: Mapping[str, Graph], facts: EngineFacts
 ) -> None:
-    """Refuse a graph that an engine must not read. Raises Conflict."""
+    """Refuse a graph that an engine must not read. Raise Conflict with its first problem; `place`
+    is its number in the request."""
     wrong = blocking(check(graph, None, facts, inside))
     final = [each for each in wrong if is_final(each)]
     if final:
@@ -144,8 +145,8 @@ def _require_sound(
 
 
 def _require_free(states: Mapping[str, FileState], replace: Sequence[str], folder: Path) -> None:
-    """Refuse a write that other files stand in the way of, with all of them; nothing is written
-    then. Raises Conflict."""
+    """Refuse a write that existing files stand in the way of. Raise Conflict with all of those
+    files; `replace` names the graphs whose files may be replaced."""
     hindered = {name: each.why for name, each in states.items() if isinstance(each, Hindered)}
     others = {
         name: each.file.display_path
@@ -228,8 +229,8 @@ class IndexWriter:
     async def _written(
         self, robot: str, folder: Path, plan: WritePlan, author: Author
     ) -> WritingOutcome:
-        """Record the request, write the files, record the outcome. A write that cannot be recorded
-        first does not happen. Raises Unavailable."""
+        """Record the request, write the files, record the outcome. Raise Unavailable, before
+        anything is written, if the request cannot be recorded."""
         request_event = IndexWriteAsked(
             at=self._clock_us(), author=author, folder=shown_path(str(folder)), graphs=plan.graphs
         )

@@ -126,7 +126,8 @@ def _carried_states(tree: Tree) -> list[Problem]:
 
 
 def stamp_of(text: str | bytes) -> Stamp:
-    """Return the stamp of a file; an empty one if it has none. Raises `Unreadable`."""
+    """Return the stamp of a UMRF file; an empty one if it has none. Raise `Unreadable` if the text
+    is no JSON."""
     value = parse(text)
     attributes = value.get("gui_attributes") if isinstance(value, dict) else None
     ours = attributes.get("action_assistant") if isinstance(attributes, dict) else None

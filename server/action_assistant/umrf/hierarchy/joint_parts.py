@@ -91,8 +91,8 @@ def renaming(
     wanted: Mapping[str, str],
     usual: tuple[Remap, ...],
 ) -> tuple[Remap, ...]:
-    """Return renamings by which exactly these inputs get exactly the wanted outputs. Raises
-    `JoinRefused`.
+    """Return renamings by which exactly these inputs get exactly the wanted outputs. Raise
+    `JoinRefused` if there are none.
 
     The engine renames inside a sorted tree, so each candidate is tried (docs/umrf-and-the-engine.md
     2.7).

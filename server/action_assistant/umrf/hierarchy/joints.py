@@ -47,8 +47,8 @@ _TO_EXIT: Final = frozenset({"run", "stop", "pause", "restart", "ignore"})
 
 
 def ways_out(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[JoinedArrow]:
-    """Yield the arrows from the ends of a sub-graph in place of the `relations` that its action
-    had. Raises `JoinRefused`."""
+    """Yield the arrows from the ends of a sub-graph that replace the `relations` of its action.
+    Raise `JoinRefused` if a flat graph cannot do the same."""
     _, exits = ends_of(place.inside)
     kind = _kind(exits)
     _check_outputs(place, exits, kind, relations)
@@ -86,8 +86,8 @@ def _kind(exits: Sequence[Relation]) -> str:
 
 
 def _required(relation: Relation, exits: Sequence[Relation], kind: str, *, is_only: bool) -> bool:
-    """Return whether the child of a sub-graph waits for each of the actions that stand for it.
-    Raises `JoinRefused`."""
+    """Return whether the child of a sub-graph waits for each of the actions that replace it. Raise
+    `JoinRefused` if a flat graph cannot express that."""
     answers = {relation.conditions.answer(end) for end in OUTCOMES}
     if kind == "any":
         if relation.required and not is_only:
@@ -148,11 +148,8 @@ def _check_outputs(
 
 
 def _check_end(inside: Graph, end: Relation, following: Sequence[Relation]) -> None:
-    """Refuse an end that can come without the values of the exit, by a bypass or with an error, if
-    a following action takes values.
-
-    An end in a loop is refused, too. Raises `JoinRefused`.
-    """
+    """Refuse an end that is part of a loop, or that can come without the values of the exit (by a
+    bypass or an error) if a following action takes values. Raise `JoinRefused` then."""
     conditions = end.conditions
     empty: list[Precondition] = [o for o in OUTCOMES[:2] if conditions.answer(o) == "bypass"]
     empty += ["on_error"] if conditions.on_error not in ("bypass", "ignore") else []
@@ -270,7 +267,7 @@ def _into(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[Joine
 
 def _entry_actions(place: SubGraphPlace) -> Iterator[tuple[Key, Action]]:
     """Yield the entry actions of the sub-graph, with the values that the file gives to its action.
-    Raises `JoinRefused`."""
+    Raise `JoinRefused` if an entry action would begin at another time or with other values."""
     actions = {action.key: action for action in place.inside.actions}
     own = slots_of(place.action.inputs)
     texts = {flat_name(p.path): p for p in place.action.inputs}
@@ -304,7 +301,7 @@ def _entry_actions(place: SubGraphPlace) -> Iterator[tuple[Key, Action]]:
 
 
 def _check_same(outer: Slot, inner: Slot, action: Action) -> None:
-    """Refuse a value that only one of two inputs on its way would take. Raises `JoinRefused`."""
+    """Refuse two connected inputs that do not take the same values. Raise `JoinRefused` then."""
     place = f"“{outer.name}” and “{inner.name}” of {action.full_name}"
     if inner.has_value():
         refuse("inputs", f"{place}: both have a value in their files.")

@@ -69,7 +69,7 @@ Json: TypeAlias = "dict[str, Json] | list[Json] | str | bool | Number | None"
 
 
 def parse(text: str | bytes) -> Json:
-    """Parse a JSON text. Raises `Unreadable`."""
+    """Parse a JSON text. Raise `Unreadable` if it is too large, no JSON, or has a key twice."""
     text = decoded(text)
     _bound(text)
     hooks = _Hooks(text)
@@ -157,7 +157,8 @@ def _without_strings(text: str) -> str:
 
 
 def decoded(text: str | bytes) -> str:
-    """Return the text as `parse` reads it, without a byte order mark. Raises `Unreadable`."""
+    """Return the text without a byte order mark. Raise `Unreadable` if it is larger than MAX_BYTES
+    or not UTF-8."""
     if len(text) > MAX_BYTES:
         raise Unreadable("too-large", "The text is larger than 10 MB.")
     if isinstance(text, str):
@@ -173,8 +174,8 @@ def decoded(text: str | bytes) -> str:
 
 
 def _bound(text: str) -> None:
-    """Refuse a text that is nested too deeply or has too many values, before anything is built.
-    Raises `Unreadable`."""
+    """Check a text before it is parsed. Raise `Unreadable` if it is nested too deeply or has too
+    many values."""
     structure = _NOT_STRUCTURE.sub("", _STRING.sub("", text))
     if len(structure) > MAX_VALUES:
         raise Unreadable("too-large", f"The text has more than {MAX_VALUES:,} values.")

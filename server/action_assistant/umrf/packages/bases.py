@@ -84,7 +84,8 @@ def write_base(base: GenerationBase) -> bytes:
 
 
 def read_base(content: bytes) -> GenerationBase:
-    """Read the content of the base file. Raises `UnreadableBase`."""
+    """Read the content of the base file. Raise `UnreadableBase` if it is malformed or of a newer
+    version."""
     try:
         stored = msgspec.json.decode(content, type=_StoredBase)
         if stored.format != 1:

@@ -42,8 +42,8 @@ class _BundledAction(msgspec.Struct, frozen=True):
 
 
 def bundle_files(package: str, actions: Sequence[Action]) -> dict[str, bytes]:
-    """Return contents by path below the folder of a package with all these actions. Raises
-    `ImpossiblePackage`.
+    """Return the files of one package with all these actions: contents by path below its folder.
+    Raise `ImpossiblePackage` if a name or parameter cannot be one of C++ or ROS.
 
     Files of a single action have the same paths as in its own package.
     """

@@ -43,11 +43,9 @@ class ImpossiblePackage(Exception):
 
 
 def package_files(action: Action) -> dict[str, bytes]:
-    """Return contents by path (with `/`) below the folder of the package, whose name is
-    `naming.snake_case(action.name)`.
-
-    Raises `ImpossiblePackage`.
-    """
+    """Return the files of an action's package: contents by path (with `/`) below its folder
+    `naming.snake_case(action.name)`. Raise `ImpossiblePackage` if a name or parameter cannot be
+    one of C++ or ROS."""
     refusals = check_name(action.name)
     inputs, against_inputs = structure(action, "input_parameters")
     outputs, against_outputs = structure(action, "output_parameters")

@@ -159,7 +159,8 @@ class Engine(Graphs):
     def modify(self, graph: Graph, at_ms: float, continue_from: str = "") -> list[Trace]:
         """Give a running, paused or halted graph of this name a new structure and let it continue.
 
-        Raises `GraphRefused`; a graph that was paused for the modify then stays PAUSED.
+        Raise `GraphRefused` as the engine does; a graph that was paused for the modify then stays
+        PAUSED.
         """
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)

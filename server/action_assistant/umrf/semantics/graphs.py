@@ -138,9 +138,9 @@ class Graphs(Core):
         return None
 
     def _refuse_broken(self, graph: Running, *, matched: bool) -> None:
-        """Refuse a graph with an action that cannot be built. Raises `GraphRefused`.
+        """Raise `GraphRefused` if an action of the graph cannot be built.
 
-        The graph stays in the engine without that action and those after it. If there are others
+        The graph then stays in the engine, without that action and those after it. If actions stand
         before it, a get kills the engine.
         """
         found = self._not_built(graph, matched=matched)

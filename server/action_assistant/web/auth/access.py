@@ -83,7 +83,7 @@ def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None
 
 
 def require(connection: ASGIConnection[Any, Any, Any, Any], permission: Permission) -> None:
-    """Refuse whoever's role does not allow this. Raises Forbidden."""
+    """Raise Forbidden if the person of this connection has a role that does not allow this."""
     role = person_of(connection).role
     if not allowed(role, permission):
         raise Forbidden(f"You are here as {role}: you may {may(role)}.")
@@ -98,7 +98,8 @@ class Needs:
     async def __call__(
         self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler
     ) -> None:
-        """Raises Forbidden. Plain functions would be called in a thread, for which Stop had to wait."""
+        """Raise Forbidden if the person's role lacks the permission. This is a coroutine since a
+        plain function would run in a thread, for which Stop had to wait."""
         require(connection, self.permission)
 
 

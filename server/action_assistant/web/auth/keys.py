@@ -98,7 +98,8 @@ class Keys:
 
     @classmethod
     def known(cls, data: Path) -> "Keys":
-        """The keys of a data folder that has some, as `of` would find them. Raises CannotStart."""
+        """Return the existing keys of a data folder or of the environment. Raise CannotStart if
+        there are none."""
         given = cls._given()
         if given is not None:
             return given

@@ -71,7 +71,8 @@ class SessionFiles:
         return sorted(found, key=lambda each: each.expires, reverse=True)
 
     def end(self, session: str) -> None:
-        """End one, in both processes. Raises NotFound; Unavailable, as `Revocations.end`."""
+        """End one session, in both processes. Raise NotFound if it is not open; raise Unavailable
+        if the folder cannot store that."""
         if session not in {each.id for each in self.every()}:
             raise NotFound(f"There is no open session {session!r}.")
         self._revoked.end(session)

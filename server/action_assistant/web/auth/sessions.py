@@ -80,7 +80,7 @@ class InvitationRegistry(Protocol):
     """Knows the invitations and the people who came in by them."""
 
     def look(self, proof: str) -> Invited:
-        """Return the invitation that a link proves. Raise Unauthenticated."""
+        """Return the invitation that a link proves. Raise Unauthenticated if the link is not valid."""
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
         """Remember who came in by it."""
@@ -106,7 +106,8 @@ class Sessions:
         self._pace = TokenBuckets(_TRIES_AT_ONCE, _TRIES_PER_MINUTE / 60) if limits else None
 
     def look(self, invitation: str, request: _Asking) -> Invited:
-        """Return the invitation of a link. Raise Unauthenticated or TooMany."""
+        """Return the invitation of a link. Raise Unauthenticated if the link is not valid, TooMany
+        if this address tries too often."""
         self._admit(request)
         return self._reception().look(invitation)
 
@@ -282,8 +283,8 @@ def revocation(revoked: Revocations) -> list[ControllerRouterHandler]:
 
 
 async def _end(revoked: Revocations, request: _Asking) -> None:
-    """Every session that the browser of whoever asks holds, also those that have expired. Raises
-    Unavailable."""
+    """End every session that this browser holds, also expired ones. Raise Unavailable if that
+    cannot be stored."""
     sessions: list[Session] = request.scope["state"].get("sessions", [])
     unwritten: Unavailable | None = None
     for each in dict.fromkeys(session.id for session in sessions):

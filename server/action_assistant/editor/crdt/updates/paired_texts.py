@@ -77,8 +77,8 @@ class PairedTexts:
 
 
 def has_paired_texts(bodies: Sequence[bytes]) -> bool:
-    """Tell whether any of these stored updates has a text with characters of two UTF-16 units. Raises
-    Malformed."""
+    """Return whether any of these stored updates has a text with surrogate pairs (characters of two
+    UTF-16 units). Raise Malformed if an update cannot be read."""
     text = b"\x00".join(bodies).translate(_CLASSES)
     starts: list[int] = []
     at = text.find(_AS_CLASSES)

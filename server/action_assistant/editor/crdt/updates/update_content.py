@@ -36,7 +36,8 @@ class ContentReader:
         self.paired = b""
 
     def content(self, kind: int) -> int:
-        """Read the content of one struct, and return how many clocks it takes. Raises Malformed."""
+        """Read the content of one struct of this kind, and return how many clocks it takes. Raise
+        Malformed if it cannot be read."""
         reader = self._reader
         self.paired = b""
         match kind:

@@ -30,30 +30,31 @@ def outline(update: bytes) -> UpdateOutline:
 
 
 def stored_outline(update: bytes) -> UpdateOutline:
-    """Read an update that a room took, also one that it would not take today: the graph can be opened
-    all the same. Raises Malformed."""
+    """Return the outline of an update from the log, also of one that today's rules would refuse, so
+    that old graphs still open. Raise Malformed if it cannot be read."""
     return small_outline(update) or scanned(update, stored=True)
 
 
 def scanned(update: bytes, *, stored: bool = False) -> UpdateOutline:
-    """Read an update of any kind: `outline` without its short cut, or `stored_outline`. Raises
-    Malformed."""
+    """Return the outline of an update by reading all of it, without the short cut for small
+    updates. Raise Malformed if it cannot be read; with `stored`, an update that only today's
+    rules refuse is accepted."""
     scan = Scan(ByteReader(update), stored=stored)
     scan.whole()
     return scan.outline()
 
 
 def places_parted(update: bytes) -> list[tuple[int, int]]:
-    """The clocks of clients before which applying an update parts a text, if there is one. Raises
-    Malformed."""
+    """Return the positions (client, clock) before which this update splits a text item. Raise
+    Malformed if it cannot be read."""
     scan = Scan(ByteReader(update), stored=True)
     scan.whole()
     return scan.parted
 
 
 def cut_items(update: bytes, known: Mapping[int, int]) -> list[int]:
-    """The clients of which the first part of an item is known, where there are so many clocks of each.
-    Raises Malformed."""
+    """Return the client ids of which `known` (next clock by client) covers only the first part of
+    an item of this update. Raise Malformed if it cannot be read."""
     scan = Scan(ByteReader(update), stored=True)
     scan.whole()
     return [c for c, start, end in scan.items if start < known.get(c, 0) < end]
@@ -85,7 +86,7 @@ class Scan:
         self._structs = self._actions = self._fields = 0
 
     def whole(self) -> None:
-        """Read the whole update. Raises Malformed."""
+        """Read the whole update into the attributes. Raise Malformed if it cannot be read."""
         reader = self._reader
         clients = reader.number()
         if clients > MOST_CLIENTS or clients * 3 > reader.left:

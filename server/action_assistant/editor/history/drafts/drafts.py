@@ -138,7 +138,7 @@ class Drafts:
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
     async def get(self, draft: str) -> DraftView:
-        """Return one draft. Raises NotFound."""
+        """Return one draft. Raise NotFound if there is none with this id."""
         return await self._view(await self._row(draft))
 
     async def pair(self, draft: str) -> DraftPair:

@@ -92,7 +92,8 @@ class CallOutput:
         self._printed = _Kept()
 
     def take_line(self, line: bytes) -> None:
-        """Take in one line of the protocol. Raises BadOutput."""
+        """Add one output line of a behaviour's process. Raise BadOutput if it does not follow the
+        protocol."""
         try:
             said = msgspec.json.decode(line, type=_Line)
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:

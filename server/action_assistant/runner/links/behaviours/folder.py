@@ -66,7 +66,8 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
         return True
 
     def source(self, name: str) -> str:
-        """Return the Python text of an action's behaviour. Raises Unusable."""
+        """Return the Python text of an action's behaviour. Raise Unusable if its file cannot be
+        read or is no regular file."""
         file = file_of(name)
         if file is None:
             raise Unusable(f"“{name}” is no name that a behaviour can have.")
@@ -103,8 +104,8 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
 
     @contextmanager
     def _entered(self) -> Iterator[int]:
-        """Open the folder and yield its descriptor, so that all reads go to this folder even if its path is
-        changed meanwhile. Raises OSError."""
+        """Open the folder and yield its descriptor, so that all reads go to this folder even if its
+        path is changed meanwhile. Raise OSError if it cannot be opened."""
         folder = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
         try:
             yield folder

@@ -30,7 +30,7 @@ class Supervisor:
     called, or when the runner dies. Used on one thread."""
 
     def __init__(self) -> None:
-        """Start the process. Raises OSError."""
+        """Start the process. Raise OSError if the system cannot start it."""
         with ExitStack() as opened:
             ours, theirs = (opened.enter_context(each) for each in socket.socketpair())
             self._lifeline, lifeline = (opened.enter_context(each) for each in socket.socketpair())

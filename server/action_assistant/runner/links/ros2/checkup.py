@@ -197,7 +197,8 @@ def _origin(module: str) -> str:
 async def _standings(
     reach: Reach, robots: Sequence[Registration], seen: list[Diagnostic]
 ) -> list[tuple[Registration, Standing]]:
-    """Return the standing of each registered robot; all are asked at once. Raises RuntimeError."""
+    """Return the standing of each registered robot, all asked at once; robots with a bad profile
+    are added to `seen` instead. Raise RuntimeError if a ROS domain cannot be joined."""
     links: list[tuple[Registration, Link]] = []
     for each in robots:
         try:

@@ -67,7 +67,8 @@ class Domain:
     def __init__(
         self, number: int, topics: Topics, loop: asyncio.AbstractEventLoop, clock_us: Clock
     ) -> None:
-        """Join the domain. Takes up to some seconds, so it is called in a thread. Raises RuntimeError."""
+        """Join the domain. This takes up to some seconds, so it is called in a thread. Raise
+        RuntimeError if the middleware does not show this process to itself."""
         self.number = number
         self.topics = topics
         self.actors: set[str] = set()  # names in feedback so far
@@ -190,8 +191,8 @@ class Domain:
         return tuple(each for each in ends if each.process != self.process)
 
     def _know_ourselves(self) -> tuple[str, str]:
-        """Return the gid prefix of this process and the type hash of its start messages, as others see them.
-        Raises RuntimeError."""
+        """Return the gid prefix of this process and the type hash of its start messages, as others
+        see them. Raise RuntimeError if the middleware does not show them in time."""
         name, deadline = (
             self._node.get_fully_qualified_name().lstrip("/"),
             time.monotonic() + _JOIN_S,

@@ -47,7 +47,7 @@ class Ros2:
         return Ros2Link(self.domain, registration, facts, self._clock_us)
 
     async def domain(self, number: int, topics: Topics) -> Domain:
-        """Return a domain, which the first call joins. Raises RuntimeError."""
+        """Return a domain, which the first call joins. Raise RuntimeError if it cannot be joined."""
         async with self._joining:
             known = self._domains.get((number, topics))
             if known is None:
@@ -59,8 +59,8 @@ class Ros2:
             return known
 
     async def sighting(self) -> Sighting:
-        """Return the engines that are seen now, on the domains of links and on that of the environment. Raises
-        RuntimeError."""
+        """Return the engines that are seen now, on the domains of links and on that of the
+        environment. Raise RuntimeError if that domain cannot be joined."""
         await self.domain(self._home, topics_of(PINNED))
         domains = tuple(self._domains.values())
         youngest = max(each.settled_at for each in domains)
@@ -73,7 +73,8 @@ class Ros2:
         return Sighting(engines, max(0.0, youngest - time.monotonic()))
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Return the engines that are seen once discovery has had its time. Raises RuntimeError."""
+        """Return the engines that are seen once discovery has had its time. Raise RuntimeError if
+        the domain of the environment cannot be joined."""
         seen = await self.sighting()
         await anyio.sleep(seen.left_s)
         return (await self.sighting()).engines if seen.left_s else seen.engines
