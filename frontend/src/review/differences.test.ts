@@ -118,6 +118,12 @@ test("the likely cause is the nearest thing that differed, and none where nothin
   expect(likelyCause(comparison([closes], { graph: changed }))).toBe(
     "its torque was 8 instead of 12.5",
   );
+  const missing = { ...closes, b: null, relation: "only_a" as const };
+  expect(likelyCause(comparison([missing], { graph: changed }))).toBeNull();
+  const led = { change: "changed" as const, parent: "Open_0", child: "Close_0" };
+  const relations = [{ ...led, fields: [{ field: "on_true", before: "run", after: null }] }];
+  const rerouted = { ...changed, relations } as unknown as Comparison["graph"];
+  expect(likelyCause(comparison([missing], { graph: rerouted }))).toMatch(/^the arrow .*changed$/);
 });
 
 test("what happened on the way comes before any difference of the graphs, and no false cause is named", () => {

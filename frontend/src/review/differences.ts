@@ -213,7 +213,9 @@ export function likelyCause(found: Comparison): string | null {
   if (level !== undefined && found.subgraphs.includes(level))
     return `the graph inside ${step.levels.map(spaced).join(INTO)} was another one`;
   const own = found.graph.actions.find(({ aid }) => step.aid !== null && aid === step.aid);
-  const field = own?.fields.find(({ field }) => /^(in|out)\//.test(field)) ?? undefined;
+  // Values of an action explain how it ended, not that it did not run.
+  const both = step.a !== null && step.b !== null;
+  const field = both ? own?.fields.find(({ field }) => /^(in|out)\//.test(field)) : undefined;
   if (field !== undefined) return changedWords(field);
   const input = ranWithOther(step);
   if (input !== null) return input;

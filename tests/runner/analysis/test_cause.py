@@ -31,7 +31,7 @@ from action_assistant.runner.runs.events import (
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.model import Graph
+from action_assistant.umrf.model import Conditions, Graph
 from runner.harness import ANN
 from runner.process import RunnerProcess
 from runner.record_examples import graph, line, recorded
@@ -201,6 +201,45 @@ def test_an_arrow_that_passes_the_outcome_over_is_named() -> None:
         "Ann pressed Stop while no action was seen running.",
         "Join waited for B, which ended false: its arrow passes that over.",
     ]
+
+
+def _ended(at: int, name: str, result: str) -> tuple[Any, ...]:
+    end = "ERROR" if result == "error" else "FINISHED"
+    return NodeResult(at, "task", name, f"on_{result}"), state(at, name, end)
+
+
+@pytest.mark.parametrize("others", [(), _ended(6, "B_0", "true")])
+def test_an_ignored_outcome_before_the_last_report_keeps_nobody_waiting(others: Any) -> None:
+    """Engines run a join whose last parent says so, whatever the others had ended with."""
+    told = (state(3, "A_0", "RUNNING"), *_ended(4, "A_0", "false"), state(4, "B_0", "RUNNING"))
+    stop, end = StopRequested(9, ANN), Ended(10, "stopped")
+    found_causes = found(FORK, Observed(4, told), Observed(6, others), stop, end)
+    assert not any("passes that over" in each for each in found_causes)
+    assert others or "Join waited for B, which had not been seen to end by then." in found_causes
+
+
+@pytest.mark.parametrize(
+    ("outcome", "cause"), [("false", "B ended false."), ("error", "B ended in error.")]
+)
+def test_an_error_from_which_an_arrow_recovered_is_no_cause_of_what_came_later(
+    outcome: str, cause: str
+) -> None:
+    error = Conditions(on_error="run")
+    plan = graph("task", *line("A", "Again", "B"))
+    keys = {each.name: each.key for each in plan.actions}
+    relations = tuple(
+        msgspec.structs.replace(each, conditions=error) if each.child == keys["Again"] else each
+        for each in plan.relations
+    )
+    plan = msgspec.structs.replace(plan, relations=relations)
+    slipped = (state(3, "A_0", "RUNNING"), *_ended(4, "A_0", "error"))
+    again = (state(4, "Again_0", "RUNNING"), *_ended(5, "Again_0", "true"))
+    last = (state(5, "B_0", "RUNNING"), *_ended(6, "B_0", outcome))
+    told = [Observed(4, slipped), Observed(5, again)]
+    assert found(plan, *told, Observed(6, last), Ended(7, "finished", f"on_{outcome}")) == [cause]
+    stopped = [Observed(6, last[:1]), StopRequested(7, ANN), Ended(8, "stopped")]
+    assert not any("error" in each for each in found(plan, *told, *stopped))
+    assert "A ended in error." in found(plan, *told, Ended(7, "halted"))
 
 
 def test_a_run_is_not_ended_by_a_stranger_when_it_was_over_before() -> None:

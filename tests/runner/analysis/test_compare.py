@@ -242,6 +242,52 @@ def test_a_stop_after_they_had_parted_is_not_named_as_the_cause() -> None:
     assert compared(GOOD, late).because is None
 
 
+CHAIN = sequence(actions=3)
+
+
+def _without(graph: Graph, number: int) -> Graph:
+    """The chain without one action; the ones beside it are joined."""
+    before, gone, after = (graph.actions[each].key for each in (number - 1, number, number + 1))
+    relations = tuple(
+        msgspec.structs.replace(each, parent=before) if each.parent == gone else each
+        for each in graph.relations
+        if each.child != gone
+    )
+    assert any((each.parent, each.child) == (before, after) for each in relations)
+    actions = tuple(each for each in graph.actions if each.key != gone)
+    return msgspec.structs.replace(graph, actions=actions, relations=relations)
+
+
+@pytest.mark.parametrize("bypassed", [False, True])
+def test_a_stop_is_no_cause_of_a_visit_to_which_only_the_other_graph_led(bypassed: bool) -> None:
+    shorter = _without(CHAIN, 1)
+    if bypassed:  # the action is there, and no arrow leads to it
+        kept = tuple(each for each in CHAIN.relations if each.parent == CHAIN.actions[1].key)
+        shorter = msgspec.structs.replace(
+            CHAIN, relations=(*(each for each in shorter.relations if each not in kept), *kept)
+        )
+    done = [(each.full_name, "true") for each in CHAIN.actions]
+    good = went(1, *done, graph=CHAIN)
+    stop = StopRequested(2_700_000, Author("ada", "Ada"))
+    stopped = went(2, done[0], (done[2][0], "-"), graph=shorter, end="stopped", more=[stop])
+    for one, other in ((good, stopped), (stopped, good)):
+        found = compared(one, other)
+        assert found.parting.step.action == done[1][0]
+        assert found.because is None
+
+
+def test_a_stop_in_the_run_that_has_a_visit_does_not_explain_that_the_other_lacks_it() -> None:
+    stopped = went(2, ("Work_0", "true"), ("Work_1", "stopped"), end="stopped", more=[STOPPED])
+    assert compared(went(1, ("Work_0", "true")), stopped).because is None
+
+
+def test_a_script_does_not_explain_a_visit_that_one_run_lacks() -> None:
+    script = '{"behaviours": {"Work_1": [{"after_s": 1}]}}'
+    short = went(2, ("Work_0", "true"))
+    found = compare(GOOD[0], short[0], SentTree(GOOD[1], {}, script), SentTree(short[1]))
+    assert found.because is None
+
+
 def test_an_alarm_of_one_run_is_named_before_any_difference_of_the_graphs() -> None:
     alarm = AlarmRaised(1_900_000, "engine_restarted", "The engine was restarted.")
     lost = went(2, ("Work_0", "true"), end="lost", more=[alarm])

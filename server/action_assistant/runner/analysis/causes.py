@@ -188,7 +188,7 @@ def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
     wrong = tuple(_parameters(run, graph)) if graph is not None else ()
     yield from wrong
     named = {each.action for each in wrong}
-    yield from (each for each in _failures(run) if each.action not in named)
+    yield from (each for each in _failures(run, graph) if each.action not in named)
     stalls = tuple(_stalls(run, graph))
     yield from stalls
     if graph is not None and not stalls:
@@ -383,9 +383,9 @@ def _was_given(visit: Visit, parameter: str, value: str) -> bool:
     return reported is None or reported[:_LONGEST] == value
 
 
-def _failures(run: Run) -> Iterator[Cause]:
+def _failures(run: Run, graph: Graph | None) -> Iterator[Cause]:
     """Yield the action whose failure ended the run, however deep inside."""
-    failing = _failing_visit(run)
+    failing = _failing_visit(run, graph)
     if failing is not None:
         at, name, visit = failing
         yield ActionFailed(
@@ -397,19 +397,29 @@ def _failures(run: Run) -> Iterator[Cause]:
         )
 
 
-def _failing_visit(run: Run) -> EndedVisit | None:
+def _failing_visit(run: Run, graph: Graph | None) -> EndedVisit | None:
     """Return the visit that the bad end goes back to: the first that ended in error; in a run that
-    ended false, the last of the top level that did. An error inside of an action that ended true
-    comes last, since that action recovered from it."""
+    ended false, the last of the top level that did. An error comes last if an action around it
+    ended true, or an action that it started by an arrow of `graph`: these recovered from it. In a
+    run that a person stopped it does not come at all."""
     found = places_of(run)
     ended = _ended_visits(run, found, run.actions)
     errors = [each for each in ended if each[2].result == "error"]
     own = {place.way: name for name, place in found.items()}
-    wrong = next((each for each in errors if not _made_good(run, found, own, each)), None)
+    recovery = _recovery(graph)
+    wrong = next(
+        (
+            each
+            for each in errors
+            if not _made_good(run, found, own, each) and not _handled(run, recovery, each)
+        ),
+        None,
+    )
     if wrong is None and run.result == "on_false":
         top = [each for each in ended if each[2].result == "false" and not found[each[1]].levels]
         wrong = next(reversed(top), None)
-    wrong = wrong or next(iter(errors), None)
+    if run.end != "stopped" or run.stop_requested_at is None:
+        wrong = wrong or next(iter(errors), None)
     return wrong and _inmost(run, found, wrong)
 
 
@@ -437,6 +447,29 @@ def _made_good(
         for name in around
         if name is not None
         for visit in run.actions[name].visits
+    )
+
+
+def _recovery(graph: Graph | None) -> Mapping[str, frozenset[str]]:
+    """Return by the full name of an action the full names of those that its error starts."""
+    if graph is None:
+        return {}
+    names = {action.key: action.full_name for action in graph.actions}
+    found: dict[str, set[str]] = {}
+    for arrow in graph.relations:
+        if arrow.conditions.on_error == "run" and arrow.parent in names and arrow.child in names:
+            found.setdefault(names[arrow.parent], set()).add(names[arrow.child])
+    return {name: frozenset(children) for name, children in found.items()}
+
+
+def _handled(run: Run, recovery: Mapping[str, frozenset[str]], wrong: EndedVisit) -> bool:
+    """Return whether an action that this error started began after it and ended true."""
+    at, name, visit = wrong
+    return any(
+        later.result == "true" and later.start >= (visit.until or at)
+        for child in recovery.get(name, ())
+        if child in run.actions
+        for later in run.actions[child].visits
     )
 
 
@@ -511,23 +544,30 @@ def _waiting(
     """Yield the parents that kept the action `child` from running at `moment` (microseconds UTC).
     `arrows` are the required arrows to `child`; `names` gives full names of actions by key.
 
-    Yield nothing unless `child` has several parents and at least one of them had ended by then.
+    Yield nothing unless `child` has several parents and at least one of them had ended by then. A
+    parent that had ended counts only if all had, and if it was the last one: any end of a required
+    parent is a report, and the response to the last report decides (docs/umrf-and-the-engine.md
+    2.3).
     """
     parents = [(names[arrow.parent], arrow) for arrow in arrows if arrow.parent in names]
-    if not any(_over(run.actions.get(name), moment) for name, _ in parents) or len(parents) < 2:
+    seen = [(name, arrow, run.actions.get(name, ActionRun())) for name, arrow in parents]
+    ended = [
+        (name, arrow, over)
+        for name, arrow, action in seen
+        if (over := _over(action, moment)) is not None
+    ]
+    if not ended or len(parents) < 2:
         return
-    for name, arrow in parents:
-        action = run.actions.get(name, ActionRun())
+    for name, _, action in seen:
         going = _going(action, moment)
         if going is not None:
             yield Waiting(at=going.start, action=child, parent=name)
-        elif (over := _over(action, moment)) is not None and _passes_over(arrow, over):
-            yield Waiting(
-                at=over.not_after or over.start,
-                action=child,
-                parent=name,
-                ended=over.result or "",
-            )
+    latest = max(max(over.until or 0, over.start) for _, _, over in ended)
+    last = [each for each in ended if (each[2].not_after or moment) >= latest]
+    if len(ended) == len(parents) and all(_passes_over(arrow, over) for _, arrow, over in last):
+        for name, _, over in last:
+            at = over.not_after or over.start
+            yield Waiting(at=at, action=child, parent=name, ended=over.result or "")
 
 
 def _going(action: ActionRun, moment: int) -> Visit | None:

@@ -7,7 +7,15 @@ import msgspec
 from msgspec.structs import replace
 
 from action_assistant.runner.analysis.cause_texts import cause_sentence
-from action_assistant.runner.analysis.causes import OPERATOR, Cause, Silence, causes, operator
+from action_assistant.runner.analysis.causes import (
+    OPERATOR,
+    Cause,
+    ForeignCause,
+    OperatorChange,
+    Silence,
+    causes,
+    operator,
+)
 from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.counts import visit_counts
@@ -114,7 +122,9 @@ def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison
     steps = _own_first(_inner_first(begun))
     parts = (step for step in steps if _parts(step))
     parting = next((_parting(step, a, b, action_pairs) for step in parts), None)
-    because = _because(parting, (a, sent_a), (b, sent_b), action_pairs)
+    inside = _changed_inside(sent_a.inside, sent_b.inside)
+    led_otherwise = parting is not None and _led_otherwise(parting.step, graph_a, graph_b, inside)
+    because = _because(parting, (a, sent_a), (b, sent_b), action_pairs, led_otherwise=led_otherwise)
     return RunComparison(
         a=views.summary(a),
         b=views.summary(b),
@@ -122,7 +132,7 @@ def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison
         same_engine=a.engine == b.engine,
         graph=graph,
         parameters=[change for change in graph.actions if _of_values(change)],
-        subgraphs=_changed_inside(sent_a.inside, sent_b.inside),
+        subgraphs=inside,
         steps=steps[:_MOST],
         left_out=max(0, len(steps) - _MOST),
         parting=parting,
@@ -398,22 +408,30 @@ def _because(
     a: tuple[Run, SentTree],
     b: tuple[Run, SentTree],
     action_pairs: Sequence[_ActionPair],
+    *,
+    led_otherwise: bool,
 ) -> PartingCause | None:
     """Return the event that explains why the runs differ: commands of people in either run first,
     then alarms, then scripts of the simulator. For runs without a different visit but with
-    different ends: what explains the end."""
+    different ends: what explains the end.
+
+    Where only one run has the visit, only an event of the other run can explain that, and none
+    does if the graphs lead to the action in different ways (`led_otherwise`)."""
     step = parting.step if parting is not None else None
     if step is None and a[0].end == b[0].end:
         return None
     sides = [(b[0], step.b if step else None), (a[0], step.a if step else None)]
+    both = step is None or (step.a is not None and step.b is not None)
     for found in (_operators, _troubles):
         for run, shown in sides:
             for cause in found(run):
-                if _explains(cause.at, run, shown):
+                lacking = shown is None and not led_otherwise
+                may_explain = both or lacking or _changes_graph(cause)
+                if may_explain and _explains(cause.at, run, shown):
                     return _happened(
                         str(cause.__struct_config__.tag), run, cause_sentence(cause, run)
                     )
-    if step is None or step.levels:
+    if step is None or step.levels or not both:
         return None
     pair = next(pair for pair in action_pairs if pair.action == step.action)
     scripted = [_scripted(sent, name) for (_, sent), name in ((a, pair.a), (b, pair.b))]
@@ -421,6 +439,31 @@ def _because(
         return None
     run = b[0] if scripted[1] is not None else a[0]
     return _happened("script", run, f"The script of the simulator says what {step.name} did.")
+
+
+def _changes_graph(cause: Cause) -> bool:
+    """Return whether a cause is a change of the graph of a run that went on."""
+    return isinstance(cause, OperatorChange) or (
+        isinstance(cause, ForeignCause) and cause.command == "modify"
+    )
+
+
+def _led_otherwise(step: ComparedVisit, a: Graph, b: Graph, inside: Sequence[str]) -> bool:
+    """Return whether other arrows lead to the action of a visit in graph `a` than in graph `b`, or
+    one of them lacks it. `inside`: names of graphs inside that differ."""
+    if step.levels:
+        return any(level.rpartition("_")[0] in inside for level in step.levels)
+    return _arrows_to(step, a) != _arrows_to(step, b)
+
+
+def _arrows_to(step: ComparedVisit, graph: Graph) -> frozenset[tuple[object, ...]] | None:
+    if all(each.key != step.aid for each in graph.actions):
+        return None
+    return frozenset(
+        (each.parent, each.conditions, each.required)
+        for each in graph.relations
+        if each.child == step.aid
+    )
 
 
 def _operators(run: Run) -> Iterator[Cause]:
