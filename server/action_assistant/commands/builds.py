@@ -46,8 +46,8 @@ class BuildError(msgspec.Struct, frozen=True):
 
 
 class PackageBuild(msgspec.Struct, frozen=True):
-    """The result of the last build of one package. `source` is the folder of its source; None if it
-    is not known any more."""
+    """The result of the last build of one package. `source`: the folder of its source; None if it
+    cannot be found."""
 
     package: str
     ended_well: bool
@@ -57,7 +57,8 @@ class PackageBuild(msgspec.Struct, frozen=True):
 
 
 def last_builds(workspace: Path) -> tuple[PackageBuild, ...]:
-    """Every package of the last build. Raises CannotStart where there is no such log."""
+    """Return the result of every package in the last colcon build. Raise CannotStart if there is no
+    log of one."""
     latest = workspace / "log" / "latest_build"
     events = latest / "events.log"
     try:
@@ -188,7 +189,7 @@ def _described(source: Path) -> Iterator[tuple[str, str]]:
 
 
 def _packages_of(file: str) -> frozenset[str]:
-    """The actions, in snake case, of which a generated file may be."""
+    """Return the names of actions, in snake case, to which a generated file may belong."""
     parts = file.split("/")
     stem = parts[-1].split(".")[0]
     return frozenset({stem, stem.removesuffix("_test"), *parts[1:2]})

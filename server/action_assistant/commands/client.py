@@ -35,7 +35,7 @@ def command(
     text: str,
     example: str,
 ) -> argparse.ArgumentParser:
-    """A command below another, that needs a running server."""
+    """Add a sub-command that needs a running server, and return its parser."""
     parser = commands.add_parser(name, help=text, description=text)
     add_server(parser, example)
     return parser
@@ -56,7 +56,7 @@ def add_server(parser: argparse.ArgumentParser, example: str) -> None:
 
 
 class Server:
-    """A running editor and its runner, as a program sees them."""
+    """A client of a running editor and its runner."""
 
     def __init__(self, editor: "httpx.Client", runner_url: str) -> None:
         self._client = editor
@@ -68,7 +68,8 @@ class Server:
         return str(self._client.base_url).rstrip("/")
 
     def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
-        """Ask the editor; a refusal becomes one sentence."""
+        """Send a request to the editor, and return its answer. Raise RequestRefused, with one
+        sentence, if it is refused."""
         return _asked(self._client, method, path, **body)
 
     def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
@@ -76,7 +77,8 @@ class Server:
         return _asked(self._client, method, self._runner_url + path, **body)
 
     def graph_id(self, asked: str) -> str:
-        """The id of a graph that is named by id or name."""
+        """Return the id of the graph with this id or name. Raise RequestRefused unless exactly one
+        matches."""
         graphs = self.editor("GET", "/api/graphs").json()
         if any(graph["id"] == asked for graph in graphs):
             return asked
@@ -94,7 +96,7 @@ class Server:
 
 
 class RequestRefused(Exception):
-    """The answer is no; `status` is that of HTTP, 0 where nobody was asked."""
+    """A request was refused. `status`: the HTTP status; 0 if no request was sent."""
 
     def __init__(self, why: str, status: int = 0) -> None:
         super().__init__(why)
@@ -128,7 +130,8 @@ def sentence(answer: "httpx.Response") -> str:
 
 @contextmanager
 def running(options: argparse.Namespace) -> Iterator[Server]:
-    """The server that a command speaks to, with the token. Raises CannotStart, No."""
+    """Yield a client, with the token, of the server that the options name. Raise CannotStart if it
+    is not reached or not proven, RequestRefused if it refuses the token."""
     import httpx
 
     with httpx.Client(**reach(options)) as client:

@@ -32,21 +32,21 @@ COMMANDS: Final = {"diff": _add_diff}
 
 
 class _Moment(NamedTuple):
-    """A graph of the server after one of its changes; now, where `seq` is None."""
+    """A graph of the server after its change `seq`; None for its newest state."""
 
     graph: str
     seq: int | None
 
 
 class _Version(msgspec.Struct):
-    """A published version, as far as it is compared."""
+    """A published version, with the fields that a comparison needs."""
 
     id: str
     umrf: msgspec.Raw
 
 
 def _diff(options: argparse.Namespace) -> int:
-    """Exit code 0: nothing differs; 1: something does."""
+    """Run the command; return 0 if the two are equal, 1 if they differ, 2 if one cannot be read."""
     given = [options.before, options.after]
     try:
         if all(Path(each).is_file() for each in given):
@@ -107,7 +107,7 @@ def _fetched(server: Server, place: str | _Moment | _Version) -> tuple[str, byte
 
 
 def _of_texts(before: tuple[str, bytes], after: tuple[str, bytes]) -> Difference:
-    """Actions are the same if they are called the same: files know nothing else of them."""
+    """Compare two files. Actions are matched by name, since files have no other identity."""
     return difference((0, by_name(_graph(*before))), (0, by_name(_graph(*after))))
 
 

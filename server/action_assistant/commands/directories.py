@@ -27,16 +27,18 @@ class Owner(NamedTuple):
 
 
 class Directory(Protocol):
-    """One folder. Everything raises OSError, also for a name that is not exactly one component of a path."""
+    """One open folder. Every method raises OSError, also for a name that is not exactly one
+    component of a path."""
 
     def names(self) -> list[str]:
-        """Return the names of everything in it."""
+        """Return the names of all entries."""
 
     def status(self, name: str) -> os.stat_result:
         """Return the status of an entry, of a link that of the link itself."""
 
     def below(self, name: str, *, make: bool) -> "Directory":
-        """A folder in it, made if need be; to be closed."""
+        """Open a folder inside this one; with `make` create it if it is missing. The caller closes
+        it."""
 
     def read(self, name: str) -> tuple[bytes, int]:
         """Return the content of a file, and its mode."""
@@ -44,8 +46,8 @@ class Directory(Protocol):
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write a file that is not there yet, to the disk; all of it or nothing. Where it cannot be given
-        to the `owner`, it is not opened to this user's group instead."""
+        """Write a new file durably, all of it or nothing. If it cannot be given to `owner`, the
+        rights of the group are removed instead."""
 
     def complete(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
@@ -53,7 +55,7 @@ class Directory(Protocol):
         """Write the rest of a file that has the beginning of this content, to the disk."""
 
     def link(self, old: str, new: str) -> None:
-        """Give a file a second name that is not there yet, on the disk when this returns."""
+        """Give a file a second, unused name, durably."""
 
     def replace(self, new: str, name: str) -> None:
         """Give a file the name of another, on the disk when this returns."""
@@ -83,7 +85,7 @@ class HeldDirectory:
         return cls(os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC))
 
     def names(self) -> list[str]:
-        """Return the names of everything in it."""
+        """Return the names of all entries."""
         with os.scandir(self._at) as entries:
             return [each.name for each in entries]
 
@@ -145,7 +147,7 @@ class HeldDirectory:
         os.fsync(self._at)
 
     def replace(self, new: str, name: str) -> None:
-        """Rename `new` to `name`, replacing what stands there."""
+        """Rename `new` to `name`, replacing an existing file."""
         names = _component(new), _component(name)
         os.replace(*names, src_dir_fd=self._at, dst_dir_fd=self._at)
         os.fsync(self._at)  # the steps reach the disk in their order, too
@@ -173,7 +175,7 @@ class NamedDirectory:
         return cls(root)
 
     def names(self) -> list[str]:
-        """Return the names of everything in it."""
+        """Return the names of all entries."""
         return [path.name for path in self._path.iterdir()]
 
     def status(self, name: str) -> os.stat_result:
@@ -232,7 +234,7 @@ class NamedDirectory:
         os.link(self._path / _component(old), self._path / _component(new))
 
     def replace(self, new: str, name: str) -> None:
-        """Rename `new` to `name`, replacing what stands there."""
+        """Rename `new` to `name`, replacing an existing file."""
         _refuse_link(self._path / _component(name))
         (self._path / _component(new)).replace(self._path / name)
 
@@ -262,7 +264,8 @@ def _refuse_link(path: Path) -> None:
 
 
 def why(error: OSError) -> str:
-    """Return the reason of an error in words. With `O_NOFOLLOW`, a link is one level too many, or no folder."""
+    """Return the reason of an error in words. With `O_NOFOLLOW`, a link gives the errors of too
+    many links or of a path through no folder."""
     match error.errno:
         case errno.ELOOP:
             return "it is a link, which is not followed"

@@ -126,7 +126,7 @@ def refusal(name: Path | str, error: codec.Unreadable) -> str:
 
 
 def _at(where: Where) -> str:
-    """A place in words: line and column, then the pointer."""
+    """Return a place in words: line and column, then the JSON pointer."""
     return f"line {where.line}, column {where.column}{': ' if where.path else ''}{where.path}"
 
 
@@ -173,8 +173,8 @@ def _verdict(
 
 
 def _as_sub_graph(problem: Problem) -> Problem:
-    """A file may be meant for use inside another graph, which gives its entries their values; a start
-    of it by itself is refused all the same."""
+    """Make H7 a warning: the file may be a sub-graph that gets its values from outside, though
+    starting it by itself is refused."""
     if problem.code != "H7":
         return problem
     message = problem.message.removesuffix(" (As a sub-graph it may get one.)")
@@ -183,7 +183,7 @@ def _as_sub_graph(problem: Problem) -> Problem:
 
 
 def _given(paths: Sequence[Path]) -> dict[str, Graph]:
-    """The graphs of several files by name: each may be used inside another."""
+    """Return the graphs of several files by name, since one may be a sub-graph of another."""
     found: dict[str, Graph] = {}
     for path in paths:
         try:
@@ -208,7 +208,8 @@ def _print(verdict: CheckVerdict) -> None:
 
 
 def kind_word(problem: Problem) -> str:
-    """Return the word with which a line about a problem begins: `note` for what is so with nearly every graph."""
+    """Return the first word of a line about a problem: `note` for a problem that nearly every graph
+    has, else its severity."""
     return "note" if problem.code in QUIET else problem.severity
 
 
@@ -232,7 +233,7 @@ def _convert(options: argparse.Namespace) -> int:
 
 
 def _with_examples(path: Path, graph: Graph) -> Graph:
-    """The graph with examples as values; says which."""
+    """Return the graph with examples as values, and print which inputs got one."""
     offered = [problem for problem in checks.check(graph) if problem.fix == "take-example"]
     for problem in offered:
         name = problem.where.path.partition("/input_parameters/")[2].replace("/", "::")
@@ -320,7 +321,7 @@ def _script(path: Path) -> semantics.Script:
 
 
 def _library(folder: Path | None) -> Mapping[str, Graph]:
-    """The graphs of a folder by name; the engine indexes `*graph.json`."""
+    """Return the graphs of all `*graph.json` below a folder, by name, as the engine indexes them."""
     found: dict[str, Graph] = {}
     for path in sorted(folder.rglob("*graph.json")) if folder else ():
         try:

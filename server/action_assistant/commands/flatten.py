@@ -34,7 +34,7 @@ class GivenGraph(NamedTuple):
 
 
 def given_graph(path: Path) -> GivenGraph:
-    """The graph of a file. Raises CannotStart for one that an engine would not take either."""
+    """Read the graph of a file. Raise CannotStart if an engine would refuse the file."""
     try:
         reading = codec.read(file_text(path))
     except codec.Unreadable as error:
@@ -47,8 +47,8 @@ def given_graph(path: Path) -> GivenGraph:
 
 
 def given_graphs(paths: Iterable[Path]) -> dict[str, GivenGraph]:
-    """The graphs of files and of folders, by name; of two with one name the first counts. A file of a
-    folder that is no graph is left out, and that is said."""
+    """Return the graphs of files and folders, by name; the first of equal names counts. In a
+    folder, a file that is no graph is skipped with a message."""
     found: dict[str, GivenGraph] = {}
     for path in paths:
         for given in _below(path) if path.is_dir() else [given_graph(path)]:
@@ -101,7 +101,7 @@ COMMANDS: Final = {"flatten": _add_flatten}
 
 
 def _flatten(options: argparse.Namespace) -> int:
-    """Exit code 1: one graph would not do the same."""
+    """Run the command; return 1 if no single graph does the same as the hierarchy."""
     top = given_graph(options.file)
     given = given_graphs(options.graphs)
     known = actions_below(options.actions).keys() if options.actions else frozenset[str]()
@@ -129,7 +129,7 @@ def _flatten(options: argparse.Namespace) -> int:
 
 
 def _told(reason: FlatteningReason, top: GivenGraph, given: Mapping[str, GivenGraph]) -> str:
-    """A reason with the place of its action in the file of the graph that has it."""
+    """Return a line with a reason and the place of its action in the file of its graph."""
     if not reason.at:
         return f"{top.path}: {reason.message} ({reason.code})"
     last = reason.at[-1]

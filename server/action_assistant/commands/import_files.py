@@ -53,7 +53,7 @@ def _import(options: argparse.Namespace) -> int:
 
 
 class _Bringing:
-    """One call: what was brought so far, and whether anything was refused."""
+    """One call of the command: the files imported so far, and whether any was refused."""
 
     def __init__(self, server: Server, *, update: bool) -> None:
         self.code = 0
@@ -119,7 +119,7 @@ class _Bringing:
             )
 
     def _known(self) -> dict[str, str]:
-        """The documents of the library's actions by name."""
+        """Return the documents of the library's actions by name."""
         if self._documents is None:
             listed = self._server.editor("GET", "/api/actions").json()
             self._documents = {}
@@ -130,8 +130,8 @@ class _Bringing:
 
 
 def _action_files(folder: Path) -> Iterator[Path]:
-    """Files of actions below a folder, in the order of their paths; as colcon does, not below folders
-    that it ignores."""
+    """Yield the files of actions below a folder, sorted by path. Folders that colcon ignores are
+    skipped."""
     for at, folders, files in os.walk(folder):
         if not _IGNORED.isdisjoint(files):
             folders.clear()

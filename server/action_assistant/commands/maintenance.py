@@ -125,7 +125,8 @@ def _verify(options: argparse.Namespace) -> int:
 
 
 def _say(sentence: str, is_aside: bool) -> None:
-    """Print a sentence; beside a line that somebody keeps it is none of the output."""
+    """Print a sentence; with `is_aside` to stderr, since stdout then holds a line that programs
+    keep."""
     print(sentence, file=sys.stderr if is_aside else sys.stdout)
 
 
@@ -151,8 +152,8 @@ def _lines(given: str | None) -> list[str]:
 
 
 def _strange(journal: "_KnownJournal") -> list[str]:
-    """Return what stands in the schema of a journal that is not ours, in words. A database on a server may
-    hold what is others'."""
+    """Return sentences about objects in the schema of a journal that are not ours. A database on a
+    server is not checked, since it may have other users."""
     if not journal.url.startswith("sqlite:"):
         return []
     path = Path(make_url(journal.url).database or "")
@@ -216,7 +217,7 @@ def _rebuild(options: argparse.Namespace) -> int:
 
 
 class _KnownJournal(NamedTuple):
-    """One journal of a data folder, and how its events become tables."""
+    """One journal of a data folder, and the fold that computes its tables."""
 
     branch: Branch
     url: str
@@ -224,7 +225,7 @@ class _KnownJournal(NamedTuple):
 
 
 def _journals(options: argparse.Namespace) -> list[_KnownJournal]:
-    """Return every journal that there is. Raises CannotStart where there is none."""
+    """Return every journal of the data folder. Raise CannotStart if there is none."""
     from action_assistant.editor.log import database_location
     from action_assistant.editor.log.graph_events import fold as editor_fold
     from action_assistant.runner.projection import fold as runner_fold

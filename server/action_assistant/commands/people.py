@@ -124,8 +124,8 @@ def _revoke_at(server: Server, invitation: str) -> int:
 
 
 def _link(options: argparse.Namespace) -> int:
-    """The likeliest address first. Whoever has the link is the owner, so it leads only to what has
-    proven to know the token: anything else that listens there would be told it."""
+    """Print links by which the owner signs in, the likeliest address first. The link holds the
+    token, so only addresses of a server that has proven to know it are printed."""
     with running(options) as server:
         try:
             sharing = server.editor("GET", "/api/invitations").json()

@@ -182,8 +182,8 @@ def reached(options: argparse.Namespace) -> settings.Reachability:
 
 
 def _host(options: argparse.Namespace) -> str:
-    """Return the address to listen at. Raise CannotStart for one that opens more than was asked
-    for."""
+    """Return the address to listen at. Raise CannotStart for an address that is reachable by more
+    than the options allow."""
     host: str = options.host or (settings.EVERYWHERE if options.share else "127.0.0.1")
     if options.share and host in {"0.0.0.0", "::"}:
         host = settings.EVERYWHERE

@@ -225,7 +225,7 @@ def _why(run: Run) -> str:
 
 
 def _at_rest(options: argparse.Namespace) -> int:
-    """Take somebody's word for what no answer of an engine can prove."""
+    """Record a person's word that a run is at rest, where no engine can prove it."""
     with running(options) as server:
         try:
             path = f"/api/runs/{options.run}/at_rest"
@@ -237,8 +237,8 @@ def _at_rest(options: argparse.Namespace) -> int:
 
 
 def verdict(run: dict[str, Any]) -> tuple[int, str]:
-    """The exit code for a run that is over, and its end in words. Robots do not tell results: what has
-    finished went well unless something is known to have failed, as an action in error is."""
+    """Return the exit code for a run that is over, and its end in words. A robot reports no result,
+    so a finished run counts as good unless an action failed."""
     if run["state"] != "finished" or run["result"] is not None:
         words = f"{run['state']} ({run['result']})" if run["result"] else str(run["state"])
         return 0 if run["state"] == "finished" and run["result"] == "on_true" else 1, words
@@ -249,8 +249,8 @@ def verdict(run: dict[str, Any]) -> tuple[int, str]:
 
 
 def insisting(server: Server, method: str, path: str) -> Any:
-    """An answer about a Stop, also when a connection breaks: it may come several times. Raises No,
-    CannotStart after some seconds without one."""
+    """Send a request about a Stop, and repeat it while the connection fails. Raise RequestRefused
+    if it is refused, CannotStart after some seconds without an answer."""
     deadline = time.monotonic() + _INSIST_S
     while True:
         try:
@@ -262,7 +262,7 @@ def insisting(server: Server, method: str, path: str) -> Any:
 
 
 def _stop(options: argparse.Namespace) -> int:
-    """Want it stopped, then wait for what proves that nothing moves."""
+    """Request a Stop, then wait for the proof that nothing moves; return the exit code."""
     with running(options) as server:
         try:
             path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
@@ -297,7 +297,7 @@ def _unconfirmed(run: Run) -> str:
 
 
 def _unproven(stopped: dict[str, list[str]], robots: list[dict[str, Any]]) -> list[str]:
-    """Return one sentence for each graph of others that is not proven to be at rest."""
+    """Return one sentence for each graph started by others that is not proven to be at rest."""
     known = {robot["name"]: robot for robot in robots}
     found: list[str] = []
     for name, graphs in stopped.items():

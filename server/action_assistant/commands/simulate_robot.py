@@ -178,14 +178,14 @@ def _script(path: Path | None) -> Script:
 
 
 def _index(folder: Path) -> EmulatedIndex:
-    """Return what an engine would index in a folder. Raise CannotStart where there is no folder."""
+    """Return what an engine would index in a folder. Raise CannotStart if there is no folder."""
     if not folder.is_dir():
         raise CannotStart(f"There is no folder {folder}.")
     return _found(folder)
 
 
 def _found(folder: Path) -> EmulatedIndex:
-    """Files that cannot be read are skipped."""
+    """Return the index of a folder; files that cannot be read are skipped."""
     return index_of(_texts(folder, "umrf.json"), _texts(folder, "graph.json"))
 
 

@@ -52,7 +52,7 @@ class AfterProof(httpx.Auth):
 
 
 def _peer(answer: httpx.Response) -> str:
-    """To whom we are connected."""
+    """Return the address and port to which an answer's connection leads; "" if unknown."""
     try:
         host, port, *_ = answer.extensions["network_stream"].get_extra_info("server_addr")
     except (OSError, KeyError, TypeError, ValueError):

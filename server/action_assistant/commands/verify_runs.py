@@ -17,8 +17,8 @@ from action_assistant.umrf.semantics import script_from
 class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
     """The verdict on one expected run.
 
-    `against` says which graph was simulated: the one that was sent `then`, or the one that is there
-    `now`.
+    `against`: the graph that was simulated, either the one that the run was sent (`then`) or the
+    present one (`now`).
     """
 
     name: str
@@ -60,7 +60,8 @@ def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVer
 
 
 def _now(server: Server, each: Expectation, graph: str) -> VerifyVerdict:
-    """Against the graph as it is now. One that is gone cannot be asked any more."""
+    """Compare an expected run with the present state of its graph; fail if the graph does not exist
+    any more."""
     try:
         umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
     except RequestRefused as error:

@@ -44,7 +44,8 @@ class NoRoom(CannotStart):
 
 
 class JournalCopy(msgspec.Struct, frozen=True):
-    """One journal in a backup: its last position, SHA-256 of the file, and its size."""
+    """One journal in a backup: the position of its last event, and the SHA-256 and size of its
+    file."""
 
     events: int
     sha256: str
@@ -79,7 +80,8 @@ class BackupManifest(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Packer:
-    """Writes a backup, which is there under its name once `close` returns, or not at all."""
+    """Writes a backup file. It has its final name once `close` returns; until then no file has that
+    name."""
 
     def __init__(self, folder: Path, progress: Progress) -> None:
         self.files: dict[str, BackupPart] = {}
@@ -105,7 +107,7 @@ class Packer:
         self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
 
     def close(self, about: BackupManifest, target: Path, prove: Callable[[Path], None]) -> None:
-        """Say what it is, have it proven, and put it into its place."""
+        """Add the manifest, finish the file, verify it by `prove`, and rename it to `target`."""
         self._write(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
         self._zip.close()
         self._raw.flush()
@@ -133,7 +135,7 @@ class Packer:
 
 
 class Package:
-    """A backup that is read. Nothing of it is written before all of it that it says was looked at."""
+    """Reads a backup file. Nothing is unpacked before its manifest and total size were checked."""
 
     def __init__(self, source: Path) -> None:
         self._source = source
@@ -222,7 +224,8 @@ class Package:
         )
 
     def _parts(self) -> dict[str, tuple[zipfile.ZipInfo, str]]:
-        """Every file that belongs to it, as it lies in the zip, and its SHA-256."""
+        """Return the zip entry and the SHA-256 of every file of the backup, by name. Raise
+        CannotStart if a part is missing or has an impossible name."""
         sizes = {f"{branch}.db": each.bytes for branch, each in self.about.journals.items()}
         digests = {f"{branch}.db": each.sha256 for branch, each in self.about.journals.items()}
         for name, held in self.about.files.items():
@@ -278,7 +281,7 @@ def sha256_of(path: Path) -> str:
 
 
 def _is_place(name: str) -> bool:
-    """Return whether a name leads to a path below one of the two folders, and nowhere else."""
+    """Return whether a name in a backup is a plain relative path below FILES or ARCHIVE."""
     parts = PurePosixPath(name).parts
     plain = all(each not in {"", ".", ".."} and each.isprintable() for each in name.split("/"))
     return plain and len(parts) > 1 and parts[0] in {FILES, ARCHIVE} and "\\" not in name

@@ -57,7 +57,7 @@ _AT_WORK: Final = ".at-work"
 
 
 def belongings(data: Path) -> Iterator[tuple[str, Path]]:
-    """Files that are taken along, with their places in the folder."""
+    """Yield the files beside the journals that a backup includes: relative path and path of each."""
     for name in sorted(MERGED | WHOLE):
         top = data / name
         for path in sorted(top.rglob("*")) if top.is_dir() else [top]:
@@ -90,7 +90,7 @@ def is_database(path: Path) -> bool:
 
 
 def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> None:
-    """A SQLite file as it is at one moment, while others may write."""
+    """Copy a consistent state of a SQLite file while other processes may write to it."""
 
     def tell(_: int, remaining: int, total: int) -> None:
         progress.tell(f"{name}: {total - remaining} of {total} pages copied")
@@ -158,7 +158,7 @@ def checked(
 
 
 def aside_folder(data: Path, prefix: str = ASIDE) -> Path:
-    """A new folder for what was there before."""
+    """Create and return a new folder, named by the time, for files that are replaced."""
     name = time.strftime(f"{prefix}%Y%m%d-%H%M%S")
     for number in count(1):
         path = data / (name if number == 1 else f"{name}-{number}")
@@ -171,14 +171,15 @@ def aside_folder(data: Path, prefix: str = ASIDE) -> Path:
 
 
 def rows_of(path: Path, question: Select[Any]) -> list[Row[Any]]:
-    """Ask a SQLite file that nobody writes."""
+    """Return the rows of a query on a SQLite file that no process writes."""
     found: list[Row[Any]] = []
     database_of(f"sqlite:///{path}").look(lambda c: found.extend(c.execute(question).all()))
     return found
 
 
 def archived(runner: Path) -> dict[str, str]:
-    """Places of archives, in their folder, and what their SHA-256 is by the copy of a journal."""
+    """Return the archives that the copy of the runner's journal names: their SHA-256 by path in the
+    archive folder."""
     if not runner.exists():
         return {}
     event = runner_event.c
@@ -198,8 +199,8 @@ def archived(runner: Path) -> dict[str, str]:
 
 @contextmanager
 def workshop(parent: Path, prefix: str) -> Iterator[Path]:
-    """A folder for the work, on the disk where its result will lie, for this user alone; nobody else
-    sweeps it away meanwhile. Faults of disk and databases become CannotStart."""
+    """Yield a temporary folder on the disk of the result, private to this user and locked against
+    `sweep`. Errors of disk and database are raised as CannotStart."""
     try:
         with tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as folder:
             held = opener(str(Path(folder) / _AT_WORK), os.O_RDWR | os.O_CREAT)

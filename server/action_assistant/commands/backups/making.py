@@ -53,8 +53,8 @@ _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 class FinishedBackup(msgspec.Struct, frozen=True):
     """A finished backup and its content.
 
-    `strangers` names what stood in the schema of a journal, is not this program's, and was left
-    out.
+    `strangers` names tables and other objects in the schema of a journal that are not this
+    program's and were left out.
     """
 
     made: BackupMade
@@ -66,7 +66,8 @@ class FinishedBackup(msgspec.Struct, frozen=True):
 def make_backup(
     data: Path, database: str | None, target: Path, progress: Progress
 ) -> FinishedBackup:
-    """Write a backup of a data folder to a file. Raises CannotStart, and then there is none."""
+    """Write a backup of a data folder to a file. Raise CannotStart if that fails; no file is left
+    then."""
     begun, at, sources = time.monotonic(), time.time(), _sources(data, database)
     _check_room(data, sources, target.parent)
     with workshop(target.parent, WORK) as folder:
@@ -159,7 +160,7 @@ def _size(source: str) -> int:
 
 
 def _read_back(part: Path, progress: Progress) -> None:
-    """Prove that a finished file holds what was written. Raise CannotStart otherwise."""
+    """Verify that a finished backup file holds what was written. Raise CannotStart otherwise."""
     package = Package(part)
     try:
         package.prove(progress)
@@ -168,7 +169,7 @@ def _read_back(part: Path, progress: Progress) -> None:
 
 
 def _copy(source: str, branch: Branch, target: Path, progress: Progress) -> None:
-    """Copy a journal as it is at one moment into a SQLite file."""
+    """Copy a consistent state of a journal into a SQLite file."""
     from action_assistant.journal.copies.copying import copy
 
     target.touch(mode=0o600)
@@ -216,7 +217,8 @@ def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple
 
 
 def _archives(packer: Packer, kept: Path, runner: Path) -> list[str]:
-    """Take in all archives; those that the journal names and that are not as it says."""
+    """Add all archives to the backup. Return a sentence for each archive that the journal names and
+    that is missing or altered."""
     for path in sorted(path for top in _ARCHIVES for path in (kept / top).rglob("*.gz")):
         packer.file(f"{ARCHIVE}/{path.relative_to(kept).as_posix()}", path)
     missing = []

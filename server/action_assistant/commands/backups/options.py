@@ -46,7 +46,7 @@ def parse_retention(text: str) -> RetentionRule:
 
 
 def name_at(moment: datetime) -> str:
-    """Return the file name of a backup that was begun at this moment."""
+    """Return the file name of a backup that was begun at this time."""
     return f"action-assistant-{moment.astimezone(UTC).strftime(_STAMP)}Z.zip"
 
 
@@ -102,7 +102,7 @@ def add_rules(parser: argparse.ArgumentParser, prefix: str) -> None:
 
 
 def span(text: str) -> float:
-    """A time such as 30m, 24h or 7d, in seconds."""
+    """Parse a duration such as 30m, 24h or 7d; return it in seconds."""
     found = _SPAN.fullmatch(text.strip())
     if found is None or float(found[1]) * _SECONDS[found[2]] < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no time such as 30m, 24h or 7d")

@@ -10,10 +10,10 @@ _EVERY: Final = 1.0  # seconds
 
 
 class Progress:
-    """Reports how far long work has come, on stderr.
+    """Reports the progress of long work on stderr.
 
-    It writes nothing in the first second, and then one text a second: over the last one on a
-    terminal, on lines of their own elsewhere.
+    It writes nothing in the first second, then one text a second: on a terminal each replaces the
+    last, elsewhere each has its own line.
     """
 
     def __init__(self) -> None:
@@ -40,7 +40,7 @@ class Progress:
 
 
 def _steer(text: str) -> None:
-    """To the terminal itself, past what makes everything else plain."""
+    """Write control characters to the terminal itself, past the filter that makes output plain."""
     stream = sys.__stderr__ or sys.stderr
     stream.write(text)
     stream.flush()

@@ -44,8 +44,8 @@ _NICE: Final = 19  # the least of a processor
 
 
 class RegularBackups(msgspec.Struct, frozen=True):
-    """The settings of regular backups: source, target folder, rule of what stays, command for
-    finished ones."""
+    """The settings of regular backups: source, target folder, retention rule, and the command that
+    is called with each finished backup."""
 
     data: Path
     database: str | None
@@ -76,8 +76,8 @@ def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, O
 
 
 def keep_making(plan: RegularBackups, every: float) -> int:
-    """Make one every so many seconds, until told to end or the process that started us dies. Nothing
-    else waits for it: it takes what others leave of processor and disk."""
+    """Make a backup every `every` seconds, until SIGTERM or the end of the parent process. It runs
+    at low priority."""
     os.nice(_NICE)
     signal.signal(signal.SIGTERM, _end)
     parent = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
@@ -107,7 +107,7 @@ def keep_making(plan: RegularBackups, every: float) -> int:
 
 
 def told(done: FinishedBackup, off_site: OffSite | None) -> str:
-    """One line about a backup."""
+    """Return one line about a finished backup."""
     made = done.made
     text = f"backup {made.file}: {made.bytes / 2**20:.1f} MiB in {made.seconds:.1f} s, proven"
     if made.missing:
@@ -119,7 +119,7 @@ def told(done: FinishedBackup, off_site: OffSite | None) -> str:
 
 @contextlib.contextmanager
 def _alone(into: Path) -> Iterator[None]:
-    """One backup into a folder at a time; what is left of one that was killed goes."""
+    """Allow one backup into a folder at a time, and remove what a killed one has left."""
     make_folder(into)
     lock = opener(str(into / _LOCK), os.O_RDWR | os.O_CREAT)
     try:
@@ -132,7 +132,7 @@ def _alone(into: Path) -> Iterator[None]:
 
 
 def _free(into: Path) -> Path:
-    """A name that no backup has yet, also none of another server."""
+    """Return a file name that no backup in the folder has yet."""
     while (target := into / name_at(datetime.now(UTC))).exists():
         time.sleep(0.1)  # names tell the second
     return target
@@ -154,7 +154,8 @@ def _is_anothers(path: Path, done: FinishedBackup) -> bool:
 
 
 def _taken_away(command: str | None, path: Path) -> OffSite | None:
-    """Run the command with the path as its last argument. What it says goes to where we say things."""
+    """Run the command with the path of the backup as its last argument; its output goes to our log.
+    Return how that ended; None without a command."""
     if not command:
         return None
     begun = time.monotonic()
@@ -194,8 +195,8 @@ def _first(plan: RegularBackups, every: float) -> float:
 
 
 def _wait_until(due: float, parent: str | None) -> bool:
-    """False when the process that started us has died meanwhile: its end of the pipe is closed. In
-    slices, since clocks are set."""
+    """Wait until `due` (seconds since 1970). Return False if the parent process, which holds the
+    other end of the pipe `parent`, ends first. It waits in slices, since clocks are set."""
     while (left := due - time.time()) > 0:
         ends = [] if parent is None else [int(parent)]
         if select.select(ends, [], [], min(left, 60.0))[0]:

@@ -34,7 +34,7 @@ Tell: TypeAlias = Callable[[str], None]
 
 
 class Findings:
-    """The sentences of a rehearsal: what was looked at, and what is not sound."""
+    """The sentences of a rehearsal: what was checked, and what is wrong."""
 
     def __init__(self) -> None:
         self.looked_at: list[str] = []
@@ -43,7 +43,8 @@ class Findings:
 
 
 def rehearse(source: Path, data: Path) -> int:
-    """The command: 1 when something is not sound. Raises CannotStart where that cannot be told."""
+    """Run the command; return 1 if anything is wrong with the backup. Raise CannotStart if that
+    cannot be determined."""
     if not source.is_file():
         raise CannotStart(f"There is no file {source}.")
     begun, at, progress, found = time.monotonic(), time.time(), Progress(), Findings()
@@ -149,7 +150,7 @@ async def _opened(
 
 
 async def _look_at_graphs(journal: Journal, folder: Path, found: Findings, tell: Tell) -> None:
-    """Every document is read to its end, every version has its digest, every link can be read."""
+    """Read every document to its end, and check the digest of every version and every invitation."""
     from action_assistant.editor.crdt.loading import stored
     from action_assistant.editor.crdt.replica import ReplicaState
     from action_assistant.editor.documents import contents
@@ -200,7 +201,7 @@ async def _versions(journal: Journal, found: Findings, tell: Tell) -> int:
 
 
 async def _look_at_runs(journal: Journal, folder: Path, found: Findings, tell: Tell) -> None:
-    """Every run is folded from its events, which may be in an archive."""
+    """Fold every run from its events, in the journal or an archive."""
     from action_assistant.runner.archives.archive_store import ArchiveStore
     from action_assistant.runner.runs.history import RunHistory
     from action_assistant.web.workers.lanes import run_here

@@ -51,10 +51,10 @@ _LAST: Final = select(_event.position, _event.chain).order_by(_event.position.de
 
 
 class RestoreUnderWay(msgspec.Struct, frozen=True):
-    """The restore that is under way, for a later run that continues it.
+    """A restore that has begun; a later call reads this and continues it.
 
-    `sha256` is that of the editor's journal in the backup. `position` and `chain` are the end of
-    the log that it becomes here.
+    `sha256`: the hash of the editor's journal in the backup. `position` and `chain`: the end of the
+    log after the restore.
     """
 
     sha256: str
@@ -108,7 +108,7 @@ def _make(data: Path) -> None:
 
 
 def check_names(about: BackupManifest, source: Path) -> None:
-    """A backup may write what belongs to a data folder, and nothing else there."""
+    """Refuse a backup with a file that does not belong to a data folder. Raise CannotStart then."""
     for name in about.files:
         top, inner = name.split("/")[:2]
         if top == FILES and inner not in MERGED | WHOLE:
@@ -116,7 +116,7 @@ def check_names(about: BackupManifest, source: Path) -> None:
 
 
 def _check_folder(data: Path, source: Path) -> None:
-    """Not among the things of others."""
+    """Refuse a folder with files of other programs and none of this one. Raise CannotStart then."""
     strangers = [path for path in left_out(data) if path != source]
     if strangers and not any((data / name).exists() for name in (*_JOURNALS, *WHOLE, *_MARKS)):
         names = ", ".join(path.name for path in strangers[:3])
@@ -128,8 +128,8 @@ def _check_folder(data: Path, source: Path) -> None:
 def _put(
     folder: Path, data: Path, url: str, about: BackupManifest, progress: Progress
 ) -> tuple[Path | None, list[str]]:
-    """Put everything into its place; return the folder with what was there before, and the names
-    that were kept."""
+    """Move the unpacked parts into the data folder. Return the folder that holds the replaced
+    files, and the names of existing files that were kept instead of the backup's."""
     from action_assistant.editor.log import database_location, epochs
 
     mark, is_own = data / settings.RESTORING, database_location.is_own(data, url)
@@ -218,7 +218,7 @@ def _is_there(url: str, under: RestoreUnderWay, about: BackupManifest) -> bool:
 
 
 def _placed(folder: Path, name: str, data: Path) -> bool:
-    """Put a file into its place; False when another one stays there. Nothing is overwritten."""
+    """Move an unpacked file to its target; return False if another file is there, which is kept."""
     top, _, inner = name.partition("/")
     base = data if top == FILES else settings.keep(data).folder
     source, target = folder / name, base / inner
@@ -238,7 +238,7 @@ def _placed(folder: Path, name: str, data: Path) -> bool:
 
 
 def _move(source: Path, target: Path) -> None:
-    """There as a whole or not at all, also on another disk."""
+    """Move a file or folder atomically and durably, also to another disk."""
     part = source
     if source.stat().st_dev != target.parent.stat().st_dev:
         part = target.with_name(f".{target.name}.part")
@@ -251,7 +251,8 @@ def _move(source: Path, target: Path) -> None:
 
 
 def _locked(data: Path, branch: Branch) -> int:
-    """Keep everybody else out of a journal, also out of one that cannot be opened."""
+    """Lock a journal against all other processes, also one that cannot be opened. Return the
+    descriptor of the lock."""
     from action_assistant.journal.sqlite import own
 
     try:
@@ -261,7 +262,7 @@ def _locked(data: Path, branch: Branch) -> int:
 
 
 def _exchange(new: Path, old: Path, aside: Path | None) -> None:
-    """Put a file in the place of another, which is kept. At no moment is there none."""
+    """Replace a file atomically; link the old one into the folder `aside` first."""
     for path in (old, old.with_name(f"{old.name}-wal")):
         if aside is not None and path.exists() and not (aside / path.name).exists():
             os.link(path, aside / path.name)

@@ -114,7 +114,7 @@ def _url(data: Path, database: str | None, copy: UpgradeCopy) -> str:
 
 
 def _place(url: str) -> Path | str:
-    """The file, or the URL of what is on a server."""
+    """Return the path of a SQLite file, or the URL of a database on a server."""
     parsed = make_url(url)
     return Path(parsed.database or "") if parsed.get_backend_name() == "sqlite" else url
 
@@ -203,7 +203,8 @@ def _put_rows(data: Path, copy: UpgradeCopy, url: str, progress: Progress) -> No
 def _exchanged(
     connection: Connection, copy: UpgradeCopy, aside: Path, progress: Progress
 ) -> tuple[int, int]:
-    """All tables of ours are those of the copy; how many events there are, and were."""
+    """Replace all our tables by the tables of the copy, after copying the present ones to `aside`.
+    Return how many events there are now, and were before."""
     try:
         current = recognize(connection)
     except NewerSchema as error:  # none of its tables may stay behind, and we do not know them
@@ -253,7 +254,7 @@ def _tell(copy: UpgradeCopy, place: str, then: int, now: int | None, aside: Path
 
 @contextmanager
 def _told(folder: Path) -> Iterator[None]:
-    """Faults of the disk, in a sentence."""
+    """Turn errors of the disk into CannotStart with a sentence."""
     try:
         yield
     except OSError as error:

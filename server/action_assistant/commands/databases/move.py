@@ -205,8 +205,8 @@ def _source(data: Path, known: str, given: str | None) -> str:
 
 
 def _into_server(data: Path, source: str, target: str, progress: Progress) -> int:
-    """Copy, compare, and have the folder remember the other one; how many events. Raises CannotStart,
-    and then everything is as it was."""
+    """Copy the graphs into a database on a server, compare, and switch to it; return the number of
+    events. Raise CannotStart if that fails; nothing has changed then."""
     return copy(
         database_of(source),
         database_of(target),
@@ -244,7 +244,7 @@ def _into_folder(
 
 
 def _tidy(data: Path, target: str) -> None:
-    """Remove what a move left that was killed after the folder remembered the other database."""
+    """Remove what is left of a move that was killed after the switch to the other database."""
     try:
         lock = own(data / "editor.db")
     except CannotStart:
@@ -299,8 +299,8 @@ def _switch(
 
 
 def _put_aside(data: Path, keep: str = "") -> Path | None:
-    """The file in the data folder is not the truth (any more): it keeps what it holds, under a name that
-    says what it is. Not if it is the one to `keep`."""
+    """Move `editor.db` of the data folder into a new folder, since it is not the database in use.
+    Return that folder; None if there is no such file or it is the database `keep`."""
     path = data / "editor.db"
     if not path.exists() or keep == f"sqlite:///{path}":
         return None

@@ -87,7 +87,7 @@ async def once(copier: "RunsCopier", name: str) -> int:
 
 
 async def followed(copier: "RunsCopier") -> int:
-    """Copy what is new again and again."""
+    """Copy new events again and again, until cancelled."""
     away = False
     try:
         while True:
@@ -109,8 +109,7 @@ async def followed(copier: "RunsCopier") -> int:
 
 
 class RunsCopier:
-    """Brings the copy up to what the log is. `missing`: runs whose events are in an archive that is not
-    there."""
+    """Brings the copy of the runner's log up to date. `missing`: runs whose archive is not there."""
 
     def __init__(self, path: Path, kept: Path, engine: AsyncEngine, progress: Progress) -> None:
         self.missing: list[str] = []
@@ -152,8 +151,8 @@ class RunsCopier:
             return await connection.run_sync(work, *values)
 
     async def _check(self, last: int) -> None:
-        """The copy is of this very log. Events of archived runs are not there any more, so the newest
-        that is has to be the same in both."""
+        """Check that the copy is of this very log. Events of archived runs are removed from the
+        log, so the newest event that it still has must be equal in both."""
         chosen = select(runner_event.c.position, runner_event.c.chain)
         chosen = chosen.where(runner_event.c.position <= last)
         rows = await self._log.query(chosen.order_by(runner_event.c.position.desc()).limit(1))
@@ -164,7 +163,7 @@ class RunsCopier:
                 raise CannotStart(_another(f"event {row.position} is another one"))
 
     async def _store(self, events: Sequence[Event], chains: dict[int, bytes]) -> None:
-        """Events and the rows of their runs, in one transaction."""
+        """Store events and the rows of their runs in one transaction."""
         runs = {name for each in events if (name := _run_of(each.stream))}
         rows = await self._rows(sorted(runs))
         rows["robot"] = [
@@ -182,7 +181,7 @@ class RunsCopier:
         return found
 
     async def _summed(self) -> None:
-        """Runs that were summed up since their last event."""
+        """Update the rows of runs whose review was computed after their last event."""
         behind = await self._do(_not_summed)
         for start in range(0, len(behind), _PAGE):
             some = behind[start : start + _PAGE]
@@ -192,7 +191,7 @@ class RunsCopier:
                 await self._do(_write, [], {}, runs, await self._rows(runs))
 
     async def _archived(self) -> None:
-        """Runs that were archived before anything was copied: their events are read from there."""
+        """Copy the runs that were archived before the copy began, from their archives."""
         chosen = select(run.c.id, run.c.number).where(run.c.archived_as.is_not(None))
         there = await self._do(_streams)
         for row in await self._log.query(chosen.order_by(run.c.number)):
@@ -216,7 +215,7 @@ def _prepare(connection: Connection) -> None:
 
 
 def _last(connection: Connection) -> int:
-    """Up to where the log was copied; what came from archives by itself is from before."""
+    """Return the position up to which the log was copied. Events from archives do not count."""
     chosen = select(func.max(_event.c.position)).where(_event.c.chain.is_not(None))
     return int(connection.execute(chosen).scalar() or 0)
 
@@ -242,7 +241,7 @@ def _write(
     runs: Sequence[str],
     rows: dict[str, list[dict[str, Any]]],
 ) -> None:
-    """Events that are not there yet, and the rows of some runs as they are now."""
+    """Insert events that the copy lacks, and replace the rows of some runs."""
     if events:
         values = [
             {name: getattr(each, name) for name in Event.__struct_fields__}
@@ -262,7 +261,8 @@ def _write(
 
 
 def _storable(row: dict[str, Any]) -> dict[str, Any]:
-    """A row without NUL in its texts, of which Postgres holds none. The event has it."""
+    """Return a row with each NUL in its texts replaced, since Postgres cannot store it; the event
+    keeps it."""
     return {
         name: value.replace("\0", "\ufffd") if isinstance(value, str) else value
         for name, value in row.items()

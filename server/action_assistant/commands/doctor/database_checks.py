@@ -71,7 +71,7 @@ def fault(url: str, error: Exception) -> Diagnostic:
 
 
 def _causes(error: BaseException) -> Iterator[BaseException]:
-    """An error and all that it came from."""
+    """Yield an error and all its causes and contexts."""
     waiting: list[BaseException | None] = [error]
     seen: list[BaseException] = []
     while waiting:
@@ -137,8 +137,8 @@ def _last(connection: Connection) -> int:
 
 
 def _wrong(connection: Connection, heads: dict[str, Head], row: Sequence[Any]) -> str:
-    """Return a clause about what is wrong with an event, given those before it; empty if it is
-    sound."""
+    """Return a clause about what is wrong with an event, given the events before it; empty if it is
+    sound. `heads` is updated."""
     stream, seq = row[0], row[1]
     if tuple(map(type, row)) != _TYPES:
         return f"one of {stream!r} holds values of the wrong kind"
@@ -154,7 +154,8 @@ def _wrong(connection: Connection, heads: dict[str, Head], row: Sequence[Any]) -
 
 
 def _before(connection: Connection, stream: str, seq: int) -> Head | None:
-    """The chain before an event; None where that event is not here (any more)."""
+    """Return the head of a stream before an event; None if the previous event is not in the
+    database."""
     if seq == 1:
         return NOTHING
     chosen = select(_event.chain).where(_event.stream == stream, _event.seq == seq - 1)
@@ -163,7 +164,7 @@ def _before(connection: Connection, stream: str, seq: int) -> Head | None:
 
 
 def _wrong_ends(connection: Connection, heads: dict[str, Head]) -> str:
-    """Return a clause about a stream that does not end where its head says; empty if there is none."""
+    """Return a clause about a stream that does not end where its head says; empty if all do."""
     names = list(heads)[:500]
     chosen = select(_head.stream, _head.seq, _head.chain).where(_head.stream.in_(names))
     for row in connection.execute(chosen):
@@ -173,7 +174,8 @@ def _wrong_ends(connection: Connection, heads: dict[str, Head]) -> str:
 
 
 def _cut_off(connection: Connection) -> str:
-    """A stream of graphs whose last event is not there. Those of runs may be in archives."""
+    """Return a clause about a stream of the editor whose last event is missing; empty otherwise.
+    Streams of runs are not checked, since they may be in archives."""
     if not inspect(connection).has_table(graph.name):
         return ""
     last = select(_event.seq).where(_event.stream == _head.stream, _event.seq == _head.seq)
@@ -193,7 +195,7 @@ _NEWER: Final = (
 
 
 def graphs_are_there(place: Installation) -> Iterator[Diagnostic]:
-    """The editor's database, wherever it is."""
+    """Check the editor's database, in the data folder or on a server."""
     data = place.data
     try:
         url = place.database or database_location.of(data)
@@ -245,7 +247,7 @@ def runs_are_there(place: Installation) -> Iterator[Diagnostic]:
 
 
 class _DatabaseFindings(msgspec.Struct):
-    """The findings of one look into a database."""
+    """The findings of one examination of a database."""
 
     damage: str = ""
     newest: int | None = None
@@ -279,7 +281,8 @@ def _in_file(what: str, file: Path) -> Iterator[Diagnostic]:
 
 
 def _examine(database: Database, connection: Connection, seen: _DatabaseFindings) -> None:
-    """Into a database of this version or an earlier one. Raises CannotStart for others."""
+    """Examine a database of this version or an earlier one, and add the results to `seen`. Raise
+    CannotStart for any other database."""
     if recognize(connection):
         seen.damage = first_damage(database, connection)
         seen.newest = newest_at(connection)
@@ -329,7 +332,7 @@ def span(seconds: float) -> str:
 
 
 def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
-    """A database on a server: it answers, keeps what it confirms, and has the graphs."""
+    """Check that a database on a server answers, stores commits durably, and has the graphs."""
     shown = database_location.shown(url)
     database = database_of(url)
     try:

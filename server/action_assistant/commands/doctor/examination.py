@@ -52,8 +52,8 @@ def diagnose(place: Installation) -> list[Diagnostic]:
 def examine(
     place: Installation, checks: Iterable[Check] = CHECKS, seconds: float = PATIENCE_S
 ) -> Iterator[Diagnostic]:
-    """Begin to look at everything, and return what was found in the order of the checks, which run side by
-    side: some of them wait for what does not answer."""
+    """Start all checks side by side, since some wait for an answer, and yield their findings in the
+    order of the checks."""
     until = time.monotonic() + seconds
     threads = [_CheckThread(check, place) for check in checks]
     return (each for thread in threads for each in thread.seen(until))

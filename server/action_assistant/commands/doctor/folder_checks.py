@@ -130,7 +130,7 @@ def _unusable(data: Path, why: Path) -> Diagnostic:
 
 
 def _blocked(folder: Path) -> Path | None:
-    """Return the path that keeps us from creating a missing folder; None if it can be created."""
+    """Return the path that keeps us from creating a missing folder; None if nothing does."""
     above = next(each for each in folder.absolute().parents if each.exists())
     return None if above.is_dir() and os.access(above, os.W_OK | os.X_OK) else above
 
@@ -163,14 +163,15 @@ def _readable(data: Path) -> Iterator[Diagnostic]:
 
 
 def _listed(data: Path, paths: list[Path]) -> str:
-    """Some of them, by their names in the folder."""
+    """Return the first of these paths in one text, relative to the data folder, and how many more
+    there are."""
     names = [str(path.relative_to(data)) if path != data else str(data) for path in paths]
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     return ", ".join(names[:_SHOWN]) + more
 
 
 def token_is_there(place: Installation) -> Iterator[Diagnostic]:
-    """The token of a folder that was served; the environment's counts before it."""
+    """Check that a data folder that was served has a token, unless the environment gives one."""
     data, token = place.data, place.data / TOKEN_FILE
     served = any(
         (data / name).exists()
@@ -205,7 +206,7 @@ def token_is_there(place: Installation) -> Iterator[Diagnostic]:
 
 
 def nothing_was_interrupted(place: Installation) -> Iterator[Diagnostic]:
-    """A restore that was killed left a mark, with which nothing starts."""
+    """Report a restore that was interrupted, after which no process starts."""
     mark = place.data / settings.RESTORING
     if mark.exists():
         yield found(
@@ -217,7 +218,7 @@ def nothing_was_interrupted(place: Installation) -> Iterator[Diagnostic]:
 
 
 def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
-    """The folder into which older runs go."""
+    """Check the folder of archives."""
     try:
         folder = settings.keep(place.data).folder
     except CannotStart:  # told with the settings
@@ -249,7 +250,7 @@ def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
 
 
 def disk_has_room(place: Installation) -> Iterator[Diagnostic]:
-    """The disks of the data folder and of the archive."""
+    """Check the free space on the disks of the data folder and of the archive."""
     folders = [place.data]
     with suppress(CannotStart):  # told with the settings
         folders.append(settings.keep(place.data).folder)

@@ -9,10 +9,11 @@ from action_assistant.errors import CannotStart
 
 
 class Installation(msgspec.Struct, frozen=True, kw_only=True):
-    """A data folder, and where its processes should be: the editor at `port`, the runner after it.
+    """A data folder, and the ports of its processes: the editor at `port`, the runner at the next
+    one.
 
-    `database`: the editor's, if it is not the one that the folder remembers. `public_url`: where a
-    proxy shows the page; None takes ACTION_ASSISTANT_PUBLIC_URL.
+    `database`: the editor's, if not the one that the folder remembers. `public_url`: where a proxy
+    serves the page; None takes ACTION_ASSISTANT_PUBLIC_URL.
     """
 
     data: Path
@@ -23,7 +24,7 @@ class Installation(msgspec.Struct, frozen=True, kw_only=True):
 
     @staticmethod
     def port_of_settings() -> int:
-        """The editor's as the environment has it; the usual one where that is no port."""
+        """Return the editor's port by the environment; the default if that is no port."""
         try:
             return settings.port()
         except CannotStart:  # told as a finding
@@ -31,5 +32,5 @@ class Installation(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def processes(self) -> tuple[tuple[str, int], ...]:
-        """The editor and the runner, and their ports."""
+        """Return the names and ports of the editor and the runner."""
         return ("editor", self.port), ("runner", self.port + 1)

@@ -28,7 +28,7 @@ _HOST: Final = re.compile(r"[A-Za-z0-9_.:\[\]-]+")
 
 
 def settings_mean_something(place: Installation) -> Iterator[Diagnostic]:
-    """Every variable of ours that is set."""
+    """Check every environment variable of this program."""
     del place
     given = {name: value for name, value in os.environ.items() if name.startswith(_PREFIX)}
     problems = [each for name in sorted(given) for each in _setting(name, given[name])]
@@ -57,7 +57,7 @@ def _setting(name: str, value: str) -> Iterator[Diagnostic]:
 
 
 def _anything(_: str) -> None:
-    """A value that is read elsewhere."""
+    """Accept any value, since another check reads it."""
 
 
 def _limits(value: str) -> None:
@@ -97,7 +97,7 @@ def _metrics(name: str) -> Callable[[str], object]:
 
 
 def _argument(reads: Callable[[str], object]) -> Callable[[str], object]:
-    """A reader of an option, which raises as argparse wants it."""
+    """Return `reads` with the errors of argparse turned into CannotStart."""
 
     def read(value: str) -> object:
         try:
@@ -153,7 +153,7 @@ def program(place: Installation) -> Iterator[Diagnostic]:
 
 
 def page_is_built(place: Installation) -> Iterator[Diagnostic]:
-    """The page, whole, and in a checkout not older than what it is made of."""
+    """Check that the built page is complete and, in a checkout, not older than its sources."""
     del place
     folder = paths.page()
     index = folder / "index.html"
@@ -190,7 +190,8 @@ def page_is_built(place: Installation) -> Iterator[Diagnostic]:
 
 
 def _newer_source(built: float) -> Path | None:
-    """In a checkout, a source of the page that is newer than the page."""
+    """Return a source file of the page that is newer than the built page; None if there is none or
+    this is no checkout."""
     sources = paths.page_sources()
     if sources is None:
         return None
@@ -202,7 +203,7 @@ def _newer_source(built: float) -> Path | None:
 
 
 def descriptors_suffice(place: Installation) -> Iterator[Diagnostic]:
-    """Files and connections that a process may have open."""
+    """Check how many files and connections a process may have open."""
     del place
     most = limits.descriptors_allowed()
     if most < _DESCRIPTORS:
@@ -219,8 +220,8 @@ def descriptors_suffice(place: Installation) -> Iterator[Diagnostic]:
 
 
 def clock_is_possible(place: Installation) -> Iterator[Diagnostic]:
-    """A clock can be compared with the files of this program only; events and processes are compared
-    with it where they are looked at."""
+    """Check that the clock is not earlier than the files of this program. Other checks compare it
+    with events and processes."""
     del place
     newest = max(each.stat().st_mtime for each in Path(__file__).parent.glob("*.py"))
     if time.time() < newest - 86_400:
@@ -235,7 +236,7 @@ def clock_is_possible(place: Installation) -> Iterator[Diagnostic]:
 
 
 def shared_memory_is_there(place: Installation) -> Iterator[Diagnostic]:
-    """Workers and messages of ROS 2 go through it on Linux."""
+    """Check the shared memory that workers and ROS 2 use on Linux."""
     del place
     if not sys.platform.startswith("linux"):
         return

@@ -31,8 +31,8 @@ _PATIENCE_S: Final = 3.0
 class ProcessAnswer(msgspec.Struct, frozen=True, kw_only=True):
     """The answer of a process to `/healthz`.
 
-    `base` includes the scheme. `version` is "" for other programs. `clock_s` is how many seconds
-    the clock of the process is ahead of ours; None if it does not say.
+    `base` includes the scheme. `version` is "" for other programs. `clock_s`: how many seconds its
+    clock is ahead of ours; None if the answer has no date.
     """
 
     base: str
@@ -58,7 +58,8 @@ def listens(host: str, port: int) -> bool:
 
 
 def at_port(host: str, port: int) -> ProcessAnswer | None:
-    """Return the answer of the web server at a port, over http or https; None if none answers."""
+    """Return the answer of the web server at a port, over http or https; None if there is no
+    answer."""
     shown = _reached(host)
     shown = f"[{shown}]" if ":" in shown else shown
     for scheme in ("http", "https"):
@@ -72,7 +73,7 @@ def at_port(host: str, port: int) -> ProcessAnswer | None:
 
 
 def client(verify: ssl.SSLContext | bool) -> httpx.Client:
-    """One that asks directly, and not for long."""
+    """Return an HTTP client without proxies and with a short timeout."""
     return httpx.Client(verify=verify, timeout=_PATIENCE_S, trust_env=False)
 
 
@@ -111,7 +112,7 @@ _OTHER_NAME: Final = (62, 64)  # X509_V_ERR_HOSTNAME_MISMATCH, …IP_ADDRESS_MIS
 
 
 def certificate_fits(where: str, url: str, trust: ssl.SSLContext) -> Iterator[Diagnostic]:
-    """Yield the faults of the certificate at an address; nothing if nobody answers there."""
+    """Yield the faults of the certificate at an address; yield no finding if no server answers."""
     host, port = urlsplit(url).hostname or "", urlsplit(url).port or 443
     try:
         _shake(host, port, trust)
@@ -162,7 +163,8 @@ def _names(shown: x509.Certificate | None) -> str:
 
 
 def _shake(host: str, port: int, trust: ssl.SSLContext) -> bytes | None:
-    """The certificate that is shown. Raises OSError, ssl.SSLCertVerificationError."""
+    """Return the certificate that a server presents. Raise OSError if it does not answer,
+    ssl.SSLCertVerificationError if the certificate is not trusted."""
     with (
         socket.create_connection((host, port), _HANDSHAKE_S) as wire,
         trust.wrap_socket(wire, server_hostname=host) as secured,
@@ -317,7 +319,7 @@ def _ours(
 
 
 def clock_differs(name: str, where: str, ahead_s: float) -> Diagnostic:
-    """The clock of a process is not ours."""
+    """Return the finding that the clock of a process differs from ours."""
     way = "ahead of" if ahead_s > 0 else "behind"
     return found(
         "clock-differs",
@@ -354,7 +356,7 @@ def _held(place: Installation, name: str, *, runs: bool) -> Iterator[Diagnostic]
 
 
 def _any_certificate() -> ssl.SSLContext:
-    """For a challenge, with which nothing secret is sent; certificates are looked at by themselves."""
+    """Return a TLS context that accepts every certificate, for a challenge that sends no secret."""
     context = ssl.create_default_context()
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE

@@ -51,8 +51,8 @@ def robots_answer(place: Installation) -> Iterator[Diagnostic]:
 
 
 def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
-    """The engines of registered robots that run on this computer: an engine that indexes while it runs may
-    die of each get and start that comes meanwhile (H15)."""
+    """Warn of engines of registered robots on this computer that index while they run: such an
+    engine may crash at a get or start (H15)."""
     names = {each.name for each in _registered(place.data)}
     for pid, words in _engines() if names else ():
         name = _said(words, "--actor-name")
@@ -68,7 +68,7 @@ def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
 
 
 def _engines() -> Iterator[tuple[int, list[str]]]:
-    """The engine nodes on this computer, by process id, with their command lines."""
+    """Yield the process id and command line of each engine node on this computer."""
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
@@ -79,7 +79,7 @@ def _engines() -> Iterator[tuple[int, list[str]]]:
 
 
 def _said(words: Sequence[str], option: str) -> str:
-    """The value of an option in a command line, in either spelling; empty without it."""
+    """Return the value of an option in a command line, as `--a b` or `--a=b`; empty without it."""
     for word, following in zip(words, [*words[1:], ""], strict=True):
         if word == option:
             return following
@@ -127,7 +127,8 @@ def _asked(interpreter: Interpreter, place: Installation) -> list[Diagnostic]:
 
 
 def _registered(data: Path) -> list[Registration]:
-    """Robots in the registry, read without waiting for the runner; none when there is none yet."""
+    """Return the registered robots, read from the database without the runner; empty if it cannot
+    be read."""
     path = data / "runner.db"
     if not path.exists():
         return []

@@ -24,14 +24,15 @@ class FolderContents(msgspec.Struct, frozen=True):
 
 
 class FileStep(msgspec.Struct, frozen=True):
-    """One step of writing: the file is replaced or made, or removed where `content` is None."""
+    """One step of writing: the file gets this content, or is removed if `content` is None."""
 
     path: str
     content: bytes | None
 
 
 def contents(root: Path, paths: Iterable[str]) -> FolderContents:
-    """Paths are relative, with `/`. Raises CannotStart for a folder that cannot be read."""
+    """Read the files at these relative paths (with `/`). Raise CannotStart if the folder cannot be
+    read."""
     present: dict[str, bytes] = {}
     barred: dict[str, str] = {}
     try:
@@ -124,7 +125,8 @@ def _prove_unchanged(top: Directory, path: str, known: bytes | None) -> None:
 
 
 def _stage(top: Directory, path: str, content: bytes) -> str:
-    """Writes a new file beside the path, as open to others as the one that is there. Returns its name."""
+    """Write a new file beside the path, with the rights of the existing file there. Return its
+    name."""
     with _inside(top, path, make=True) as (at, name):
         new = f".{name}.{secrets.token_hex(4)}"
         mode = None
@@ -147,7 +149,7 @@ def _do(top: Directory, path: str, staged: str | None) -> None:
 
 
 def _undo(top: Directory, done: Sequence[FileStep], known: Mapping[str, bytes]) -> None:
-    """The last first, as far as the disk lets us; what stays is a call that was not finished."""
+    """Undo the steps, the last first, as far as the disk allows."""
     for path in reversed(dict.fromkeys(step.path for step in done)):
         with suppress(OSError):
             if path in known:

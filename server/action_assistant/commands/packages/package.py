@@ -47,7 +47,7 @@ def tell_refusals(root: Path, plan: PackagesPlan) -> None:
 
 
 def tell_refused(plan: PackagesPlan) -> None:
-    """The end of a call that could not write."""
+    """Print the last lines of a call that could not write."""
     _tell("Nothing was written.")
     if any(each.conflicts or each.broken for each in plan.regenerations.values()):
         _tell("Take over by hand what `--diff` shows for these files, and call again.")
@@ -208,7 +208,8 @@ def _regenerated(root: Path, found: PackagesPlan, options: argparse.Namespace) -
 
 
 def _of_library(options: argparse.Namespace) -> tuple[Action, ...]:
-    """The actions of the library that are asked for. Raises No, and CannotStart without a server."""
+    """Return the actions of the library that the options name. Raise RequestRefused for an unknown
+    name, CannotStart if none is named or no server is reached."""
     if not options.name:
         raise CannotStart("Which action? Name a FILE, or with --name actions of the library.")
     with running(options) as server:
@@ -227,7 +228,9 @@ def _of_library(options: argparse.Namespace) -> tuple[Action, ...]:
 def _chosen(
     path: Path, names: Sequence[str] | None
 ) -> tuple[tuple[Action, ...], tuple[NameRefusal, ...]]:
-    """The actions that packages are asked for. Raises `Unreadable`, and CannotStart for no file."""
+    """Return the actions of a file for which packages are wanted, and refusals of actions that
+    disagree. Raise `Unreadable` for a file that is no UMRF, CannotStart for one that cannot be
+    read."""
     try:
         text = path.read_bytes()
     except OSError as error:
@@ -254,7 +257,7 @@ def _chosen(
 def _packages(
     actions: Sequence[Action], together: str | None
 ) -> tuple[dict[str, dict[str, bytes]], tuple[NameRefusal, ...]]:
-    """The files of all packages, by folder and path; or what stands against them."""
+    """Return the files of all packages, by folder and path, or the reasons against them."""
     if together is not None:
         try:
             return {together: bundle_files(together, actions)}, ()

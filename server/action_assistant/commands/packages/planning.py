@@ -20,8 +20,8 @@ from action_assistant.umrf.packages.regenerating import (
 
 
 class PackagesPlan(msgspec.Struct, frozen=True):
-    """`there`: contents by path below the folder; `barred`: paths that cannot be read, and why;
-    `regenerations` by folder of the package."""
+    """The changes of packages in a folder. `regenerations`: by folder of the package; `there`:
+    present contents by path; `barred`: why a path cannot be read, by path."""
 
     regenerations: dict[str, Regeneration]
     there: dict[str, bytes] = {}
@@ -46,7 +46,7 @@ class PackagesPlan(msgspec.Struct, frozen=True):
 
     @property
     def removals(self) -> tuple[str, ...]:
-        """Files that are not to be there afterwards."""
+        """Return the paths of files to be removed."""
         return tuple(
             f"{folder}/{path}"
             for folder, each in self.regenerations.items()

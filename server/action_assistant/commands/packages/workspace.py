@@ -14,8 +14,8 @@ _MANIFEST: Final = "package.xml"
 
 
 def against(source: Path, packages: Iterable[str]) -> tuple[str, ...]:
-    """Sentences about what stands against these packages in this folder. Raises CannotStart where there
-    is no folder, or one in which colcon finds no packages."""
+    """Return sentences about what prevents these packages in a source folder. Raise CannotStart if
+    there is no such folder, or one in which colcon finds no packages."""
     if not source.is_dir():
         raise CannotStart(
             f"{source} is no folder. --into wants the source folder of a workspace that is there, as "
@@ -33,8 +33,8 @@ def against(source: Path, packages: Iterable[str]) -> tuple[str, ...]:
 
 
 def _packages(source: Path) -> Iterator[tuple[Path, str]]:
-    """All packages below, by folder. As colcon does, links to folders are followed, and nothing is looked
-    for in hidden folders and in packages."""
+    """Yield the folder and name of every package below. As colcon does, follow links to folders,
+    and skip hidden folders and folders inside packages."""
     seen: set[str] = set()
     for at, folders, files in os.walk(source, followlinks=True):
         real = os.path.realpath(at)

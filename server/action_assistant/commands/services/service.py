@@ -230,7 +230,7 @@ def _backups(options: argparse.Namespace) -> list[str]:
 
 
 def _data(options: argparse.Namespace) -> Path | None:
-    """The folder; None for the one that systemd keeps."""
+    """Return the data folder of the service; None for the folder that systemd manages."""
     given: Path = options.data
     if options.scope == "system" and given == paths.data() and not _named_data():
         return None
@@ -303,7 +303,7 @@ def _there(systemd: Systemd) -> str:
 
 
 def _write(systemd: Systemd, text: str, *, replace: bool) -> None:
-    """Put the unit in its place. Raises CannotStart where somebody's own would be lost."""
+    """Write the unit file. Raise CannotStart if a person has edited it, unless `replace` is set."""
     unit = systemd.unit
     before = unit.read_text() if unit.exists() else ""
     if before == text:
@@ -325,7 +325,7 @@ def _write(systemd: Systemd, text: str, *, replace: bool) -> None:
 
 
 def _put_aside(unit: Path, text: str) -> None:
-    """Keep what somebody has written."""
+    """Keep a copy of a unit that a person has edited."""
     if not is_untouched(text):
         kept = unit.with_name(f"{unit.name}.before")
         shutil.copy2(unit, kept)

@@ -91,13 +91,13 @@ def text_of(plan: ServicePlan) -> str:
 
 
 def is_untouched(text: str) -> bool:
-    """Return whether nobody edited a unit since this program, in any version, wrote it."""
+    """Return whether a unit is as this program, in any version, wrote it."""
     first, _, rest = text.partition("\n")
     return first == f"{_DIGEST}{_digest(rest)}"
 
 
 def options_of(text: str) -> tuple[str, ...] | None:
-    """The options by which a unit was made; None for one that this program did not make."""
+    """Return the options by which a unit was made; None if this program did not make it."""
     for line in text.splitlines()[:6]:
         if line.startswith(_OPTIONS):
             try:
@@ -108,7 +108,7 @@ def options_of(text: str) -> tuple[str, ...] | None:
 
 
 def quoted(word: str) -> str:
-    """A word as systemd reads it back, in a command as in an assignment."""
+    """Quote a word so that systemd reads it back unchanged, in a command or an assignment."""
     plain = word.replace("%", "%%")
     if _PLAIN.fullmatch(plain):
         return plain
@@ -202,13 +202,13 @@ class Systemd:
 
     @property
     def settings(self) -> Path:
-        """The file in which settings of the service stand, secrets among them."""
+        """Return the path of the file with the service's settings, secrets among them."""
         if self.scope == "system":
             return Path("/etc/action-assistant/environment")
         return _config() / "temoto-action-assistant" / "environment"
 
     def require(self) -> None:
-        """Raises CannotStart where there is no systemd that could run the service."""
+        """Raise CannotStart if no systemd here could run the service."""
         if shutil.which("systemctl") is None or (self.root is None and not _BOOTED.is_dir()):
             raise CannotStart(
                 "systemd does not run this computer, so it cannot run a service here. Start `action-"
@@ -217,14 +217,15 @@ class Systemd:
             )
 
     def command(self, *words: str) -> list[str]:
-        """A command to the manager."""
+        """Return a systemctl command for this scope."""
         if self.root is not None:
             scope = ["--global"] if self.scope == "user" else []
             return ["systemctl", f"--root={self.root}", *scope, *words]
         return ["systemctl", *(["--user"] if self.scope == "user" else []), *words]
 
     def do(self, commands: Sequence[Sequence[str]]) -> None:
-        """Run commands one after the other. Raises CannotStart with what the first that fails says."""
+        """Run commands one after the other. Raise CannotStart, with the output, at the first that
+        fails."""
         for each in commands:
             answer = subprocess.run(each, capture_output=True, text=True, check=False)
             if answer.returncode:

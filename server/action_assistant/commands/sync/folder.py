@@ -34,8 +34,8 @@ _Seq = Annotated[int, msgspec.Meta(ge=0)]
 
 
 class PutAside(msgspec.Struct, frozen=True):
-    """A file that was replaced and is kept until the next round, under a name with this token. `sha`: what
-    it held when it was put aside."""
+    """A replaced file, kept until the next round under a name with this token. `sha`: the SHA-256
+    of its content at that time."""
 
     token: _Token
     sha: _Sha
@@ -64,8 +64,8 @@ class SyncedFile(msgspec.Struct, frozen=True):
 
 
 class FolderTrouble(msgspec.Struct, frozen=True):
-    """A sentence about the folder. `name`: the file that is left alone in this round because of it, "" if
-    none is. `is_open`: somebody has to see to it."""
+    """A problem of the folder, in words. `name`: the file that this round skips because of it, ""
+    for none. `is_open`: a person has to resolve it."""
 
     text: str
     name: str = ""
@@ -73,8 +73,8 @@ class FolderTrouble(msgspec.Struct, frozen=True):
 
 
 class Folder:
-    """The files by name, and the state that is remembered of them. Raises CannotStart where the folder or
-    its state cannot be read; everything else raises OSError."""
+    """The files of a folder by name, and their stored state. The constructor raises CannotStart if
+    folder or state cannot be read; the methods raise OSError."""
 
     def __init__(self, path: Path) -> None:
         try:
@@ -94,7 +94,8 @@ class Folder:
         return sorted(n for n in self._at.names() if _is_graph_file(n) and _is_utf8(n))
 
     def read(self, name: str) -> bytes | None:
-        """Return what is in a file; None where there is none. Raises OSError for what is no file."""
+        """Return the content of a file; None if there is none. Raise OSError if the entry is no
+        regular file."""
         try:
             return self._at.read(name)[0]
         except FileNotFoundError:
@@ -138,7 +139,7 @@ class Folder:
             number += 1
 
     def make(self, name: str, graph: str, seq: int, text: bytes) -> bool:
-        """Make the file of a graph; False where something has that name by now."""
+        """Create the file of a graph; return False if the name is taken by now."""
         coming = Coming(secrets.token_hex(8), seq, sha(text))
         self.remember(name, SyncedFile(graph, seq, None, coming=coming))
         self._at.write_new(_fresh(coming.token), text, None)
@@ -151,9 +152,9 @@ class Folder:
         return made
 
     def exchange(self, name: str, old: str, seq: int, text: bytes) -> bool:
-        """Give a file that is known the text of its graph at `seq`, if it still has the text whose SHA-256
-        is `old`; False where somebody was quicker. The old file is put aside until the next round, when
-        what somebody who had it open has written into it since is found."""
+        """Replace the text of a file by that of its graph at `seq`, if the file still has the
+        SHA-256 `old`; return False if it was changed meanwhile. The old file is kept until the
+        next round, which finds what an editor that had it open has written since."""
         before = self.known[name]
         coming = Coming(secrets.token_hex(8), seq, sha(text))
         aside = PutAside(coming.token, old)
@@ -178,9 +179,8 @@ class Folder:
         return exchanged
 
     def recover(self) -> list[FolderTrouble]:
-        """Finish or take back what an earlier round has begun, and keep what somebody has written into a
-        file before or after it was put aside, under a name of its own. To be called at the beginning of a
-        round; return what is to be told."""
+        """Complete or undo what an interrupted round has begun, and keep under new names what
+        people have written meanwhile. Call it at the start of a round; return what to report."""
         known = dict(self.known)
         for name, file in self.known.items():
             try:
@@ -219,8 +219,8 @@ class Folder:
         return None if file.sha is None and file.aside is None else replace(file, coming=None)
 
     def _completed(self, name: str, here: bytes, sources: list[str | None]) -> bytes:
-        """Write the rest of a file of which there is only the beginning: where there are no hard links it
-        was being written when the process ended. Return what the file holds."""
+        """Complete a file of which only the beginning was written when the process ended (without
+        hard links files are copied). Return the content."""
         for source in filter(None, sources):
             text = self.read(source)
             if text is not None and len(here) < len(text) and text.startswith(here):
@@ -251,7 +251,7 @@ class Folder:
         )
 
     def _clear_up(self) -> None:
-        """Remove what rounds that ended early have left, and name what nothing is known of."""
+        """Remove files that interrupted rounds have left, and report unknown ones."""
         kept = {_aside(file.aside) for file in self.known.values() if file.aside is not None}
         coming = {
             _fresh(file.coming.token) for file in self.known.values() if file.coming is not None
@@ -274,7 +274,8 @@ class Folder:
                 self._trouble.append(FolderTrouble(f"{entry}: {why(error)}"))
 
     def _look_after_former(self, aside: str, name: str, old: str) -> None:
-        """Do the same for a file that an earlier version has put aside."""
+        """Handle a file that an earlier version of this program has put aside, as `_look_after`
+        does."""
         file = self.known.get(name)
         if not self._is_there(name):
             if file is not None and file.sha == old:
@@ -285,7 +286,7 @@ class Folder:
         self._look_after(name, aside, old)
 
     def _read_or_none(self, name: str) -> bytes | None:
-        """Return what is in a file; None also for what is no file."""
+        """Return the content of a file; None if there is none or it is no regular file."""
         try:
             return self.read(name)
         except OSError:
@@ -300,8 +301,8 @@ class Folder:
         return True
 
     def _move(self, old: str, new: str) -> bool:
-        """Give a file a second name; False where something has that name. Where there are no hard links a
-        file is written anew, since renaming it might overwrite another; what is no file is renamed."""
+        """Rename a file without overwriting; return False if `new` exists. Without hard links a
+        regular file is copied, since a rename could overwrite."""
         try:
             self._at.link(old, new)
         except FileExistsError:
@@ -380,11 +381,11 @@ def _copy(name: str, number: int) -> str:
 
 
 def _numbers() -> Iterator[str]:
-    """Yield endings that tell names apart, the first of them empty."""
+    """Yield endings that make names unique, the first of them empty."""
     yield ""
     yield from (f"-{number}" for number in itertools.count(2))
 
 
 def _rights(found: os.stat_result) -> tuple[int, Owner]:
-    """Return who may do what with an entry, and whose it is."""
+    """Return the mode and owner of an entry."""
     return stat.S_IMODE(found.st_mode), Owner(found.st_uid, found.st_gid)

@@ -51,7 +51,7 @@ COMMANDS: Final = {"sync": _add_sync}
 
 
 def _sync(options: argparse.Namespace) -> int:
-    """Exit code 1: something is not in step, and was named."""
+    """Run the command; return 1 if something is not in sync, which was printed."""
     if not options.folder.is_dir():
         raise CannotStart(f"{options.folder} is no folder.")
     told: set[str] = set()
@@ -89,7 +89,7 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 class SyncRound:
-    """One round. `left`: what is not in step after it, in words."""
+    """One round of synchronisation. `left`: what is not in sync after it, in words."""
 
     def __init__(self, server: Server, folder: Folder, tell: Callable[[str], None]) -> None:
         self.left: list[str] = []
@@ -98,8 +98,8 @@ class SyncRound:
         self._tell = tell
 
     def run(self) -> None:
-        """Bring everything into step that can be. Raises CannotStart where there is no server any more, or
-        the folder cannot be used."""
+        """Synchronise all files and graphs. Raise CannotStart if the server is not reached or the
+        folder cannot be used."""
         try:
             found, names = self._folder.recover(), self._folder.names()
         except OSError as error:
@@ -123,7 +123,8 @@ class SyncRound:
                 self._try(str(graph["name"]), self._fetch_new, graph)
 
     def _try(self, name: str, step: Callable[..., None], *given: Any) -> None:
-        """Do what brings one file or graph into step; what is in its way stops no other one."""
+        """Synchronise one file or graph by `step`; a refusal or error is reported and does not stop
+        the others."""
         try:
             step(*given)
         except RequestRefused as error:
@@ -132,7 +133,8 @@ class SyncRound:
             self._leave(f"{name}: cannot be kept in step: {why(error)}")
 
     def _graphs(self) -> dict[str, dict[str, Any]]:
-        """Return the graphs of the server by id. An id stands in paths, and is not believed to be one."""
+        """Return the graphs of the server by id. Ids become parts of paths, so others than plain
+        ones are dropped."""
         found = self._server.editor("GET", "/api/graphs").json()
         return {each["id"]: each for each in found if _ID.fullmatch(str(each["id"]))}
 
@@ -160,7 +162,7 @@ class SyncRound:
             self._fetch(name, file)
 
     def _send(self, name: str, file: SyncedFile, text: bytes) -> None:
-        """The file has changed: merge it into the graph."""
+        """Merge a changed file into its graph."""
         try:
             path = f"/api/graphs/{file.graph}/umrf"
             asked = {"params": {"seq": file.seq}, "content": text, "headers": _JSON}
@@ -184,7 +186,7 @@ class SyncRound:
             self._folder.remember(name, sent)
 
     def _fetch(self, name: str, file: SyncedFile) -> None:
-        """The graph has changed: give the file its text."""
+        """Write a changed graph into its file."""
         seq, now = self._text(file.graph)
         assert file.sha is not None
         if sha(now) == file.sha:
@@ -194,7 +196,7 @@ class SyncRound:
         # Otherwise the next round sees what somebody has written.
 
     def _bring(self, name: str, others: Collection[str]) -> None:
-        """A file that is new becomes a graph. `others`: the graphs that have no file."""
+        """Make a graph of a new file. `others`: the graphs that have no file."""
         text = self._folder.read(name)
         if text is None:
             return
@@ -215,19 +217,19 @@ class SyncRound:
         self._brought(name, SyncedFile(made["id"], made["seq"], sha(text)), text)
 
     def _brought(self, name: str, file: SyncedFile, text: bytes) -> None:
-        """A file has become a graph."""
+        """Record that a file has become a graph."""
         self._folder.remember(name, file)
         if codec.read(text).dialect != _TODAY:  # an edit of an older form could not be told apart
             self._tell(f"{name}: was an older form of UMRF; it has today's now")
             self._fetch(name, file)
 
     def _first_text(self, graph: str) -> bytes:
-        """Return what a graph was when it was made."""
+        """Return the UMRF of a graph at its first change."""
         path = f"/api/graphs/{graph}/umrf"
         return self._server.editor("GET", path, params={"at": _FIRST}).content
 
     def _fetch_new(self, graph: dict[str, Any]) -> None:
-        """A graph that is new becomes a file."""
+        """Make a file for a new graph."""
         seq, now = self._text(graph["id"])
         name = self._folder.free_name(graph["name"])
         if self._folder.make(name, graph["id"], seq, now):
@@ -243,7 +245,7 @@ class SyncRound:
 
 
 def _digest(text: bytes) -> str | None:
-    """Return the digest of the graph in a text; None where it cannot be read."""
+    """Return the digest of the graph in a text; None if it cannot be read."""
     try:
         return digest(codec.read(text).graph)
     except codec.Unreadable:

@@ -14,8 +14,8 @@ _LONGEST: Final = 120  # characters of a value
 
 
 class GraphChange(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """One thing that is different now. `name` is the full name of an action, the newer one, or the id
-    of a note or comment; `before` and `after` are None where nothing was said."""
+    """One difference. `name`: the full name of an action (the newer one), or the id of a note or
+    comment; `before` and `after` are None if there was or is no value."""
 
     subject: Subject
     change: Literal["added", "removed", "changed"]
@@ -29,7 +29,7 @@ class GraphChange(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
 
 
 class ShownGraph(msgspec.Struct, frozen=True):
-    """A graph, with the comments that stand beside it."""
+    """A graph and its comments."""
 
     graph: Graph
     comments: Mapping[str, object]
@@ -131,7 +131,7 @@ def _field_words(subject: Subject, who: str, field: Field) -> str:
 
 
 def _shown(value: object) -> str:
-    """A value as far as it fits into a line."""
+    """Return a value as text, shortened to fit into a line."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     text = value if isinstance(value, str) else str(value)

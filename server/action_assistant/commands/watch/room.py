@@ -61,7 +61,7 @@ class Lines:
         self._as_json = as_json
 
     def change(self, seq: int, who: list[str], change: GraphChange) -> None:
-        """One line on the standard output."""
+        """Print one change to stdout."""
         now = datetime.now().astimezone()
         if self._as_json:
             about = {"time": now.isoformat(timespec="milliseconds"), "seq": seq, "who": who}
@@ -71,12 +71,12 @@ class Lines:
         print(one_line(line), flush=True)
 
     def news(self, text: str) -> None:
-        """One line on the standard error, so that programs can read the rest."""
+        """Print one line to stderr, since programs read stdout."""
         print(one_line(text), file=sys.stderr, flush=True)
 
 
 class WatchedGraph:
-    """The state of a followed graph: its document, the sequence number that was told last, and
+    """The state of a followed graph: its document, the sequence number that was last printed, and
     people's names."""
 
     def __init__(self, lines: Lines) -> None:
@@ -96,12 +96,12 @@ class WatchedGraph:
         self._seq = 0
 
     def begin_anew(self) -> None:
-        """Forget the history: the server has another one."""
+        """Drop the document, since the server has another history now."""
         self.doc.unobserve(self._subscription)
         self._begin()
 
     def enter(self) -> None:
-        """A connection begins; until it is in sync, nothing is told."""
+        """Note that a connection begins; no change is printed until it is in sync."""
         self.in_sync = False
         self._greeted = False
 
@@ -112,8 +112,8 @@ class WatchedGraph:
         return {"acks": "1"} | known
 
     def hear(self, message: bytes) -> None:
-        """A message of the room. What came before it is in the document by now: the provider applies
-        each before it asks for the next."""
+        """Handle a message of the room. The document already has all earlier ones, since the
+        provider applies each before it reads the next."""
         reader = messages.ByteReader(message)
         match reader.number():
             case messages.SYNC:
@@ -141,7 +141,7 @@ class WatchedGraph:
                     self._names[entry.client] = state.user.name
 
     def _reach(self, seq: int) -> None:
-        """Tell what changed up to a sequence number, once everything up to it was received."""
+        """Print what changed up to a sequence number, of which everything was received."""
         self._seq = seq
         if not self._greeted and self._told is not None:
             self._lines.news(f"Connected again, at moment {seq}.")
@@ -226,7 +226,8 @@ def watch(options: argparse.Namespace) -> int:
 
 
 async def _follow(options: argparse.Namespace, graph: str) -> None:
-    """Be in the room, and come again after each lost connection. Raises No, CannotStart."""
+    """Follow the room, and reconnect after each lost connection. Raise RequestRefused or
+    CannotStart where reconnecting cannot help."""
     lines = Lines(as_json=options.json)
     watched = WatchedGraph(lines)
     failures = 0
@@ -245,7 +246,7 @@ async def _follow(options: argparse.Namespace, graph: str) -> None:
 
 
 async def _visit(options: argparse.Namespace, graph: str, watched: WatchedGraph) -> Exception:
-    """Be in the room until that ends: why it did."""
+    """Stay in the room until the connection ends; return the reason."""
     watched.enter()
     # Anew each time: while the server was away, anybody may have taken its place, and has to prove
     # itself before it is sent the token.
@@ -281,7 +282,7 @@ async def _read(response: httpx.Response) -> None:
 
 
 def _raise_if_final(why: Exception, *, again: bool) -> None:
-    """Raise what coming again does not help against."""
+    """Raise a reason against which reconnecting cannot help."""
     match why:
         case WebSocketUpgradeError() if why.response.status_code in _FINAL:
             raise RequestRefused(sentence(why.response))
