@@ -10,7 +10,7 @@ from action_assistant.schema.branches import BRANCHES
 
 
 def config_for(connection: Connection, branch: str) -> Config:
-    """Alembic's configuration, pointed at our scripts and at a connection that is open."""
+    """Return Alembic's configuration with our scripts and an open connection."""
     folder = paths.migrations()
     config = Config(attributes={"connection": connection, "metadata": BRANCHES[branch]})
     config.set_main_option("script_location", str(folder).replace("%", "%%"))

@@ -35,14 +35,14 @@ class Damage(msgspec.Struct, frozen=True):
 
 
 def link(before: bytes, event: Event) -> bytes:
-    """The chain at an event: a digest of everything it holds and of the chain before it."""
+    """Return the chain at an event: a digest of all its fields and of the chain before it."""
     place = _PLACE(event.seq, event.at, event.position)
     names = _names(event.stream, event.kind, event.author)
     return blake2b(b"".join((before, names, place, event.body)), digest_size=16).digest()
 
 
 class StoredColumns(NamedTuple):
-    """Events of one stream that follow one another, as a database has them, column by column."""
+    """Consecutive events of one stream as the database has them, column by column."""
 
     seqs: Sequence[int]
     kinds: Sequence[str]
@@ -74,16 +74,19 @@ def linked(before: bytes, stream: str, events: StoredColumns) -> int:
 
 @lru_cache(maxsize=1024)
 def _names(*texts: str) -> bytes:
-    """Encode the texts that are the same in most links of a stream. Damaged text must not raise
-    here: the check reports it."""
+    """Encode the texts that most links of a stream share. Damaged text must not raise here: the
+    check reports it."""
     # Damaged text has to be told, not to fail.
     encoded = [text.encode("utf-8", "surrogateescape") for text in texts]
     return b"".join(pack(">I", len(data)) + data for data in encoded)
 
 
 class Inspector:
-    """Looks at all stored events in the order of their positions, and remembers what is wrong.
-    `removed`: reads from an event which stream it says was taken out, and where that ended."""
+    """Checks all stored events in the order of their positions, and collects damage.
+
+    `removed`: reads from an event which stream it removes from the log, and the end of that stream;
+    None for other events.
+    """
 
     def __init__(
         self, removed: Callable[[Event], tuple[str, Head] | None] = lambda _: None
@@ -98,7 +101,7 @@ class Inspector:
         self._gap: Damage | None = None  # the first
 
     def see(self, row: Sequence[Any]) -> None:
-        """The next event: its eight columns as they stand in the database."""
+        """Check the next event, given as its eight columns in the database."""
         self.seen += 1
         self._position += 1
         stream = row[0] if isinstance(row[0], str) else repr(row[0])
@@ -124,7 +127,8 @@ class Inspector:
             self._take_out(*taken)
 
     def _take_out(self, stream: str, end: Head) -> None:
-        """The rest of a stream is kept elsewhere. Its beginning may still be here."""
+        """Note that a stream was removed from the log and ended at `end`. Its first events may
+        still be in the log."""
         here = self._heads.get(stream, NOTHING)
         if here.seq > end.seq or (here.seq == end.seq and here.chain != end.chain):
             self._note(stream, end.seq, "it is not what was taken out")
@@ -133,12 +137,12 @@ class Inspector:
 
     @property
     def damage(self) -> Damage | None:
-        """Return one fault of the events that were inspected so far; None without any."""
+        """Return one damage of the events that were inspected so far; None without any."""
         return next(iter(self._damages.values()), None)
 
     def findings(self, ends: Iterable[Sequence[Any]] | None) -> list[Damage]:
-        """The first damage of each stream. `ends`: stream, seq and chain of each as they stand in the
-        database."""
+        """Return the first damage of each stream. `ends`: the stored stream, seq and chain of each
+        stream's end."""
         if self._missing != self._gone and self._gap is not None and not self._damages:
             self._note(self._gap.stream, self._gap.seq, self._gap.why)
         heads = self._heads if ends is None else self._written(ends)

@@ -45,8 +45,8 @@ class QuickCommits:
     """Decides from the last hundred commits whether a commit may run on the event loop.
 
     At most five of them may have taken longer than 20 ms and none longer than 100 ms, and all
-    together at most a sixth of the time in which they came. The first twenty commits never run
-    there.
+    together at most a sixth of the time in which they came. The first twenty commits never run on
+    the loop.
     """
 
     def __init__(self) -> None:
@@ -76,8 +76,8 @@ class QuickCommits:
 
 
 class CommitMetrics(Collector):
-    """A collector for a registry of Prometheus. `failing`: why the newest transaction was not stored;
-    None once one was."""
+    """A collector for a registry of Prometheus. `failing`: why the newest transaction was not
+    stored; None if it was."""
 
     def __init__(self) -> None:
         self.failing: str | None = None
@@ -94,16 +94,16 @@ class CommitMetrics(Collector):
         self._last = 0.0  # seconds since 1970
 
     def submitted(self, jobs: int) -> None:
-        """Jobs wait for the writer."""
+        """Count jobs that wait for the writer."""
         self._submitted += jobs
 
     def begins(self) -> None:
-        """The writer begins a transaction."""
+        """Note the begin of a transaction."""
         self._busy_since = time.monotonic()
 
     def over(self, jobs: int, stored: Sequence[Sequence[Event]]) -> None:
-        """A transaction of so many jobs is over. `stored`: the events of each that was not refused; where
-        all were, nothing was written, and nothing is known of the disk."""
+        """Note the end of a transaction of `jobs` jobs. `stored`: the events of each job that was
+        not refused. If all were refused, nothing was written, so it says nothing of the disk."""
         if stored and self._busy_since is not None:
             took = time.monotonic() - self._busy_since
             self._seconds.observe(took)
@@ -126,12 +126,12 @@ class CommitMetrics(Collector):
 
     @property
     def waiting(self) -> int:
-        """Jobs that were submitted and have no outcome yet."""
+        """The number of submitted jobs without an outcome."""
         return self._submitted - self._done
 
     @property
     def busy_s(self) -> float:
-        """Seconds for which the transaction has lasted that is under way; 0 without one."""
+        """The age of the present transaction in seconds; 0 without one."""
         since = self._busy_since
         return 0.0 if since is None else time.monotonic() - since
 

@@ -24,7 +24,7 @@ def no_copy(connection: Connection, branch: Branch, revision: str) -> None:
 
 
 class WriterSession(Protocol):
-    """The connection that writes. Used by one thread at a time; everything only inside `run`."""
+    """The writing connection. One thread at a time uses it, only inside `run`."""
 
     connection: Connection
 
@@ -35,21 +35,21 @@ class WriterSession(Protocol):
         """Return whether the connection still existed when it was last used."""
 
     def begin(self) -> None:
-        """Open a transaction in which nobody else can write."""
+        """Begin a transaction that locks out other writers."""
 
     def say(self, command: str) -> None:
-        """A command without a result: COMMIT, SAVEPOINT …"""
+        """Execute a command without a result: COMMIT, SAVEPOINT …"""
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
         """Write events with their chain, and the new ends of their streams: all or nothing. A transaction
         of its own, which is committed, if none is open."""
 
     def close(self) -> None:
-        """Let go, whatever state the connection is in."""
+        """Close the connection, whatever its state is."""
 
 
 class Database(Protocol):
-    """One database, owned by this process for writing."""
+    """One database, which only this process writes."""
 
     @property
     def name(self) -> str:
@@ -57,7 +57,8 @@ class Database(Protocol):
 
     @property
     def address(self) -> str:
-        """The URL by which another process of this machine reads the same database, password and all."""
+        """The URL by which another process of this computer reads the same database, with its
+        password."""
 
     @property
     def is_local(self) -> bool:
@@ -65,7 +66,8 @@ class Database(Protocol):
 
     @property
     def patience(self) -> float:
-        """Seconds to wait for the database before it is left open whether a commit has happened."""
+        """The seconds to wait for the database before it stays unknown whether a commit has
+        happened."""
 
     @property
     def faults(self) -> tuple[type[Exception], ...]:
@@ -85,7 +87,8 @@ class Database(Protocol):
         be used."""
 
     def connect(self) -> WriterSession:
-        """Connect again after a failure; whatever the last session left unfinished is over then."""
+        """Connect again after a failure. The unfinished transaction of the last session has ended
+        then."""
 
     def lost(self, error: Exception) -> bool:
         """Return whether a fault is that of the database, so that nothing can be written, and not
@@ -95,11 +98,12 @@ class Database(Protocol):
         """Read, without waiting for the writer."""
 
     async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
-        """Read much of it, all as it was at one moment, while others write. Changes nothing, also
-        nothing of an older version."""
+        """Answer a question from one consistent snapshot, while others write. Nothing is changed,
+        not even the tables of an older version."""
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
-        """Some stored events with their chain as they stand, and from where to go on."""
+        """Return a page of stored events, unchecked and with their chain, after the position
+        `after`; and the position for the next page."""
 
     def bytes_in_use(self, connection: Connection) -> dict[str, int]:
         """Return the size in bytes of the database and, if it has one, of its write-ahead log,

@@ -15,7 +15,8 @@ T = TypeVar("T")
 
 
 def database_of(url: str) -> Database:
-    """The database that a URL names. Raises CannotStart for what we cannot open."""
+    """Return the database that a URL names. Raise CannotStart for a malformed URL or a database of
+    another kind."""
     try:
         parsed = make_url(url)
     except ArgumentError as error:

@@ -40,7 +40,8 @@ class Draft(msgspec.Struct, frozen=True, gc=False):
 
 
 class Addition(msgspec.Struct, frozen=True):
-    """Drafts for one stream. `expected` is the newest `seq` that the caller knows of, or None."""
+    """Drafts for one stream. `expected`: the newest `seq` that the caller knows; None to append in
+    any case."""
 
     stream: str
     drafts: tuple[Draft, ...]
@@ -48,7 +49,8 @@ class Addition(msgspec.Struct, frozen=True):
 
 
 def bare(events: Iterable[Event], usual: str) -> list[BareEvent]:
-    """Return events without their kind and time where the kind is the usual one."""
+    """Return the body, kind and time of events; kind and time are None for events of the kind
+    `usual`."""
     return [(e.body, *((None, None) if e.kind == usual else (e.kind, e.at))) for e in events]
 
 
@@ -65,5 +67,5 @@ Fold: TypeAlias = "Callable[[Event], Sequence[Executable]]"
 
 
 def nothing(_: Event) -> "Sequence[Executable]":
-    """The fold of a journal without tables."""
+    """Return no statements: the fold of a journal without tables."""
     return ()

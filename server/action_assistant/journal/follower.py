@@ -11,7 +11,7 @@ _HELD: Final = 1000  # events that wait for a follower in memory; after that it 
 
 
 class Follower:
-    """The queue of committed events for one reader, of bounded size."""
+    """The bounded queue of committed events for one reader."""
 
     def __init__(self) -> None:
         self._waiting: deque[Event] = deque()

@@ -53,7 +53,7 @@ _Shape: TypeAlias = tuple[object, ...]
 
 
 class Findings(NamedTuple):
-    """The objects of a schema that are not this program's, and those of this program that were
+    """Objects of a schema that this program did not make, and objects of this program that were
     altered."""
 
     strangers: tuple[SchemaObject, ...]
@@ -73,8 +73,8 @@ def look(path: Path, branch: Branch) -> Findings:
 
 
 def remove_strangers(path: Path, branch: Branch) -> list[str]:
-    """Drop from the copy of a journal what is not ours; return what was dropped, in words. Raises
-    CannotStart where something of ours is not as this program makes it, sqlite3.Error."""
+    """Drop from the copy of a journal all objects that are not ours; return them in words. Raise
+    CannotStart if one of our objects is altered, sqlite3.Error if the file cannot be read."""
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
         found = _compared(connection, branch)
         if found.altered:
@@ -117,8 +117,8 @@ def _may_go(found: SchemaObject, ours: Iterable[SchemaObject]) -> bool:
 
 
 def _revision(connection: sqlite3.Connection, branch: Branch) -> str | None:
-    """Return the revision that a journal says it is at, the newest where it says none; None for one that
-    this version does not know."""
+    """Return the stored revision of a journal, or the newest if it has none; None if this version
+    does not know it."""
     found: set[object] = set()
     # A view of this name could go on for ever.
     kind = connection.execute("SELECT type FROM sqlite_master WHERE name = ?", [VERSIONS.name])
@@ -132,7 +132,7 @@ def _revision(connection: sqlite3.Connection, branch: Branch) -> str | None:
 
 @cache
 def _shapes_of(branch: Branch, revision: str) -> dict[SchemaObject, _Shape]:
-    """Return what an empty journal of this revision has."""
+    """Return the objects of an empty journal of this revision."""
     engine = create_engine("sqlite://", poolclass=NullPool, isolation_level="AUTOCOMMIT")
     with engine.connect() as connection:
         upgrade_to(branch, revision)(connection)

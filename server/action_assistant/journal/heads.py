@@ -41,8 +41,9 @@ async def head_at(
 
 
 async def heads_at(journal: JournalReader, position: int, read_kept: ReadKept) -> dict[str, Head]:
-    """Return the head of each stream after the event at this position, whatever came since. Streams that
-    were taken out since are read where they are kept. Raises OSError, Refused, Unavailable."""
+    """Return the head of each stream as of the event at `position`. Streams that were removed since
+    are read by `read_kept`. Raise OSError or Refused if one cannot be read, Unavailable if the
+    journal cannot."""
     last = (
         select(_event.stream, func.max(_event.seq).label("seq"))
         .where(_event.position <= position)
@@ -73,8 +74,8 @@ def digest_of(branch: Branch, position: int, heads: dict[str, Head]) -> str:
 def _end(events: Iterable[Event], position: int) -> Head:
     """Return the head of one stream as it was at `position` of the log.
 
-    `events`: all events of the stream, the oldest first. Those after `position` are ignored; if all
-    are after it, the head is `NOTHING`.
+    `events`: all events of the stream, oldest first. Events after `position` are ignored; if there
+    are no others, the head is `NOTHING`.
     """
     head = NOTHING
     for event in events:

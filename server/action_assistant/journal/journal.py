@@ -52,7 +52,7 @@ def _before(copies: Path | None) -> Before:
 
 
 class Journal(JournalReader):
-    """The log of one process. The only writer of its database; readers never wait for it."""
+    """The log of one process, the only writer of its database; readers never wait for writes."""
 
     def __init__(
         self,
@@ -93,13 +93,12 @@ class Journal(JournalReader):
         copies: Path | None = None,
         at_once: bool = False,
     ) -> "Journal":
-        """Open, and bring the tables to this version. `url`: sqlite:///PATH or postgresql://…
-        `copies`: the folder where a copy goes before; without it none is made. `at_once`: the loop may
-        wait for the disk of this machine itself, while that is quick; not for a process that must
-        always answer.
+        """Open a journal, and bring its tables to this version.
 
-        Raises CannotStart: newer or foreign database, not to be reached or written, in use, or not
-        set up to keep what it was told.
+        `url`: sqlite:///PATH or postgresql://… `copies`: the folder for a copy before an upgrade;
+        None makes no copy. `at_once`: the event loop may wait for a local disk while that is quick;
+        not for a process that must always answer. Raise CannotStart if the database is foreign,
+        newer, in use, not reached, not writable, or does not store commits durably.
         """
         database = database_of(url)
         return await cls.on(database, branch=branch, fold=fold, copies=copies, at_once=at_once)
@@ -173,9 +172,10 @@ class Journal(JournalReader):
         return await self._write(lambda transaction: work(transaction.connection))
 
     async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
-        """Say in the log that a stream is kept elsewhere from now on; the number of that, by which
-        its events may be deleted. `also` tells more of it, in the same transaction. Raises Conflict
-        when the stream does not end there, Unavailable."""
+        """Record that a stream is kept elsewhere from now on; return the number of that event, by
+        which `delete_some` may delete the stream. `also` returns another addition for the same
+        transaction, given that number. Raise Conflict if the stream has another end, Unavailable
+        if the journal cannot be written."""
         body = msgspec.json.encode(removed)
 
         def say(transaction: Transaction) -> int:
@@ -195,7 +195,8 @@ class Journal(JournalReader):
         )
 
     async def rebuild(self) -> int:
-        """Make all tables again from the events, in one transaction; the number of events."""
+        """Compute all tables again from the events, in one transaction; return the number of
+        events."""
         folds = [t for t in BRANCHES[self._branch].sorted_tables if t.name not in LOG]
 
         def again(transaction: Transaction) -> int:
@@ -236,7 +237,7 @@ class Journal(JournalReader):
         return [*found, *(Damage("", 0, text) for text in complaints)]
 
     async def health(self) -> str | None:
-        """Return why nothing can be stored at the moment; None if it can. Nothing is written."""
+        """Return why nothing can be stored now; None if it can. Nothing is written."""
         try:
             await self._write(lambda transaction: transaction.connection)
         except Unavailable as error:
@@ -260,7 +261,8 @@ class Journal(JournalReader):
 
     @property
     def address(self) -> str:
-        """The URL by which a worker reads the database. It may hold a password: not to be shown or logged."""
+        """The URL by which a worker reads the database. Never show or log it, since it may hold a
+        password."""
         return self._database.address
 
     @property
@@ -269,11 +271,12 @@ class Journal(JournalReader):
         return self._database.name
 
     async def bytes_in_use(self) -> dict[str, int]:
-        """Bytes of the database and of what waits beside it, by name. Raises Unavailable, OSError."""
+        """Return the bytes of the database and its write-ahead log, by name. Raise Unavailable or
+        OSError if they cannot be read."""
         return await self._ask(self._database.bytes_in_use)
 
     async def close(self) -> None:
-        """Finish what was appended, then let go of the file. Followers end."""
+        """Commit what was appended, then close the database. Followers end."""
         if self._closed:
             return
         self._closed = True
@@ -353,7 +356,7 @@ class Journal(JournalReader):
             self._followers.discard(follower)
 
     async def _heard(self, follower: Follower, last: int) -> AsyncIterator[Event]:
-        """Events from memory, or from the file where memory was not enough."""
+        """Yield new events from memory, or from the database if the queue overflowed."""
         while True:
             found = await follower.next()
             if found is None:

@@ -44,8 +44,8 @@ def own(path: Path) -> int:
 
 
 def holder(path: Path) -> Holder | None:
-    """Return the process that has locked a database; None if the system does not tell. Linux tells
-    it for visible processes."""
+    """Return the process that has locked a database; None if unknown. Linux shows it for visible
+    processes."""
     return _holder(path.with_name(f"{path.name}.lock"))
 
 
@@ -59,7 +59,7 @@ def is_program(pid: int) -> bool:
 
 
 def _taken(lock: Path) -> int | None:
-    """The lock, or None when somebody holds it."""
+    """Return the descriptor of the lock; None if another process holds it."""
     while True:
         descriptor = opener(str(lock), os.O_RDWR | os.O_CREAT)
         if not file_locks.take(descriptor):
@@ -74,7 +74,7 @@ def _taken(lock: Path) -> int | None:
 
 
 def _taken_from_a_stranger(lock: Path, path: Path) -> int | None:
-    """A new lock in the place of theirs, by one process of ours at a time."""
+    """Replace the lock file of another user; one of our processes at a time does so."""
     guard = opener(str(lock.with_name(f"{lock.name}.new")), os.O_RDWR | os.O_CREAT)
     try:
         file_locks.wait_for(guard)
@@ -92,14 +92,15 @@ def _is_a_strangers(holder: Holder | None, path: Path) -> bool:
 
 
 def _user_of(pid: int) -> int:
-    """The real user, also of a process that hides: raises OSError, ValueError, IndexError."""
+    """Return the real user of a process, also of one that hides. Raise OSError, ValueError or
+    IndexError if it cannot be read."""
     told = Path(f"/proc/{pid}/status").read_text()
     (uid,) = [line.split()[1] for line in told.splitlines() if line.startswith("Uid:")]
     return int(uid)
 
 
 def _holder(lock: Path) -> Holder | None:
-    """Return the process that holds a lock file; None if the system does not tell."""
+    """Return the process that holds a lock file; None if unknown."""
     try:
         there = lock.stat()
         place = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"

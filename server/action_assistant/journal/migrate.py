@@ -23,7 +23,7 @@ logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in o
 
 
 def revisions_of(branch: str) -> list[str]:
-    """Every revision that this program knows, the oldest first."""
+    """Return every revision that this program knows, oldest first."""
     names = (_OURS.match(path.name) for path in (paths.migrations() / branch).glob("*.py"))
     return sorted(
         (name[0] for name in names if name), key=lambda name: int(name.rpartition("_")[2])
@@ -56,7 +56,7 @@ def upgrade_to(
 
 
 def _upgraded(connection: Connection, branch: Branch, current: set[str], revision: str) -> str:
-    """The revision at which a database is afterwards."""
+    """Bring a database to `revision`, and return the revision it has then."""
     newest = revisions_of(branch)[-1]
     if current == {newest} == {revision}:
         return newest
@@ -73,8 +73,8 @@ def _upgraded(connection: Connection, branch: Branch, current: set[str], revisio
 
 
 def recognize(connection: Connection) -> set[str]:
-    """The revisions of a database of ours; none of an empty one. Changes nothing. Raises CannotStart
-    for another program's, and for one that a newer version of this program made."""
+    """Return the revisions of a database of ours; an empty set for an empty database. Change
+    nothing. Raise CannotStart for a database of another program or of a newer version."""
     name = _name_of(connection)
     current = _current(connection)
     if _is_foreign(connection, current):
@@ -102,14 +102,14 @@ def _newer(connection: Connection, name: str, revision: str) -> str:
 
 
 def _current(connection: Connection) -> set[str]:
-    """The revisions that a database says it is at."""
+    """Return the revisions that a database has stored."""
     if not inspect(connection).has_table(VERSIONS.name):
         return set()
     return set(map(str, connection.scalars(select(VERSIONS.c.version_num))))
 
 
 def _name_of(connection: Connection) -> str:
-    """The path of a file, the name of a database on a server."""
+    """Return the path of a SQLite file, or the name of a database on a server."""
     if connection.dialect.name != "sqlite":
         return str(connection.engine.url.database)
     row = connection.exec_driver_sql("PRAGMA database_list").first()
@@ -119,7 +119,7 @@ def _name_of(connection: Connection) -> str:
 def _is_foreign(connection: Connection, current: set[str]) -> bool:
     """Return whether a database has tables that this program did not make.
 
-    A database on a server may hold other tables, as long as their names differ from ours.
+    On a server, tables of other names than ours do not count.
     """
     there = set(inspect(connection).get_table_names()) - {VERSIONS.name}
     if connection.dialect.name == "sqlite":

@@ -97,7 +97,7 @@ class PostgresSession:
         self.say("BEGIN")
 
     def say(self, command: str) -> None:
-        """A command without a result."""
+        """Execute a command without a result."""
         await_only(self._raw.execute(command))
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
@@ -109,7 +109,7 @@ class PostgresSession:
         await_only(self._raw.execute(_STORE, *values, [chain for _, chain in events], *ends))
 
     def close(self) -> None:
-        """Let go at once: what is not committed has not happened."""
+        """Close the connection at once; an uncommitted transaction is rolled back."""
         try:
             self._loop.run_until_complete(self._end())
         finally:
@@ -154,7 +154,7 @@ class Postgres:
         )
 
     def open(self, branch: Branch, before: Before = no_copy) -> PostgresSession:
-        """Lock the database for this process, check that it keeps what it confirms, migrate."""
+        """Lock the database for this process, check that it stores commits durably, and migrate."""
         session = self.own(branch)
         try:
             self.migrate(upgrade_to(branch, before=before))
@@ -174,8 +174,8 @@ class Postgres:
             raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
 
     def look(self, question: Callable[[Connection], object]) -> None:
-        """Ask nothing: whoever changes tables asks inside the same transaction, and nothing else
-        alters them."""
+        """Do nothing: the check is made inside of the transaction that changes the tables, and no
+        other code alters them."""
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
         """Run a change of the schema in one transaction. Raise CannotStart if the database cannot
@@ -198,8 +198,8 @@ class Postgres:
     def connect(self) -> PostgresSession:
         """Connect, and become the only writer (again).
 
-        The lock belongs to a session: once it is ours, our last session has ended on the server,
-        and whatever it was committing has either happened or never will.
+        A session holds the lock: once we have it, our last session has ended on the server, and its
+        last commit has either happened or never will.
         """
         return PostgresSession(
             self._engine({"application_name": self._me}, poolclass=NullPool), self._take_over
@@ -231,7 +231,7 @@ class Postgres:
             return await connection.run_sync(question)
 
     async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
-        """Read in one transaction, which sees nothing of what others commit meanwhile."""
+        """Answer a question in one transaction, which sees no later commits of others."""
         async with self._readers.connect() as connection:
             await connection.execution_options(
                 isolation_level="REPEATABLE READ", postgresql_readonly=True
@@ -239,7 +239,7 @@ class Postgres:
             return await connection.run_sync(question)
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
-        """Stored events with their chain."""
+        """Return a page of stored events with their chain, and the position for the next page."""
         columns = editor_event.c
         chosen = select(*(columns[name] for name in (*Event.__struct_fields__, "chain")))
         chosen = chosen.where(columns.position > after).order_by(columns.position).limit(_PAGE)
@@ -247,7 +247,7 @@ class Postgres:
         return list(rows), rows[-1][6] if rows else after
 
     def bytes_in_use(self, connection: Connection) -> dict[str, int]:
-        """Bytes of the database; its log is that of the whole server."""
+        """Return the bytes of the database. The write-ahead log belongs to the whole server."""
         asked = "SELECT pg_database_size(current_database())"
         return {"database": int(connection.exec_driver_sql(asked).scalar_one())}
 
@@ -297,7 +297,7 @@ class Unfit(OSError):
 
 
 async def _hear() -> None:
-    """Let the loop notice what has come in, such as the end of a connection."""
+    """Let the event loop notice incoming data, such as the end of a connection."""
     for _ in range(3):
         await asyncio.sleep(0)
 

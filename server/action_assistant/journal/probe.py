@@ -21,8 +21,8 @@ _NOTHING: Final = {"stream": "health", "seq": 0, "proof": b"", "state": b""}
 
 
 class JournalProbe:
-    """Tries a journal when somebody wants to know, once a second at most. `write` does something on the
-    writer's thread and commits it, `read` asks beside it; `is_alive` says whether the thread is."""
+    """Tests a journal on request, once a second at most. `write` commits something on the writer's
+    thread, `read` asks beside it; `is_alive` returns whether that thread lives."""
 
     def __init__(
         self, branch: Branch, write: Asked, read: Asked, is_alive: Callable[[], bool]
@@ -53,7 +53,7 @@ class JournalProbe:
         return parts
 
     def close(self) -> None:
-        """Nobody will ask any more."""
+        """Cancel the tests under way."""
         self._writing.cancel()
         self._reading.cancel()
 
@@ -75,7 +75,7 @@ async def _tried(way: Asked, question: Callable[[Connection], Any]) -> str:
 
 
 def _leave_no_trace(connection: Connection) -> None:
-    """A commit that has to reach the disk, as that of an edit."""
+    """Write and delete a row, so that the commit has to reach the disk as that of an edit does."""
     table = editor_snapshot
     connection.execute(insert(table).values(_NOTHING))
     connection.execute(delete(table).where(table.c.stream == _NOTHING["stream"]))

@@ -25,7 +25,7 @@ class ProgramVersion(NamedTuple):
 
 
 def last_writer(connection: Connection) -> ProgramVersion | None:
-    """Return the version that wrote last; None for databases of versions that did not note it."""
+    """Return the version that wrote last; None if no version was stored."""
     if not inspect(connection).has_table(written_by.name):
         return None
     row = connection.execute(_LAST).first()
@@ -33,7 +33,7 @@ def last_writer(connection: Connection) -> ProgramVersion | None:
 
 
 def sign(connection: Connection, revision: str) -> None:
-    """This program writes from now on. Nothing is written where it was the last one before, too."""
+    """Store that this version writes from now on. Nothing is written if it was the last writer."""
     if not inspect(connection).has_table(written_by.name):
         return  # brought to an earlier revision, by a test
     row = connection.execute(_LAST).first()

@@ -64,8 +64,8 @@ class JournalReader:
     async def read(
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
-        """Return the events of a stream with `after < seq <= upto`, in order. `limit`: return at
-        most so many events, the oldest of them."""
+        """Return the events of a stream with `after < seq <= upto`, in order. `limit`: at most so
+        many, the oldest ones."""
         chosen = _EVENTS.where(_event.stream == stream, _event.seq > after)
         if upto is not None:
             chosen = chosen.where(_event.seq <= upto)
@@ -94,14 +94,14 @@ class JournalReader:
     async def query(
         self, statement: Select[Any], values: Mapping[str, Any] | None = None
     ) -> list[Row[Any]]:
-        """Ask the tables. `values`: of the parameters that a statement was made with once for all, since
-        to make one takes longer than to run it."""
+        """Return the rows of a query. `values`: for the parameters of a prepared statement, since
+        building one takes longer than running it."""
         return await self._ask(lambda connection: list(connection.execute(statement, values).all()))
 
     async def plain_rows(
         self, statement: Select[Any], values: Mapping[str, Any] | None = None
     ) -> list[Sequence[Any]]:
-        """Ask for many rows, as the driver gives them out: no value is converted."""
+        """Return many rows as the driver gives them, without conversion of values."""
         return await self._ask(lambda connection: _plain(connection.execute(statement, values)))
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:

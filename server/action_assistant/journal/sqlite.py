@@ -93,7 +93,7 @@ class SqliteSession:
         self._raw.execute("BEGIN IMMEDIATE")
 
     def say(self, command: str) -> None:
-        """A command without a result."""
+        """Execute a command without a result."""
         self._raw.execute(command)
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
@@ -112,7 +112,7 @@ class SqliteSession:
             self._raw.execute("COMMIT")
 
     def close(self) -> None:
-        """Let go; what is not committed has not happened."""
+        """Close the connection; an uncommitted transaction is rolled back."""
         try:
             self.connection.close()
         except (sqlite3.Error, DatabaseError):
@@ -122,7 +122,7 @@ class SqliteSession:
 
 @lru_cache(_ROWS)
 def _insert_of(rows: int) -> str:
-    """An INSERT of so many events."""
+    """Return an INSERT of this many events."""
     return _INSERT + ", ".join(["(?, ?, ?, ?, ?, ?, ?, ?)"] * rows)
 
 
@@ -147,7 +147,7 @@ class Sqlite:
         self.address: Final = f"sqlite:///{self._path.absolute()}"
 
     def open(self, branch: Branch, before: Before = no_copy) -> SqliteSession:
-        """Lock the file for this process, since two writers of one log would tear it; migrate."""
+        """Lock the file for this process, since two writers would damage the log; then migrate."""
         self.look(recognize)
         self._lock = own(self._path)
         self.migrate(upgrade_to(branch, before=before))
@@ -157,8 +157,8 @@ class Sqlite:
             raise CannotStart(f"Cannot open {self._the}: {cause_of(error)}.") from error
 
     def look(self, question: Callable[[Connection], object]) -> None:
-        """Ask what is in the file, if there is one. To open one as ours would already change it: its
-        log is another one from then on."""
+        """Call `question` with a read-only connection to the file, if it exists. A normal
+        connection would already change the file's journal mode."""
         if not self._path.exists():
             return
         with _readable(self._path) as path:
@@ -187,7 +187,7 @@ class Sqlite:
             engine.dispose()
 
     def _make(self) -> None:
-        """An empty file, if there is none: what lies beside it gets the same rights."""
+        """Create an empty file if there is none; SQLite gives the files beside it the same rights."""
         try:
             os.close(opener(str(self._path), os.O_RDWR | os.O_CREAT))
         except OSError as error:
@@ -226,7 +226,8 @@ class Sqlite:
         return await self.ask(asked)
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
-        """Stored events as they stand, also where text has become unreadable."""
+        """Return a page of stored events, also those whose text is damaged, and the position for
+        the next page."""
         raw: Any = connection.connection.dbapi_connection
         plain, raw.text_factory = raw.text_factory, _lenient
         try:
@@ -236,7 +237,7 @@ class Sqlite:
         return [row[:8] for row in rows], rows[-1][8] if rows else after
 
     def bytes_in_use(self, connection: Connection) -> dict[str, int]:
-        """Bytes of the file, and of the log beside it."""
+        """Return the bytes of the file and of its write-ahead log."""
         del connection
         log = self._path.with_name(f"{self._path.name}-wal")
         return {
@@ -266,7 +267,8 @@ class Sqlite:
 
 
 def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
-    """An engine whose transactions are SQLite's own: also for schema changes, locked at BEGIN."""
+    """Return an engine that uses SQLite's own transactions, also for schema changes, with the write
+    lock taken at BEGIN."""
     engine = create_engine(
         f"sqlite:///{path}", poolclass=NullPool, connect_args={"timeout": wait}, **options
     )
@@ -286,8 +288,8 @@ def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
 
 @contextmanager
 def _readable(path: Path) -> Iterator[Path]:
-    """A file to look into. What was interrupted while it was no log yet has to be taken back before it
-    can be read, so that is done to a copy."""
+    """Yield the path of a file to read. If it has a hot rollback journal, that is applied to a
+    copy, whose path is yielded."""
     undone = path.with_name(f"{path.name}-journal")
     if not undone.exists() or not undone.stat().st_size:
         yield path
@@ -321,8 +323,8 @@ def inspected(path: Path, tell: Callable[[int], None] = lambda _: None) -> tuple
 
 
 def unchanged(path: Path) -> str:
-    """The URL of a file that is only read. Where nothing waits in a log beside it, no lock and no
-    index of a log is made either."""
+    """Return the URL for reading a file without changing it. If its write-ahead log is empty, no
+    lock and no index file are made either."""
     log = path.with_name(f"{path.name}-wal")
     waits = log.exists() and log.stat().st_size > 0
     return f"sqlite:///file:{quote(str(path))}?uri=true&" + ("mode=ro" if waits else "immutable=1")

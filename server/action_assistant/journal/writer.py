@@ -34,8 +34,8 @@ _LAST: Final = select(func.coalesce(func.max(editor_tables.editor_event.c.positi
 
 
 class Job(Generic[T]):
-    """Work for the writer. `done` is called with its result, or with why there is none; it must not
-    raise. `is_brief`: it appends a little to a stream, and does nothing else."""
+    """Work for the writer. `done` is called with the result or the error; it must not raise.
+    `is_brief`: the job only appends a little to one stream."""
 
     def __init__(
         self,
@@ -57,8 +57,8 @@ class Transaction:
     """The transaction that jobs write in. Events are gathered, and stored by one statement at the
     end.
 
-    A job that does nothing else costs no round trip of its own. Every other statement of a job is
-    inside a savepoint, so that what a job did wrong touches nobody else's work.
+    A job that only appends costs no round trip of its own. Every other statement of a job is inside
+    a savepoint, so that a failed job does not affect the others.
     """
 
     def __init__(self, session: WriterSession, fold: Fold, clock: ClockUs) -> None:
@@ -86,7 +86,7 @@ class Transaction:
 
     @property
     def connection(self) -> Connection:
-        """For statements: inside the transaction, and the savepoint of this job."""
+        """The connection for statements inside of this job's savepoint."""
         if not self._entered:
             self._flush()
             self._session.say("SAVEPOINT job")
@@ -94,7 +94,8 @@ class Transaction:
         return self._session.connection
 
     def add(self, addition: Addition) -> int:
-        """Append to one stream and fold; the newest seq. Raises Conflict, BadInput."""
+        """Append to one stream and fold; return the newest seq. Raise Conflict if the stream has
+        another end than `expected`, BadInput if a text cannot be stored."""
         stream = addition.stream
         _check_text(stream)
         for each in addition.drafts:
@@ -122,7 +123,7 @@ class Transaction:
         return self._head(stream)
 
     def attempt(self, job: Job[Any], database: Database) -> Outcome:
-        """One job. Raises what makes it impossible to store anything; all else is its outcome."""
+        """Run one job and return its outcome. Raise only what prevents storing anything at all."""
         position = self._position
         self._before.clear()
         try:
@@ -151,7 +152,8 @@ class Transaction:
         return result, None, [event for event, _ in own]
 
     def finish(self) -> None:
-        """Commit. After `committing`, a failure leaves open whether it has happened."""
+        """Commit. If this fails after `committing` is set, it is unknown whether the commit has
+        happened."""
         self.committing = True
         if self._begun:
             self.committing = False
@@ -164,7 +166,7 @@ class Transaction:
         self._begun = False
 
     def _flush(self) -> None:
-        """Store what earlier jobs gathered, in a transaction that stays open."""
+        """Store the events that earlier jobs gathered; the transaction stays open."""
         if not self._begun:
             self._session.begin()
             self._begun = True
@@ -190,9 +192,9 @@ class Transaction:
 
 
 class Writer:
-    """The only writer of a database. What waits while a commit is under way is the next one.
+    """The only writer of a database. Jobs that wait during a commit form the next transaction.
 
-    `tell` is called on the writer's thread after each commit or failure there, once for all its jobs.
+    `tell` is called on the writer's thread after each commit or failure, once for all its jobs.
     """
 
     def __init__(
@@ -217,13 +219,13 @@ class Writer:
         self._thread.start()
 
     def submit(self, jobs: Sequence[Job[Any]]) -> None:
-        """Queue jobs, for one transaction if it can hold them; returns at once."""
+        """Queue jobs, for one transaction if it can hold them; return at once."""
         self.metrics.submitted(len(jobs))
         self._jobs.put(jobs)
 
     def commit(self, jobs: Sequence[Job[Any]]) -> JobOutcomes:
-        """Commit jobs here and now. Only while of everything that was submitted `tell` has said what became
-        of it."""
+        """Commit jobs on this thread and return their outcomes. Call it only after `tell` has
+        reported the outcomes of all jobs submitted before."""
         self.metrics.submitted(len(jobs))
         return self._commit(jobs)
 
@@ -244,7 +246,7 @@ class Writer:
         return self._thread.is_alive()
 
     def close(self) -> None:
-        """Finish what was submitted, then end the thread. Blocks."""
+        """Finish all submitted jobs, then end the thread. Blocks."""
         self._jobs.put(None)
         self._thread.join()
 
@@ -258,7 +260,7 @@ class Writer:
                 return
 
     def _next(self) -> tuple[list[Job[Any]], bool]:
-        """Wait for jobs and return all of them, and whether the writer has to end after them."""
+        """Wait for jobs; return all that are queued, and whether the writer has to end after them."""
         found: list[Job[Any]] = []
         jobs = self._jobs.get()
         while jobs is not None:
@@ -351,7 +353,8 @@ def _scalar(session: WriterSession, chosen: Select[Any]) -> object:
 
 @lru_cache(_KNOWN)  # the same names come again and again
 def _check_text(text: str) -> None:
-    """Raise BadInput for what some database cannot hold: found at the commit, it would harm others."""
+    """Raise BadInput for a text that some database cannot store. At the commit such an error would
+    affect other jobs."""
     try:
         if b"\0" not in text.encode():
             return

@@ -101,8 +101,8 @@ export interface EditorApi {
     };
     /**
      * BackupsShown
-     * @description The last backup that was made, and what it lacks; the last one that came to nothing since; the last
-     *     trial that restored one; and when the next one is due. Null where there was none.
+     * @description The last backup and what it lacks, the failure since then, the last restore rehearsal, and
+     *     when the next backup is due. Fields are null where there was none.
      */
     BackupsShown: {
         made_at: string | null;
@@ -675,7 +675,7 @@ export interface EditorApi {
     };
     /**
      * Health
-     * @description The process answers. `commit`: of this program, null when nobody knows.
+     * @description The answer of a process that is alive. `commit`: of this program, null if unknown.
      */
     Health: {
         status: string;
@@ -779,7 +779,7 @@ export interface EditorApi {
     };
     /**
      * InvitationQuestion
-     * @description A link that somebody wants to know more about before using it.
+     * @description An invitation about which a person asks before using it.
      */
     InvitationQuestion: {
         invitation: string;
@@ -1105,8 +1105,8 @@ export interface EditorApi {
     };
     /**
      * OpenSession
-     * @description A browser that is signed in. `invitation` is the id of the link that it came by; without one it
-     *     came by the token.
+     * @description A browser that is signed in. `invitation`: the id of the invitation by which it came in; it
+     *     is missing if it came in by the token.
      */
     OpenSession: {
         id: string;
@@ -1185,7 +1185,7 @@ export interface EditorApi {
     };
     /**
      * Person
-     * @description A person who acts now, with a role that says what they may do.
+     * @description A person with a role, which says what they may do.
      */
     Person: {
         id: string;
@@ -1358,9 +1358,9 @@ export interface EditorApi {
     };
     /**
      * Readiness
-     * @description The answer to whether the process can do its work, and what prevents it.
+     * @description The answer to the question whether the process can do its work, with what prevents it.
      *
-     *     `parts` says what each part lacks, null where it works. Without `rclpy` a process is ready.
+     *     `parts`: what each part lacks, null where it works. A missing `rclpy` is no problem here.
      */
     Readiness: {
         ready: boolean;
@@ -1496,8 +1496,8 @@ export interface EditorApi {
     };
     /**
      * SignIn
-     * @description The body of a sign-in: the token or an invitation at first, and a name when the person gives
-     *     one.
+     * @description The body of a sign-in: the token or an invitation, and optionally the person's name. A
+     *     signed-in person may send only a new name.
      *
      *     An invitation is `ID.SECRET`, as its link has it.
      */
@@ -1534,7 +1534,8 @@ export interface EditorApi {
     };
     /**
      * StorageShown
-     * @description Bytes: what the disk of the data folder has left, and what is in use.
+     * @description Bytes: free space and size of the disk of the data folder, and what the database and folders
+     *     take.
      */
     StorageShown: {
         /** Format: date-time */

@@ -194,8 +194,8 @@ export interface RunnerApi {
     };
     /**
      * BackupsShown
-     * @description The last backup that was made, and what it lacks; the last one that came to nothing since; the last
-     *     trial that restored one; and when the next one is due. Null where there was none.
+     * @description The last backup and what it lacks, the failure since then, the last restore rehearsal, and
+     *     when the next backup is due. Fields are null where there was none.
      */
     BackupsShown: {
         made_at: string | null;
@@ -506,7 +506,7 @@ export interface RunnerApi {
     };
     /**
      * Health
-     * @description The process answers. `commit`: of this program, null when nobody knows.
+     * @description The answer of a process that is alive. `commit`: of this program, null if unknown.
      */
     Health: {
         status: string;
@@ -981,9 +981,9 @@ export interface RunnerApi {
     };
     /**
      * Readiness
-     * @description The answer to whether the process can do its work, and what prevents it.
+     * @description The answer to the question whether the process can do its work, with what prevents it.
      *
-     *     `parts` says what each part lacks, null where it works. Without `rclpy` a process is ready.
+     *     `parts`: what each part lacks, null where it works. A missing `rclpy` is no problem here.
      */
     Readiness: {
         ready: boolean;
@@ -1102,7 +1102,7 @@ export interface RunnerApi {
     };
     /**
      * Revocation
-     * @description An invitation that lets nobody in any more, or a session that has ended: one of the two.
+     * @description The invitation that is revoked or the session that is ended: one of the two.
      */
     Revocation: {
         /** @default null */
@@ -1585,7 +1585,8 @@ export interface RunnerApi {
     };
     /**
      * StorageShown
-     * @description Bytes: what the disk of the data folder has left, and what is in use.
+     * @description Bytes: free space and size of the disk of the data folder, and what the database and folders
+     *     take.
      */
     StorageShown: {
         /** Format: date-time */

@@ -31,9 +31,9 @@ class OffSite(msgspec.Struct, frozen=True):
 
 
 class BackupMade(msgspec.Struct, frozen=True, kw_only=True):
-    """A finished backup. `at`: when it was begun, seconds since 1970. `events` of each journal.
-    `missing`: sentences. `proven`: its file was read back and is what was written. `off_site`: None
-    when no command is set for that."""
+    """A finished backup. `at`: its begin, seconds since 1970. `events`: the number of each journal.
+    `missing`: one sentence for each missing part. `proven`: the file was read back and verified.
+    `off_site`: the outcome of the command that copies it elsewhere; None without a command."""
 
     at: float
     file: str
@@ -47,7 +47,7 @@ class BackupMade(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BackupFailed(msgspec.Struct, frozen=True):
-    """A backup that came to nothing, after the last one that did not."""
+    """A backup that failed, after the last one that did not."""
 
     at: float
     why: str
@@ -66,8 +66,8 @@ class BackupRehearsed(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BackupSchedule(msgspec.Struct, frozen=True, kw_only=True):
-    """Backups go into the folder `into` every so many seconds; `keep` says how many stay. `next`: when
-    the next one is due, seconds since 1970."""
+    """A backup goes into the folder `into` every `every` seconds; `keep`: the retention rule;
+    `next`: when the next one is due, seconds since 1970."""
 
     into: str
     every: float
@@ -108,7 +108,7 @@ def backup_state(data: Path) -> BackupState | None:
 
 
 def note(data: Path, change: Callable[[BackupState], BackupState]) -> None:
-    """Write down what has become known."""
+    """Update the stored state by `change`."""
     path = data / FILE
     try:
         guard = opener(str(path.with_name(f"{FILE}.lock")), os.O_RDWR | os.O_CREAT)
@@ -129,18 +129,18 @@ def made(data: Path, backup: BackupMade) -> None:
 
 
 def failed(data: Path, why: str) -> None:
-    """A backup came to nothing."""
+    """Record that a backup failed."""
     said = BackupFailed(time.time(), why)
     note(data, lambda state: msgspec.structs.replace(state, failed=said))
 
 
 def scheduled(data: Path, schedule: BackupSchedule) -> None:
-    """The next backup is due then."""
+    """Record when the next backup is due."""
     note(data, lambda state: msgspec.structs.replace(state, schedule=schedule))
 
 
 def rehearsed(data: Path, rehearsal: BackupRehearsed) -> None:
-    """A backup was restored for a trial."""
+    """Record the outcome of a trial restore."""
 
     def change(state: BackupState) -> BackupState:
         proven = rehearsal if rehearsal.why is None else state.proven

@@ -48,7 +48,7 @@ class UpgradeCopy(NamedTuple):
 
 
 def copy_at(path: Path) -> UpgradeCopy | None:
-    """Return the copy that a file name describes; None for other files."""
+    """Return the copy that a file name describes; None for other names."""
     revision, _, stamp = path.stem.partition("-")
     named = revision.partition("_")[0]
     try:
@@ -96,8 +96,9 @@ def keep_copy(folder: Path, connection: Connection, branch: Branch, revision: st
 
 
 def _superfluous(copies: list[UpgradeCopy]) -> list[UpgradeCopy]:
-    """All but the newest few, and the newest of each of the last few revisions: an upgrade that fails
-    at each start must not take away what was before."""
+    """Return the copies that may be deleted. The newest few stay, and the newest of each of the
+    last few revisions, since an upgrade that fails at each start must not push out the old
+    state."""
     newest: dict[str, UpgradeCopy] = {}
     for each in copies:
         newest.setdefault(each.revision, each)
@@ -106,7 +107,7 @@ def _superfluous(copies: list[UpgradeCopy]) -> list[UpgradeCopy]:
 
 
 def _written(target: Path, connection: Connection, branch: Branch, revision: str) -> int:
-    """A file that is there as a whole, proven, or not at all; how many events it holds."""
+    """Write a copy, verify it, and rename it to `target`; return the number of its events."""
     for left in target.parent.glob(
         f".{branch}_*.part*"
     ):  # of one that was killed: we are alone here
@@ -126,7 +127,7 @@ def _written(target: Path, connection: Connection, branch: Branch, revision: str
 
 
 def _free(folder: Path, revision: str) -> Path:
-    """A name that none has yet."""
+    """Return a file name that no copy has yet."""
     while True:
         target = folder / f"{revision}-{datetime.now(UTC).strftime(_STAMP)}.db"
         if not target.exists():
@@ -152,7 +153,8 @@ def _check_room(folder: Path, size: int) -> None:
 def _copy_file(
     connection: Connection, branch: Branch, revision: str, part: Path
 ) -> Callable[[], list[Damage]]:
-    """The very file, also what waits in the log beside it; what to ask for damage of the original."""
+    """Copy the SQLite file with its write-ahead log; return a function that returns the damage of
+    the original."""
     del branch, revision
     row = connection.exec_driver_sql("PRAGMA database_list").first()
     source = Path(str(row[2]) if row is not None else "")
@@ -175,7 +177,8 @@ def _copy_file(
 def _copy_rows(
     connection: Connection, branch: Branch, revision: str, part: Path
 ) -> Callable[[], list[Damage]]:
-    """All tables of ours as they are, into a file at the same revision."""
+    """Copy all our tables into a SQLite file of the same revision; return a function that returns
+    the damage of the original."""
     from action_assistant.journal import alembic_scripts
 
     _check_room(
@@ -204,8 +207,8 @@ def _copy_rows(
 
 
 def _rows_of(connection: Connection, table: Table) -> Iterator[list[dict[str, Any]]]:
-    """Some at a time, events in their order. By a cursor that is closed before the tables change: the
-    driver's own stay open until the transaction is over."""
+    """Yield the rows of a table in batches, events in order. Its cursor is closed before the tables
+    change; the driver's own stays open until the end of the transaction."""
     cursor = f"copied_{table.name}"
     order = " ORDER BY position" if table.name == "event" else ""
     command = f'DECLARE {cursor} CURSOR FOR SELECT * FROM "{table.name}"{order}'
@@ -236,7 +239,7 @@ def _proven(part: Path, before: Callable[[], list[Damage]]) -> int:
 
 
 def _telling(what: str) -> Callable[[str], None]:
-    """Says how far something has come, once a second."""
+    """Return a function that logs progress, once a second at most."""
     last = time.monotonic()
 
     def tell(how_far: str) -> None:

@@ -33,13 +33,14 @@ def copy(
     over_older: bool = False,
     then: Callable[[], None] = lambda: None,
 ) -> int:
-    """Copy everything as it is at one moment, while others may write; how many events. The tables are
-    folded anew, in the same transaction: whatever ends it, all is there or nothing.
+    """Copy a consistent state of a journal, while others may write; return the number of events.
+    The tables are folded again in the same transaction, so that all or nothing is copied.
 
-    `tell` hears how many events have been copied so far. With `over_older` the target may hold an
-    earlier state of the very same log, which is replaced. `then` is done before anybody else may write
-    to the target. To be called where no loop runs; not from one server to another. Raises CannotStart:
-    damaged, not to be reached, or the target holds something else.
+    `tell` is called with the number of events copied so far. With `over_older`, the target may hold
+    an earlier state of the very same log, which is replaced. `then` is called before others may
+    write to the target. Call this where no event loop runs, and not from one server to another.
+    Raise CannotStart if the source is damaged, a database is not reached, or the target holds other
+    data.
     """
 
     def pour(here: Connection) -> int:

@@ -60,7 +60,7 @@ def cookie_name(page_port: int) -> str:
 
 
 def device_cookie_name(page_port: int) -> str:
-    """The cookie by which a browser is known again after somebody has signed out there."""
+    """Return the name of the cookie that identifies a browser, whoever signs in."""
     return f"aa_{page_port}_device"
 
 
@@ -71,13 +71,13 @@ def person_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Person:
 
 
 def device_of(connection: ASGIConnection[Any, Any, Any, Any]) -> str:
-    """The id of the browser; "" of one that has none yet."""
+    """Return the id of the browser; "" if it has none yet."""
     device: str = connection.scope["state"].get("device", "")
     return device
 
 
 def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None:
-    """The browser's session; None for programs with a token."""
+    """Return the browser's session; None for programs with a token."""
     session: Session | None = connection.scope["state"].get("session")
     return session
 
@@ -104,7 +104,7 @@ class Needs:
 
 
 def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | None:
-    """Return the person of this browser's session, also of an expired one; None without any."""
+    """Return the person of this browser's session, also of an expired one; None without a session."""
     state = connection.scope["state"]
     session: Session | None = state.get("session") or state.get("expired")
     return session.person if session is not None else None
@@ -136,9 +136,9 @@ def plain(connection: ASGIConnection[Any, Any, Any, Any]) -> Plain:
 
 
 class Access:
-    """An ASGI middleware that lets in who may come in.
+    """An ASGI middleware that authenticates each request and refuses strangers.
 
-    `is_open(path, accepts_html)` says what answers without credentials; `policy(host)` is the
+    `is_open(path, accepts_html)` says which paths need no credentials; `policy(host)` returns the
     Content-Security-Policy for a page asked for under that Host header.
     """
 
@@ -198,7 +198,8 @@ class Access:
     async def _leashed(
         self, session: Session, scope: HTTPScope | WebSocketScope, receive: Receive, send: Send
     ) -> None:
-        """Pass on, but only as long as the session lasts. Stop outlives one that merely expired."""
+        """Pass the request on, and end it when the session ends. A socket for Stop goes on if the
+        session has only expired."""
         begun = over = False
 
         async def sent(message: Message) -> None:
@@ -361,7 +362,8 @@ def _is_stop(method: str, path: str) -> bool:
 
 
 def _headers(scope: HTTPScope | WebSocketScope) -> dict[str, str]:
-    """Header fields by lower-case name. A repeated Host or Origin is a trick: it matches nothing."""
+    """Return the header fields by lower-case name. The values of a repeated field are joined, so
+    that a repeated Host or Origin matches nothing."""
     found: dict[str, str] = {}
     for raw, value in scope["headers"]:
         name = raw.decode("latin-1").lower()
@@ -374,7 +376,7 @@ def _headers(scope: HTTPScope | WebSocketScope) -> dict[str, str]:
 async def refuse(
     scope: HTTPScope | WebSocketScope, receive: Receive, send: Send, refused: Refused
 ) -> None:
-    """Answer a request, or one for an upgrade, with a refusal."""
+    """Answer a request, or the upgrade request of a WebSocket, with a refusal."""
     log.info("refused %s: %s", scope["path"], refused.detail)
     body = problem_of(refused)
     fields = [(b"content-type", b"application/problem+json")]

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class Caller(NamedTuple):
     """Identifies the client for whom a request works, so that abandoned work can be cancelled.
 
-    `device` is the browser, whoever is signed in there; "" if unknown.
+    `device`: the id of the browser, whoever is signed in; "" if unknown.
     """
 
     person: str
@@ -50,7 +50,7 @@ def caller() -> Caller | None:
 
 
 def device() -> str:
-    """Return the browser of whoever asked for what this task does; "" where that is not known."""
+    """Return the id of the browser for which this task works; "" if unknown."""
     asking = _CALLER.get()
     return "" if asking is None else asking.device
 
@@ -84,9 +84,9 @@ def detach_from_request() -> None:
 class BackgroundTasks:
     """Starts tasks that outlive the request in which they begin.
 
-    A task inherits the caller of the code that starts it. When that request ends, whatever the task
-    asks of a worker would be refused, and the refusal would end the whole group. So services that live
-    as long as their process are given this instead of a TaskGroup.
+    A task inherits the caller of the code that starts it. When the request of that caller ends, a
+    worker would refuse the task, and the error would end the whole group. So services that live as
+    long as their process get this instead of a TaskGroup.
     """
 
     def __init__(self, tasks: TaskGroup) -> None:
@@ -97,7 +97,7 @@ class BackgroundTasks:
         work: Callable[[Unpack[_Values]], Coroutine[object, object, object]],
         *values: *_Values,
     ) -> None:
-        """Start a task that nobody waits for."""
+        """Start a task without a caller."""
         token = _CALLER.set(None)
         try:
             self._tasks.start_soon(work, *values)

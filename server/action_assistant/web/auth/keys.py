@@ -35,16 +35,14 @@ class PersonRef(msgspec.Struct, frozen=True):
 
 
 class Person(PersonRef, frozen=True):
-    """A person who acts now, with a role that says what they may do."""
+    """A person with a role, which says what they may do."""
 
     role: Role = "viewer"
 
 
 class Session(msgspec.Struct, frozen=True):
-    """A browser that once presented the token, or an invitation. `expires` is in seconds since 1970.
-
-    `invitation` is the id of the one it came in by; None for the token.
-    """
+    """A browser that has presented the token or an invitation. `expires`: seconds since 1970.
+    `invitation`: the id of the invitation; None for the token."""
 
     id: str
     person: Person
@@ -93,7 +91,8 @@ class Keys:
 
     @classmethod
     def of(cls, data: Path) -> "Keys":
-        """The keys of a data folder; made when it has none. The environment's token wins."""
+        """Return the keys of a data folder, made if it has none. A token in the environment takes
+        precedence."""
         return cls._given() or cls(_token_in(data), _named(data))
 
     @classmethod
@@ -138,7 +137,8 @@ class Keys:
         return Session(session_id or random_id(), person, expires, invitation)
 
     def secret_of(self, invitation: str) -> str:
-        """The secret of a link (256 bit): only who knows the token can tell it from the id."""
+        """Return the secret of an invitation (256 bit), which cannot be derived from its id without
+        the token."""
         return _text(hmac.digest(self._seal, b"invitation\0" + invitation.encode(), "sha256"))
 
     def prove(self, challenge: str, address: str) -> ServerProof:
@@ -181,12 +181,12 @@ class Keys:
         return f"{payload}.{_text(self._sign(payload))}"
 
     def new_device(self) -> str:
-        """Return the cookie by which a browser is known again, whoever signs in there."""
+        """Return a new cookie that identifies a browser, whoever signs in."""
         made = random_id()
         return f"{made}.{self._device_seal(made)}"
 
     def device(self, cookie: str) -> str:
-        """Return the id of the browser behind such a cookie; "" when we did not seal it."""
+        """Return the id of the browser behind a device cookie; "" if this server did not seal it."""
         found, _, seal = cookie.partition(".")
         return (
             found if hmac.compare_digest(self._device_seal(found).encode(), seal.encode()) else ""
@@ -196,7 +196,7 @@ class Keys:
         return _text(self._sign(f"device\0{device}"))
 
     def session(self, cookie: str) -> Session | None:
-        """The session behind a cookie, expired or not; None when we did not seal it."""
+        """Return the session behind a cookie, expired or not; None if this server did not seal it."""
         payload, _, signature = cookie.partition(".")
         if not hmac.compare_digest(_text(self._sign(payload)).encode(), signature.encode()):
             return None
@@ -221,7 +221,8 @@ def _named(data: Path) -> str:
 
 
 def _token_in(data: Path) -> str:
-    """The token kept in a folder. Two processes may ask at once: the first file to appear wins."""
+    """Return the token kept in a folder, made if there is none. If two processes make one at once,
+    the first file counts."""
     file = data / TOKEN_FILE
     try:
         if not file.exists():

@@ -48,14 +48,13 @@ class Revocations:
             self._marks = set()
 
     def holds(self, invitation: str | None) -> bool:
-        """Return whether an invitation was revoked. None stands for sessions that came in by the
-        token."""
+        """Return whether an invitation was revoked; False for None, which stands for the token."""
         if invitation is None:
             return False
         return _ID.fullmatch(invitation) is None or self._is_marked(invitation)
 
     def ended(self, session: Session) -> bool:
-        """Return whether this one session was ended."""
+        """Return whether this session was ended by itself, not by its invitation."""
         return _SESSION_ID.fullmatch(session.id) is None or self._is_marked(_SESSION + session.id)
 
     def ends(self, session: Session) -> bool:
@@ -63,10 +62,8 @@ class Revocations:
         return self.holds(session.invitation) or self.ended(session)
 
     def ends_now(self) -> Callable[[Session], bool]:
-        """Return the function `ends` for the present moment.
-
-        It reads the folder once, and so suits a check of many sessions.
-        """
+        """Return the function `ends` as of now. It reads the folder once, and so suits a check of
+        many sessions."""
         return self._ends_in_mind if self._take_up() else self.ends
 
     def every(self) -> frozenset[str]:
@@ -74,14 +71,15 @@ class Revocations:
         return frozenset(name for name in tuple(self._names()) if _ID.fullmatch(name))
 
     def add(self, invitation: str) -> None:
-        """Revoke one. Holds at once; is on disk when this returns. Raises Unavailable, when it holds
-        for this process and only until it ends; ValueError."""
+        """Revoke an invitation, at once and durably. Raise ValueError if the id is malformed; raise
+        Unavailable if the folder cannot be written, so that it holds only until this process
+        ends."""
         if _ID.fullmatch(invitation) is None:
             raise ValueError(f"{invitation!r} is no id of an invitation")
         self._mark(invitation)
 
     def end(self, session: str) -> None:
-        """End a session. As `add`."""
+        """End a session, at once and durably. Raise ValueError or Unavailable as `add` does."""
         if _SESSION_ID.fullmatch(session) is None:
             raise ValueError(f"{session!r} is no id of a session")
         self._mark(_SESSION + session)
@@ -128,8 +126,9 @@ class Revocations:
         return _SESSION_ID.fullmatch(session.id) is None
 
     def _take_up(self) -> bool:
-        """Keep in mind what others have marked; whether that is all there is. The time of a folder may
-        stay as it is for entries that follow each other closely."""
+        """Read the marks that other processes have written; return False if the folder cannot be
+        read. The modification time of a folder may stay the same for entries that follow
+        closely."""
         try:
             now = time.time_ns()
             changed = self._folder.stat().st_mtime_ns
@@ -166,12 +165,13 @@ class SessionGuard:
             self._task.cancel()
 
     def let_go(self) -> None:
-        """Undo the cancellation of the task, so that the task goes on after the guard has cut it."""
+        """Undo the cancellation of the task by this guard, so that the task can go on."""
         self._task.uncancel()
 
 
 class SessionGuards:
-    """The guards of everything that is open in somebody's name. Looks while there is any."""
+    """The guards of all open sockets and streams of sessions. It checks the sessions periodically
+    while there are any."""
 
     def __init__(self, revoked: Revocations) -> None:
         self._revoked = revoked

@@ -51,5 +51,5 @@ def rank(role: Role) -> int:
 
 
 def may(role: Role) -> str:
-    """Return in words what a role may do; the words follow `may`."""
+    """Return what a role may do, in words that follow "you may"."""
     return _MAY[role]

@@ -8,7 +8,7 @@ METRICS: Final = "/metrics"
 
 
 class ScrapeToken:
-    """Compared without telling by its time how much was right. Without one nothing is opened."""
+    """Compares tokens in constant time. If no token is set, no request is accepted."""
 
     def __init__(self, token: str | None = None) -> None:
         self._digest = None if token is None else _digest(token)

@@ -26,8 +26,8 @@ _MOST: Final = 5000  # that one process notes: somebody may sign in again and ag
 
 
 class OpenSession(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A browser that is signed in. `invitation` is the id of the link that it came by; without one it
-    came by the token."""
+    """A browser that is signed in. `invitation`: the id of the invitation by which it came in; it
+    is missing if it came in by the token."""
 
     id: str
     person: Person
@@ -45,7 +45,7 @@ class SessionFiles:
         self._noted: dict[str, Session] = {}
 
     def note(self, session: Session) -> None:
-        """Remember one. Without room for that nothing fails."""
+        """Store a session for the list of open sessions. A full disk or list is no error."""
         if self._noted.get(session.id) == session or len(self._noted) >= _MOST:
             return
         path = self._path(session.id)
@@ -59,7 +59,8 @@ class SessionFiles:
         self._noted[session.id] = session
 
     def every(self) -> list[OpenSession]:
-        """Return the sessions that still allow something, the newest first, and forget the others."""
+        """Return the sessions that are still valid, newest first, and delete the files of all
+        others."""
         found = []
         with contextlib.suppress(FileNotFoundError):
             for path in list(self._folder.glob("*.json")):

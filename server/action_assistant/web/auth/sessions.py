@@ -37,8 +37,8 @@ _Asking = Request[Any, Any, Any]
 
 
 class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The body of a sign-in: the token or an invitation at first, and a name when the person gives
-    one.
+    """The body of a sign-in: the token or an invitation, and optionally the person's name. A
+    signed-in person may send only a new name.
 
     An invitation is `ID.SECRET`, as its link has it.
     """
@@ -56,7 +56,7 @@ class SignedIn(msgspec.Struct, frozen=True):
 
 
 class InvitationQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A link that somebody wants to know more about before using it."""
+    """An invitation about which a person asks before using it."""
 
     invitation: Annotated[str, msgspec.Meta(max_length=200)]
 
@@ -70,7 +70,7 @@ class Invited(msgspec.Struct, frozen=True):
 
 
 class Revocation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An invitation that lets nobody in any more, or a session that has ended: one of the two."""
+    """The invitation that is revoked or the session that is ended: one of the two."""
 
     invitation: str | None = None
     session: str | None = None
@@ -83,7 +83,7 @@ class InvitationRegistry(Protocol):
         """Return the invitation that a link proves. Raise Unauthenticated if the link is not valid."""
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
-        """Remember who came in by it."""
+        """Record that a person came in by an invitation."""
 
 
 class Sessions:
@@ -136,7 +136,7 @@ class Sessions:
                 raise BadInput("Send the token or an invitation, not both.")
 
     def answer(self, session: Session, request: _Asking) -> Response[SignedIn]:
-        """The session as a cookie."""
+        """Return the answer that sets the cookie of a session."""
         secure, path = self._jar(request)
         cookie = Cookie(
             key=self._cookie,
@@ -152,8 +152,7 @@ class Sessions:
         )
 
     def _device_cookie(self, request: _Asking) -> list[Cookie]:
-        """The cookie by which this browser is known again, also after somebody has signed out; none where it
-        has one."""
+        """Return a new cookie that identifies this browser; an empty list if it has one."""
         if device_of(request):
             return []
         secure, path = self._jar(request)
@@ -169,7 +168,8 @@ class Sessions:
         return [made]
 
     def farewell(self, request: _Asking, unwritten: Unavailable | None = None) -> Response[None]:
-        """No cookie any more. `unwritten`: why other processes may not know of it."""
+        """Return the answer that deletes the session cookie. `unwritten`: why other processes may
+        not know of the end of the session."""
         content: Any = None if unwritten is None else problem_of(unwritten)
         response: Response[None] = Response(
             content,
@@ -249,7 +249,8 @@ def session_routes(
 
 
 def revocation(revoked: Revocations) -> list[ControllerRouterHandler]:
-    """For a process that knows no invitations: the runner, which may be on another computer."""
+    """Return the route by which the editor ends sessions in a process without invitations: the
+    runner, which may be on another computer."""
 
     @post(
         "/api/revocations",
@@ -299,8 +300,8 @@ async def _end(revoked: Revocations, request: _Asking) -> None:
 async def _invited(
     keys: Keys, reception: InvitationRegistry, proof: str, name: str, request: _Asking
 ) -> Session:
-    """A session for who comes by a link. Who may do more already keeps that: a link takes nothing
-    away."""
+    """Return a session for a person who comes in by an invitation. A person whose present role is
+    higher keeps their session."""
     invited = reception.look(proof)
     now = session_of(request)
     if now is not None and rank(now.person.role) >= rank(invited.role):

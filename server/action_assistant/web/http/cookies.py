@@ -10,10 +10,10 @@ _BLANKS: Final = " \t"
 
 
 def values(header: str, name: str) -> Iterator[str]:
-    """The values of the cookies of this name, in the order they came. Never raises.
+    """Yield the values of the cookies of this name, in order. Never raises.
 
-    `http.cookies` gives up at the first cookie that is not to its taste, such as `g_state={"i_l":0}`.
-    Browsers (RFC 6265, 5.4) send whatever was set, by any program of this host, on any port.
+    `http.cookies` gives up at the first malformed cookie, such as `g_state={"i_l":0}`. Browsers
+    (RFC 6265, 5.4) send the cookies of all programs of this host, on any port.
     """
     pairs = (each.partition("=") for each in header.split(";"))
     ours = (value for found, sign, value in pairs if sign and found.strip(_BLANKS) == name)

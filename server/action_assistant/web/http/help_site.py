@@ -25,10 +25,10 @@ _MISSING: Final = "There is no such page."
 
 
 class HelpSite:
-    """An ASGI middleware that answers for `/help/` and passes on the rest.
+    """An ASGI middleware that answers for `/help/` and passes other requests on.
 
-    Files are read when they are first asked for, and all of them anew when somebody has built them
-    anew. The site names its own pages relatively, so it lies below any path.
+    Files are read at the first request, and again when the site was built again. The site has
+    relative links only, so it works below any path.
     """
 
     def __init__(self, app: ASGIApp, folder: Path) -> None:
@@ -44,7 +44,8 @@ class HelpSite:
         return path == _HELP or path.startswith(f"{_HELP}/")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the file, or say that there is none."""
+        """Send a file of the site, or a 404 for an unknown path below `/help/`; pass other requests
+        on."""
         if (
             scope["type"] != ScopeType.HTTP
             or scope["method"] not in {"GET", "HEAD"}

@@ -16,9 +16,9 @@ _UNBUILT: Final = b"""<!doctype html><meta charset="utf-8"><title>Page not built
 
 
 class Page:
-    """An ASGI middleware that answers for the page's own paths and passes on the rest.
+    """An ASGI middleware that answers for the page's own paths and passes other requests on.
 
-    `root_of(scope)` is the path at which the page lies for whoever asks: "" or as "/temoto".
+    `root_of(scope)` is the path prefix of the page for this client: "" or for example "/temoto".
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class Page:
             self._rooted = {}
 
     def _index_at(self, root: str) -> File:
-        """The page itself. What it names beside it is at its root, whichever address it is opened by."""
+        """Return the index page, with its relative links changed to links below `root`."""
         if root not in self._rooted:
             body = self._index.body.replace(b'="./', f'="{root}/'.encode())
             self._rooted[root] = File(body, ".html", lasting=False)

@@ -49,7 +49,7 @@ class ProblemDetails(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def problem_of(refused: Refused) -> bytes:
-    """The body for a refusal."""
+    """Return the JSON body for a refusal."""
     return msgspec.json.encode(
         ProblemDetails(refused.type, refused.title, refused.status, refused.detail, refused.where)
     )
@@ -96,7 +96,7 @@ def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Respons
 def _told(
     request: Request[Any, Any, Any], error: HTTPException
 ) -> tuple[str, dict[str, Any] | None]:
-    """Return a sentence about the fault, and its place in the body if that is known."""
+    """Return a sentence about the error, and the path of the wrong field in the body, if known."""
     if isinstance(error, ValidationException) and isinstance(error.extra, list):
         wrong = [item for item in error.extra if isinstance(item, dict)]
         said = [

@@ -40,7 +40,7 @@ class Requests:
         self._counts = counts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, with an id and a count of what is open."""
+        """Pass a request on with a request id, and count it while it is open."""
         if scope["type"] not in _CALLS:  # lifespan
             await self._app(scope, receive, send)
             return

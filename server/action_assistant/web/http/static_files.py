@@ -18,7 +18,8 @@ Fields = tuple[tuple[bytes, bytes], ...]
 
 
 class File:
-    """One file as it is sent. `lasting`: its name says its content."""
+    """One file as it is sent. `lasting`: its name contains a hash of its content, so it never
+    changes."""
 
     def __init__(self, body: bytes, suffix: str, *, lasting: bool) -> None:
         media = _MEDIA.get(suffix, "application/octet-stream")
@@ -30,8 +31,9 @@ class File:
         self._zipped: bytes | None = None if pays else b""
 
     async def zipped(self) -> bytes:
-        """Compressed; empty where that does not pay. Made when it is asked for first, on a thread: a start
-        has no time for all files of the page, and the largest takes a tenth of a second."""
+        """Return the gzip-compressed body; empty if compression saves nothing. It is compressed at
+        the first request, on a thread: at the start there is no time for all files, and the
+        largest takes a tenth of a second."""
         if self._zipped is None:
             self._zipped = await to_thread.run_sync(partial(gzip.compress, self.body, mtime=0))
         return self._zipped
@@ -40,7 +42,7 @@ class File:
 async def send_file(
     scope: HTTPScope, send: Send, file: File, status: int = 200, more: Fields = ()
 ) -> None:
-    """Answer with a file, with the headers `more` beside those that it has by itself."""
+    """Answer with a file; `more` are additional headers."""
     asked = dict(scope["headers"])
     fields = [
         (b"etag", file.etag.encode()),

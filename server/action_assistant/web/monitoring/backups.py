@@ -11,8 +11,8 @@ from action_assistant.web.monitoring.gauges import Family
 
 
 class BackupsShown(msgspec.Struct, frozen=True, kw_only=True):
-    """The last backup that was made, and what it lacks; the last one that came to nothing since; the last
-    trial that restored one; and when the next one is due. Null where there was none."""
+    """The last backup and what it lacks, the failure since then, the last restore rehearsal, and
+    when the next backup is due. Fields are null where there was none."""
 
     made_at: datetime | None = None
     bytes: int | None = None
@@ -51,7 +51,7 @@ def backups_shown(state: BackupState | None) -> BackupsShown | None:
 
 
 def families(state: BackupState | None) -> Iterator[Family]:
-    """For a registry: nothing of what never was."""
+    """Yield the metrics of backups; a metric whose event never happened is left out."""
     if state is None:
         return
     if (last := state.last) is not None:

@@ -12,7 +12,7 @@ Labelled: TypeAlias = Mapping[Any, float]
 
 
 class Family(NamedTuple):
-    """One metric, with a value for each set of labels; without labels the value alone."""
+    """One metric: a value for each set of labels, or a single value without labels."""
 
     name: str
     documentation: str

@@ -74,8 +74,8 @@ class Monitoring:
     # --- what is told -------------------------------------------------------------------------
 
     async def readiness(self) -> Readiness:
-        """Return whether the process can do its work. The answer comes within seconds, whatever
-        hangs."""
+        """Return whether the process can do its work. The answer comes within seconds even if a
+        part hangs."""
         if self._watched is None:
             return Readiness(ready=True)
         found: dict[str, str | None] = {}
@@ -94,7 +94,7 @@ class Monitoring:
         return Readiness.of(self._parts)
 
     async def exposition(self) -> str:
-        """All metrics, in the text format of Prometheus."""
+        """Return all metrics in the text format of Prometheus."""
         await self.readiness()
         # Whole numbers are written as such, as they were before: programs may read them so.
         return generate_latest(self._registry).decode().replace(".0\n", "\n")

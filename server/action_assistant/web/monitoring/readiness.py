@@ -23,9 +23,9 @@ _OPTIONAL: Final = frozenset({"rclpy"})
 
 
 class Readiness(msgspec.Struct, frozen=True):
-    """The answer to whether the process can do its work, and what prevents it.
+    """The answer to the question whether the process can do its work, with what prevents it.
 
-    `parts` says what each part lacks, null where it works. Without `rclpy` a process is ready.
+    `parts`: what each part lacks, null where it works. A missing `rclpy` is no problem here.
     """
 
     ready: bool

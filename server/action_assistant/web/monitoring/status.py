@@ -56,7 +56,8 @@ class JournalState(msgspec.Struct, frozen=True):
 
 
 class StorageShown(msgspec.Struct, frozen=True):
-    """Bytes: what the disk of the data folder has left, and what is in use."""
+    """Bytes: free space and size of the disk of the data folder, and what the database and folders
+    take."""
 
     at: datetime
     free: int
@@ -144,7 +145,7 @@ def journal_state(journal: Journal) -> JournalState:
 
 
 def storage_shown(found: Storage | None) -> StorageShown | None:
-    """Return the result of the last look at the storage for people; None before the first."""
+    """Return the last measurement of storage for the API; None before the first."""
     if found is None:
         return None
     at = datetime.fromtimestamp(found.at, UTC)

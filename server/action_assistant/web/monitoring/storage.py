@@ -37,8 +37,8 @@ class Storage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class StorageWatch:
-    """Looks again and again, whatever goes wrong. `folders` by what people call them; they are counted
-    `run_in_worker`. With `backups` also at what is known of these; None while that cannot be read."""
+    """Measures disk, database and folders periodically. `folders`: paths by the name that people
+    read; they are counted in a worker. `backups`: also read the state of backups."""
 
     def __init__(
         self,
@@ -106,7 +106,7 @@ class StorageWatch:
             await anyio.sleep(_FOLDERS_S)
 
     def families(self) -> Iterator[Family]:
-        """The newest numbers, for a registry."""
+        """Yield the newest numbers as metrics."""
         found = self.found
         if found is None:
             return

@@ -14,8 +14,8 @@ from action_assistant.web.workers.lanes import Lane
 
 
 class Watched:
-    """An open process: its journal, its workers (the last lane counts what is in `folders`), what counts
-    by itself; and what is looked up."""
+    """The parts of an open process that monitoring reads: its journal, its workers (the last lane
+    counts `folders`), and its own metrics."""
 
     def __init__(
         self,
@@ -30,7 +30,7 @@ class Watched:
         self.folders: Final = folders
 
     def families(self) -> Iterator[Family]:
-        """Return the metrics that are looked up when somebody asks."""
+        """Yield the metrics that are computed at each request."""
         raise NotImplementedError
 
     def activity(self) -> Activity:
@@ -38,5 +38,5 @@ class Watched:
         raise NotImplementedError
 
     async def parts(self) -> Parts:
-        """Return what has to work beside journal and disk."""
+        """Return the state of the other parts that have to work, beside journal and disk."""
         return {}

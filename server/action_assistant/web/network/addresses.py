@@ -57,13 +57,13 @@ def lan_names() -> tuple[str, ...]:
 
 
 class Addresses:
-    """Host names that may be asked for, and the origins of pages that may ask.
+    """Knows the host names by which this server may be addressed, and the origins of pages that may
+    call it.
 
-    `page_port` is the port of the page. Where host names were given on purpose the page may stand
-    behind a proxy, so for those any port and scheme are accepted. With `lan`, exactly the names that
-    it gives now are accepted too: it is asked again when an unknown one comes. `public` is the address
-    under which a proxy shows the page; whoever names it is answered as at that address, and nobody
-    else is.
+    `page_port`: the port of the page. For host names that were configured any port and scheme are
+    accepted, since a proxy may stand before the page. `lan`: returns further names; it is called
+    again when an unknown name comes. `public`: the address at which a proxy serves the page; only
+    requests that name it are answered as at that address.
     """
 
     def __init__(
@@ -96,7 +96,7 @@ class Addresses:
 
     @property
     def is_encrypted(self) -> bool:
-        """Return whether the address that others use first is encrypted."""
+        """Return whether the first address that others use is encrypted."""
         return self.secure if self._public is None else self._public.is_secure
 
     def allows_host(self, header: str | None) -> bool:
@@ -163,7 +163,7 @@ class Addresses:
 
     def names(self) -> tuple[str, ...]:
         """Return the names by which others reach this computer, the likeliest first; empty if they
-        cannot."""
+        cannot reach it."""
         own = {self._host} - _ANYWHERE - LOOPBACK
         return tuple(dict.fromkeys((*self._named, *own, *self._found)))
 

@@ -49,8 +49,8 @@ class Certificate:
         self.key: Final = self._folder / "server-key.pem"
 
     def renew(self, names: Sequence[str], *, now: datetime | None = None) -> bool:
-        """See that there is a certificate for these names that stays good for a while; whether it
-        is a new one. Raises CannotStart."""
+        """Make sure that a certificate for these names is valid for a while; return True if a new
+        one was issued. Raise CannotStart if the folder cannot be written."""
         now = now or datetime.now(UTC)
         try:
             with self._alone():
@@ -64,11 +64,11 @@ class Certificate:
             ) from error
 
     def trusting(self) -> ssl.SSLContext:
-        """For clients on this computer."""
+        """Return a TLS context that trusts our own authority only, for clients on this computer."""
         return ssl.create_default_context(cafile=str(self.authority))
 
     def trusting_too(self) -> ssl.SSLContext:
-        """Return a context that trusts the system's authorities, and our own if there is one."""
+        """Return a TLS context that trusts the system's authorities, and our own if it exists."""
         context = ssl.create_default_context()
         if self.authority.exists():
             context.load_verify_locations(cafile=str(self.authority))
@@ -120,7 +120,8 @@ class Certificate:
         _write(self.chain, _text(certificate) + _text(authority))
 
     def _authority(self, names: Sequence[str], now: datetime) -> Signer:
-        """The one that there is, if it may sign for these names; else a new one."""
+        """Return the existing authority if it may sign for these names for long enough, else a new
+        one."""
         kept = self._folder / "ca-key.pem"
         try:
             found = x509.load_pem_x509_certificate(self.authority.read_bytes())
@@ -168,7 +169,7 @@ _SIGNS: Final = x509.KeyUsage(
 
 
 def _begun(issuer: x509.Name, now: datetime, days: int) -> x509.CertificateBuilder:
-    """Valid from an hour ago: clocks of tablets are late at times."""
+    """Begin a certificate that is valid from an hour ago, since clocks of tablets may be late."""
     return (
         x509.CertificateBuilder()
         .issuer_name(issuer)
@@ -234,5 +235,5 @@ def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Replace a file that only this user may read, from its first moment on."""
+    """Replace a file, readable only by this user from its creation on."""
     replace_file(path, content, part=path.with_suffix(".new"))

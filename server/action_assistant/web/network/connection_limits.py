@@ -18,7 +18,8 @@ PER_MINUTE: Final = 300  # after that
 
 
 class ConcurrencyLimit:
-    """So many requests with large bodies of each person at a time; the others wait unread."""
+    """Limits how many requests with large bodies of one person are read at a time; the others wait
+    unread."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -39,10 +40,10 @@ class ConcurrencyLimit:
 
 
 class ConnectionLimits:
-    """The sockets of this process. Without `limits` it only counts.
+    """Counts and limits the open sockets of this process. Without `limits` it only counts.
 
-    Where the way for Stop leads over a socket, `keeps_one` keeps one for everybody: the first of a
-    person is admitted however many others there are, and however fast they came.
+    With `keeps_one`, set where Stop goes over a socket, the first socket of a person is always
+    admitted.
     """
 
     def __init__(

@@ -32,8 +32,8 @@ Factory = Callable[[], asyncio.Protocol]
 
 
 class Connection:
-    """One that was accepted. `holder`: the person who is signed in on it, else the address: behind a
-    proxy that of whoever asks, and none that others share before that is known."""
+    """An accepted connection. `holder`: the person who is signed in on it, else the client's
+    address; behind a proxy it is unknown until the proxy names the client."""
 
     def __init__(self, wire: socket.socket, peer: Peer, *, of_proxy: bool = False) -> None:
         self.holder = f"@{peer[0]}:{peer[1]}" if of_proxy else f"@{peer[0]}"
@@ -61,7 +61,7 @@ class Connection:
 
 
 class ConnectionsByHolder:
-    """Connections by who holds them, and the oldest first."""
+    """The open connections, in order of age, and grouped by holder."""
 
     def __init__(self) -> None:
         self._by: dict[str, dict[Peer, Connection]] = {}
@@ -79,11 +79,11 @@ class ConnectionsByHolder:
         return self._peers.get(peer)
 
     def most(self) -> dict[Peer, Connection]:
-        """Return the connections of the holder that has most of them."""
+        """Return the connections of the holder with the most connections."""
         return max(self._by.values(), key=len)
 
     def add(self, peer: Peer, connection: Connection) -> None:
-        """Add a connection of its holder; a forgotten one of the same peer goes."""
+        """Add a connection; it replaces one of the same peer whose end was not noticed yet."""
         before = self._peers.get(peer)
         if before is not None:  # its end was not noticed yet
             self.remove(peer, before)
@@ -91,8 +91,7 @@ class ConnectionsByHolder:
         self._by.setdefault(connection.holder, {})[peer] = connection
 
     def remove(self, peer: Peer, connection: Connection) -> None:
-        """Remove a connection. Do nothing if the connection with this address is not there or is
-        another one."""
+        """Remove a connection. Do nothing if it is not the present connection of its peer."""
         if self._peers.get(peer) is not connection:
             return
         del self._peers[peer]
@@ -103,7 +102,7 @@ class ConnectionsByHolder:
 
 
 class ConnectionHolder:
-    """Tells the connection limits who holds a connection, as soon as that is known."""
+    """Sets the holder of a connection once the person is known."""
 
     def __init__(
         self, connections: "Connections", peer: Peer | None, connection: Connection | None
@@ -270,8 +269,8 @@ class Connections:
 
     @contextlib.contextmanager
     def answering(self, peer: Peer | None) -> Iterator[ConnectionHolder]:
-        """A request on a connection is answered, as long as you are inside. Gives what to tell who asks
-        when that is known."""
+        """Count a request on a connection while it is answered. Yield the object to which the
+        person is reported once known."""
         connection = None if peer is None else self._all.get(peer)
         holder = ConnectionHolder(self, peer, connection)
         if connection is None:
@@ -295,7 +294,7 @@ class Connections:
             self._strangers.add(peer, connection)
 
     def drop(self, peer: Peer | None) -> None:
-        """End a connection whose other side does not go on."""
+        """Close a connection whose client has stopped responding."""
         if peer is not None and (connection := self._all.get(peer)) is not None:
             connection.end()
 

@@ -42,7 +42,7 @@ _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class Health(msgspec.Struct, frozen=True):
-    """The process answers. `commit`: of this program, null when nobody knows."""
+    """The answer of a process that is alive. `commit`: of this program, null if unknown."""
 
     status: str
     version: str
@@ -69,10 +69,13 @@ def application(
     mount: str = "",
     body_limit: int = BODY_LIMIT,
 ) -> ASGIApp:
-    """The whole application. Routes may read less or more than `body_limit` bytes. `page`, `help_site`
-    and `runner_port` are the editor's: it serves the built page, whose Content-Security-Policy names
-    the runner, and the documentation. `mount` is the path at which a proxy shows this process;
-    `scraped` the token that opens /metrics alone."""
+    """Return the whole ASGI application of a process.
+
+    `body_limit`: bytes of a request body, unless a route has its own limit. `page`, `help_site`,
+    `runner_port`: only for the editor, which serves the built page and the documentation, and names
+    the runner in the Content-Security-Policy. `mount`: the path at which a proxy serves this
+    process. `scraped`: the token that allows /metrics only.
+    """
     handlers = [
         *route_handlers,
         *_health(monitoring),
@@ -111,7 +114,8 @@ def _with_built(
     help_site: Path | None,
     root_of: Callable[[HTTPScope], str],
 ) -> tuple[ASGIApp, Callable[[str, bool], bool]]:
-    """The routes with the built page and documentation before them, and which paths are those'."""
+    """Return the routes behind the built page and documentation, and a function that says which
+    paths these two answer."""
     shown = Page(inner, page, root_of) if page is not None else None
     helped = HelpSite(shown or inner, help_site) if help_site is not None else None
 
@@ -130,7 +134,7 @@ def _routed(
     body_limit: int,
     openapi: OpenApiText,
 ) -> Litestar:
-    """Routes, how they refuse, and the document that describes them."""
+    """Return the Litestar application with its routes, error handlers and OpenAPI document."""
     inner = Litestar(
         handlers,
         guards=[_undecided],
@@ -183,7 +187,7 @@ def _said(handler: BaseRouteHandler) -> Permission | None:
 async def _undecided(
     connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler
 ) -> None:
-    """A guard: what nobody decided about is not for everybody."""
+    """Guard: let only owners call a writing route for which no permission was chosen."""
     if connection.scope.get("method", "GET") in _SAFE or _said(handler) is not None:
         return
     if not _answers_strangers(connection.scope["path"]):
@@ -191,14 +195,14 @@ async def _undecided(
 
 
 class _Described:
-    """The application, with its OpenAPI document in reach for those who generate types of it."""
+    """The application, with its OpenAPI document for programs that generate types from it."""
 
     def __init__(self, outer: ASGIApp, openapi: OpenApiText) -> None:
         self._outer = outer
         self._openapi = openapi
 
     def openapi(self) -> bytes:
-        """The document as JSON. It takes its time."""
+        """Return the OpenAPI document as JSON. This is slow."""
         return self._openapi.made()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:

@@ -45,7 +45,7 @@ class MessageReceiver(Protocol):
         """Handle a message; None stands for a text message."""
 
     def may_write(self) -> None:
-        """Resume sending: enough of what was written has gone out."""
+        """Resume sending, since enough of the written data was sent."""
 
     def gone(self) -> None:
         """Handle the end of the socket: no message will come any more."""
@@ -65,7 +65,7 @@ class IgnoringReceiver:
 
 
 class DirectSocket(WebSocketProtocol):
-    """A WebSocket whose messages go directly to a `MessageReceiver`, once there is one."""
+    """A WebSocket whose messages go directly to a `MessageReceiver`, once one has taken it over."""
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
@@ -81,13 +81,13 @@ class DirectSocket(WebSocketProtocol):
         self._limit: Final = self.config.ws_max_size
 
     async def run_asgi(self) -> None:
-        """Called once, for the application."""
+        """Run the application with this socket in its scope. Called once."""
         extensions: MutableMapping[str, dict[object, object]] = self.scope["extensions"]
         extensions[_EXTENSION] = {"socket": self}
         await super().run_asgi()
 
     def handle_connect(self, event: Request) -> None:
-        """The request for an upgrade has come."""
+        """Handle the upgrade request, and drop its headers."""
         super().handle_connect(event)
         event.headers.clear()  # the parser keeps it for as long as the socket is open
 
@@ -109,7 +109,7 @@ class DirectSocket(WebSocketProtocol):
     # --- for whoever takes it over ------------------------------------------------------------
 
     def take_over(self, receiver: MessageReceiver) -> None:
-        """From now on, once the handshake is over, `receiver` hears what comes, and nobody else."""
+        """Send every message to `receiver` from now on. Call it after the handshake."""
         self._receiver = receiver
         self.scope["headers"] = []  # whoever is let in was asked for everything
         self._go_on()
@@ -120,12 +120,12 @@ class DirectSocket(WebSocketProtocol):
         self.resume_hearing()
 
     def pause_hearing(self) -> None:
-        """Read nothing more, so that whoever sends has to wait."""
+        """Stop reading, so that the sender has to wait."""
         self._is_held = True
         self._pause_reading()
 
     def resume_hearing(self) -> None:
-        """Go on, beginning with what has come already."""
+        """Resume reading, beginning with the data that was received already."""
         self._is_held = False
         self._held_until = self.loop.time()
         self._read_on()
@@ -149,8 +149,8 @@ class DirectSocket(WebSocketProtocol):
         return True
 
     def write(self, messages: list[bytes]) -> int:
-        """Send messages, as many as may wait; how many that are. Those after that are for
-        `may_write`. Where nobody hears them any more, all are."""
+        """Send messages until the send buffer is full; return how many were sent. Send the others
+        after `may_write`. If the socket is closed, all count as sent."""
         if self.close_sent or self.disconnected or self.transport.is_closing():
             return len(messages)
         if len(messages) == 1:
@@ -221,7 +221,8 @@ class DirectSocket(WebSocketProtocol):
         self._cut()
 
     def _cut(self) -> None:
-        """Deal with frames that are complete, unless nobody wants to hear; then others have a turn."""
+        """Handle complete frames while the receiver accepts them, up to a limit; then let other
+        tasks run."""
         for _ in range(_IN_A_TURN):
             if self._is_held or self._waits or self.transport.is_closing():
                 break
@@ -267,7 +268,7 @@ class DirectSocket(WebSocketProtocol):
         return (start, start + size) if size <= most else (0, there)
 
     def _deal_with(self, frame: bytes, start: int) -> None:
-        """One frame, whose payload begins there."""
+        """Handle one frame, whose payload begins at the offset `start`."""
         first = frame[0]
         usual = self._receiver is None or self._in_pieces is not None
         if first == _WHOLE_BINARY and start and not usual:
@@ -291,7 +292,7 @@ class DirectSocket(WebSocketProtocol):
         self._drain()
 
     def _drain(self) -> None:
-        """Hand over what went the usual way."""
+        """Hand the messages that uvicorn has queued to the receiver."""
         while self._receiver is not None and not self._is_held and not self.queue.empty():
             event = self.queue.get_nowait()
             if event["type"] == "websocket.receive":
@@ -319,13 +320,13 @@ class DirectSocket(WebSocketProtocol):
 def direct_socket(
     extensions: Mapping[str, Mapping[object, object]] | None,
 ) -> DirectSocket | None:
-    """The socket of a scope with these extensions, where it can be taken over."""
+    """Return the socket of a scope with these extensions; None if it cannot be taken over."""
     found = (extensions or {}).get(_EXTENSION, {}).get("socket")
     return found if isinstance(found, DirectSocket) else None
 
 
 def framed(message: bytes) -> bytes:
-    """A binary message as a server sends it."""
+    """Return a binary message as an unmasked WebSocket frame."""
     size = len(message)
     if size < _SHORT:
         return _SHORT_HEADS[size] + message

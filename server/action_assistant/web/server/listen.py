@@ -60,11 +60,11 @@ def serve(
     proxies: tuple[Network, ...] = (),
     direct: bool = False,
 ) -> None:
-    """Serve what `make` makes until told to end; nothing is touched before the address is ours.
-    With an `identity` over TLS. `proxies` are believed about who asks. `direct`: applications may take
-    their sockets over.
+    """Bind the address, then make the application and serve it until the process is told to end.
 
-    Raises CannotStart when the address is taken or unknown.
+    `identity`: serve TLS with its certificate. `proxies`: addresses whose forwarding headers are
+    trusted. `direct`: let applications take over their sockets. Raise CannotStart if the address is
+    taken or unknown.
     """
     sockets = bound(host, port)
     try:
@@ -144,10 +144,9 @@ class TlsIdentity:
 
 
 class StreamEndings:
-    """An ASGI middleware that ends streams without an end when the process shuts down.
+    """An ASGI middleware that ends endless streams when the process shuts down.
 
-    A listener to server-sent events is told that its peer has gone. Other requests are answered to
-    their end.
+    A stream of server-sent events receives a disconnect. Other requests are answered completely.
     """
 
     def __init__(self, app: ASGIApp) -> None:
@@ -183,7 +182,7 @@ class StreamEndings:
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
     async def _next(self, receive: Receive) -> Any:
-        """Return the disconnect of the client, or one of our own at a shutdown."""
+        """Return the client's disconnect, or a disconnect of our own at a shutdown."""
         gone = asyncio.ensure_future(receive())
         told = asyncio.ensure_future(self._told.wait())
         try:
@@ -257,7 +256,7 @@ def _own_share() -> tuple[bytes, bytes]:
 
 
 class _Http(H11Protocol):
-    """HTTP as everybody speaks it who has business here: bodies with a length."""
+    """HTTP for request bodies with a length only."""
 
     def __init__(self, *args: Any, **more: Any) -> None:
         super().__init__(*args, **more)
@@ -286,13 +285,13 @@ class _Http(H11Protocol):
 
 
 class _Strict(h11.Connection):
-    """Refuses a body without a length: a chunk of one byte costs us a thousand times more than it
-    costs to send, before anybody could say whose it is."""
+    """Refuses a body without a length: reading chunks of one byte costs us a thousand times more
+    than sending them, before the client is authenticated."""
 
     in_crumbs = False
 
     def next_event(self) -> Any:
-        """The next one. Raises RemoteProtocolError."""
+        """Return the next event. Raise RemoteProtocolError for a request whose body has no length."""
         event = super().next_event()
         if isinstance(event, h11.Request):
             names = [name for name, _ in event.headers]
@@ -303,7 +302,7 @@ class _Strict(h11.Connection):
 
 
 class _Server(uvicorn.Server):
-    """Ends streams before it waits for them."""
+    """A server that ends streams before it waits for open requests."""
 
     def __init__(
         self, config: uvicorn.Config, endings: StreamEndings, connections: Connections
@@ -336,14 +335,14 @@ class _Server(uvicorn.Server):
         )
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Called once, when the process is told to end."""
+        """Shut down: end streams, close the listeners, wait for open requests. Called once."""
         self._endings.begin()
         self._connections.close()
         await super().shutdown(sockets)
 
 
 def _in_one_line(record: logging.LogRecord) -> bool:
-    """A filter: what peers send wrongly is told, without our stack."""
+    """Log filter: shorten an error that a malformed message causes to a warning without our stack."""
     if "Invalid UTF-8" in record.msg:
         record.exc_info = None
         record.levelno, record.levelname = logging.WARNING, "WARNING"

@@ -36,13 +36,14 @@ _REF: Final = "#/components/schemas/{name}"
 
 
 def reads(body: object, **parts: object) -> dict[str, object]:
-    """For `opt=` of a route that reads its body, or `parts` of it, by itself: the type of the body
-    (`Type | None` where it may be missing), and of parts to which that refers by these names."""
+    """Return the value for `opt=` of a route that decodes its body (or `parts` of it) by itself:
+    the type of the body, `Type | None` if it may be missing, and named types to which it refers."""
     return {_BODY: body, _PARTS: parts}
 
 
 def exchanges(**messages: object) -> dict[str, object]:
-    """For `opt=` of a socket: the types of its messages, by the names under which they are described."""
+    """Return the value for `opt=` of a WebSocket route: the types of its messages, by their names
+    in the document."""
     return {_MESSAGES: messages}
 
 
@@ -52,7 +53,8 @@ def answer(
     media: str = "application/json",
     text: str = "Request fulfilled, document follows",
 ) -> ResponseSpec:
-    """For `responses=` of a route whose annotation does not say what it answers. `text` describes it."""
+    """Return the value for `responses=` of a route whose annotation does not give the type of its
+    answer. `text`: its description."""
     return ResponseSpec(
         data_container=kind,
         generate_examples=False,
@@ -62,8 +64,8 @@ def answer(
 
 
 class OpenApiText(JsonRenderPlugin):
-    """The document as JSON. It takes a fifth of a second to make, so that is done when it is first
-    asked for, and on a thread: nothing else waits for it. `make` gives the document."""
+    """The OpenAPI document as JSON, made at the first request on a thread, since it takes a fifth
+    of a second. `make` returns the document."""
 
     def __init__(self) -> None:
         super().__init__(path="/openapi.json")
@@ -76,7 +78,8 @@ class OpenApiText(JsonRenderPlugin):
         return msgspec.json.encode(self.make())
 
     def router(self) -> Router:
-        """For Litestar's routes of it, which would make it while everybody waits."""
+        """Return the route of the document, which replaces Litestar's own: that one would block the
+        event loop."""
 
         # Litestar copies what it is given, but no functions.
         async def answer(request: Request[Any, Any, Any]) -> Response[bytes] | None:
@@ -116,9 +119,9 @@ def openapi_config(title: str, text: OpenApiText) -> OpenAPIConfig:
 def document(
     app: Litestar, needs: Mapping[tuple[str, str], Permission], is_open: Callable[[str], bool]
 ) -> dict[str, Any]:
-    """The document of an application. `needs`: what one must be allowed to do, by path and method,
-    which stands in `x-needs`; `is_open`: the paths that strangers may call, which have an empty
-    `security` (Litestar leaves that out)."""
+    """Return the OpenAPI document of an application. `needs`: the permission by path and method,
+    which becomes `x-needs`; `is_open`: returns True for a path without authentication, which
+    gets an empty `security` (Litestar omits that)."""
     found = app.openapi_schema.to_schema()
     types = _Types()
     for path, method, handler in _handlers(app):
@@ -144,7 +147,7 @@ def _handlers(app: Litestar) -> Iterator[tuple[str, str, HTTPRouteHandler]]:
 
 
 def _describe(operation: dict[str, Any], handler: HTTPRouteHandler, types: "_Types") -> None:
-    """Put the types of a route into what Litestar knows of it."""
+    """Add the types of a route's body and answers to its operation in the document."""
     signature = handler.parsed_fn_signature
     data = signature.parameters.get("data")
     body = handler.opt.get(_BODY, None if data is None else data.annotation)
@@ -193,7 +196,7 @@ class _Types:
         return self._answered[-1][1]
 
     def written(self) -> dict[str, Any]:
-        """Fill in all schemas; those that have names."""
+        """Fill in all schemas; return the named ones for `components`."""
         places = [*self._asked, *self._answered]
         named = self.parts | self.messages
         kinds_of = [*(kind for kind, _ in places), *named.values()]
@@ -214,7 +217,7 @@ class _Types:
 
 
 def _anything(kind: type) -> dict[str, Any]:
-    """The schema of `object`, of which msgspec says nothing."""
+    """Return the schema of `object`, for which msgspec has none."""
     if kind is not object:
         raise NotImplementedError
     return {"description": "Any JSON value"}

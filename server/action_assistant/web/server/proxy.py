@@ -126,7 +126,8 @@ class Mounted:
 
 
 def misrouted(runner_port: int) -> ControllerRouterHandler:
-    """For the editor: what a proxy leads here and should lead to the runner."""
+    """Return the editor's route for requests that a proxy should have sent to the runner; it
+    answers with an error."""
 
     @route(
         f"{RUNNER}/{{rest:path}}",
@@ -156,7 +157,7 @@ async def _lead(send: Send, location: str) -> None:
 
 
 def _forwarded(scope: HTTPScope | WebSocketScope) -> list[str]:
-    """The chain of addresses, the one that asked the last proxy at its end."""
+    """Return the addresses of X-Forwarded-For; the last is the client of the last proxy."""
     fields = (
         value.decode("latin-1")
         for name, value in scope["headers"]
@@ -166,7 +167,8 @@ def _forwarded(scope: HTTPScope | WebSocketScope) -> list[str]:
 
 
 def _address(text: str) -> _Address | None:
-    """An address, also with a port as some proxies write it."""
+    """Parse an address, also one with a port as some proxies write it; return None for any other
+    text."""
     found = _WITH_PORT.fullmatch(text)
     try:
         address = ipaddress.ip_address(found[1] or found[2] if found else text)

@@ -11,8 +11,8 @@ UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it 
 
 
 def bound(host: str, port: int) -> list[socket.socket]:
-    """Sockets for the address; both loopback families for a loopback name, so that nobody else
-    can stand in for us under `localhost`; both families for everywhere."""
+    """Return listening sockets for the address: for a loopback name in both families, so that no
+    other process can answer under `localhost`; for EVERYWHERE in both families, too."""
     hosts = [host]
     if host in {"127.0.0.1", "localhost"}:
         hosts = ["127.0.0.1", "::1"]
@@ -44,8 +44,8 @@ def bound(host: str, port: int) -> list[socket.socket]:
 
 
 def _forget_silent_peers(listener: socket.socket) -> None:
-    """Have the kernel drop peers that vanished, and those that read nothing: what waits for them
-    would be kept for ever. Connections inherit this from the socket that accepts them."""
+    """Have the kernel drop connections to peers that vanished or read nothing, whose data would
+    wait for ever. Accepted connections inherit this."""
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     options = {"TCP_USER_TIMEOUT": UNHEARD * 1000, "TCP_KEEPIDLE": UNHEARD, "TCP_KEEPINTVL": 5}
     for name, value in options.items():

@@ -18,7 +18,7 @@ _RESTARTING: Final = 1012  # the close code of a server that ends
 
 
 class WebSocketProtocol(WebSocketsSansIOProtocol):
-    """uvicorn's protocol for one WebSocket, which ends in every state without an error."""
+    """uvicorn's protocol for one WebSocket, made to end without an error in every state."""
 
     def shutdown(self) -> None:
         """Close the socket because the process shuts down."""

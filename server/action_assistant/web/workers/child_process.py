@@ -37,7 +37,7 @@ def _context() -> "ForkServerContext":
 
 
 def wire() -> tuple[Connection, Connection]:
-    """Two ends, ours and that of a worker."""
+    """Return the two ends of a pipe: ours and the worker's."""
     ours, theirs = _context().Pipe()
     return ours, theirs
 
@@ -45,9 +45,9 @@ def wire() -> tuple[Connection, Connection]:
 def child(
     work: Callable[..., None], *args: Any, name: str, nice: int, preloaded: Sequence[str]
 ) -> "ForkServerProcess":
-    """A process of low priority that ends with this one, in which `work(*args)` runs. Waits for it
-    to exist. `preloaded`: the modules that the server process imports before it forks the first one.
-    Raises OSError, EOFError."""
+    """Start a process of low priority that runs `work(*args)` and ends with this one. Wait until it
+    exists. `preloaded`: modules that the fork server imports before the first fork. Raise
+    OSError or EOFError if it cannot be started."""
     _context().set_forkserver_preload(list(preloaded))
     told = (name, work, args, nice)
     process = _context().Process(target=_humbly, args=told, name=name, daemon=True)
@@ -84,7 +84,7 @@ LAST: Final = b"."  # this worker does nothing more
 
 
 def serve(wire: Connection) -> None:
-    """Do one thing after the other, until whoever asks has gone."""
+    """Serve requests one after the other until the parent closes the pipe."""
     with contextlib.suppress(EOFError, OSError):
         while True:
             wire.send_bytes(_reply(wire.recv_bytes()))
@@ -103,7 +103,7 @@ def _reply(request: bytes) -> bytes:
 
 
 def _raised(error: Exception) -> bytes:
-    """An error that reaches the other side as it is, where that is possible."""
+    """Return a reply with an error, or with its text if it cannot be pickled."""
     try:
         reply = pickle.dumps(("raised", error))
         pickle.loads(reply)

@@ -53,7 +53,7 @@ class RunInWorker(Protocol):
     """Runs a function in another process, so that the event loop stays free for Stop and for other
     people.
 
-    The function has to be one of a module; its arguments and its result are values.
+    The function must belong to a module; its arguments and result must be picklable.
     """
 
     def __call__(self, work: Callable[..., T], /, *args: Any) -> Awaitable[T]:
@@ -62,7 +62,7 @@ class RunInWorker(Protocol):
 
 
 async def run_here(work: Callable[..., T], /, *args: Any) -> T:
-    """No way aside: the work is done at once, in this process."""
+    """Run the function in this process, without a worker."""
     return work(*args)
 
 
@@ -83,7 +83,7 @@ class GaveUp(Unavailable):
 
     @property
     def type(self) -> str:
-        """For programs it is unavailable like anything else."""
+        """The type of the problem for programs, the one of Unavailable."""
         return "unavailable"
 
 
@@ -92,10 +92,11 @@ HOPELESS: Final = (Crashed, GaveUp, TooLarge)
 
 
 class Lane:
-    """Some workers, and who waits for them: in the order they came, of each person one at a time.
+    """A pool of worker processes with a queue: first come, first served, one request of each person
+    at a time.
 
-    Calling it is the way to have something done: `await lane(function, *values)`. Nothing of it
-    outlives whoever asked: when they have gone, or after `patience` seconds, the worker is killed.
+    `await lane(function, *values)` runs a function. The worker is killed if the client leaves, or
+    after `patience` seconds.
     """
 
     def __init__(
@@ -121,7 +122,9 @@ class Lane:
         self._waiting: dict[str, int] = {}
 
     async def __call__(self, work: Callable[..., T], /, *args: Any) -> T:
-        """The outcome of `work(*args)`. Raises what it raises, Unavailable, TooLarge, TooMany."""
+        """Return the result of `work(*args)`, run in a worker. Raise the exception of `work`;
+        TooMany if the queue is full; TooLarge if it needs too much memory; Unavailable if the
+        client leaves, or the worker dies or takes too long."""
         asking = caller()
         request = pickle.dumps((work, args), pickle.HIGHEST_PROTOCOL)
         with self._queued(asking.person if asking is not None else "") as turn:
@@ -155,7 +158,8 @@ class Lane:
 
     @contextmanager
     def _queued(self, person: str) -> Iterator[anyio.Lock]:
-        """A place in the queue. Raises TooMany."""
+        """Hold a place in the queue, and yield the lock of this person's requests. Raise TooMany if
+        too many wait."""
         waiting = self._waiting.get(person, 0)
         if person and (waiting >= _WAITING or sum(self._waiting.values()) >= _ALL_WAITING):
             raise TooMany("Too much waits to be worked on already; wait some seconds.")
@@ -168,7 +172,8 @@ class Lane:
                 del self._waiting[person], self._turns[person]
 
     async def _done(self, request: bytes) -> bytes:
-        """The reply of the worker. Raises OutOfTime, Crashed, Unavailable."""
+        """Send a request to a worker and return the reply. Raise Crashed or OutOfTime if the worker
+        dies, GaveUp after `patience` seconds."""
         self._idle = [each for each in self._idle if each.lives]
         worker = self._idle.pop() if self._idle else await self._hired()
         self._busy.add(worker)
@@ -205,12 +210,12 @@ class Lane:
 
     @property
     def busy(self) -> int:
-        """Workers that work on something."""
+        """The number of workers with a request."""
         return len(self._busy)
 
     @property
     def waiting(self) -> int:
-        """Requests without an answer, those that are worked on among them."""
+        """The number of requests without an answer, including those in work."""
         return sum(self._waiting.values())
 
     async def warm(self) -> None:
@@ -236,7 +241,7 @@ class Lane:
             raise Crashed(f"No process can be started to work on this: {error!r}.") from error
 
     def close(self) -> None:
-        """Let all of them go."""
+        """Kill all workers of the lane."""
         for worker in (*self._idle, *self._busy):
             worker.kill()
         self._idle.clear()
@@ -244,7 +249,8 @@ class Lane:
 
 @asynccontextmanager
 async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
-    """Workers for these lanes, as long as you are inside. The first ones are made soon after."""
+    """Keep workers of these lanes ready inside of the `async with`. The first ones are started soon
+    after its beginning."""
     tasks = [asyncio.create_task(_keep_warm(lane)) for lane in lanes]
     try:
         yield
@@ -268,7 +274,7 @@ async def _keep_warm(lane: Lane) -> None:
 
 
 class _Worker:
-    """One worker process, as its parent sees it."""
+    """One worker process, for its parent."""
 
     def __init__(self, process: "ForkServerProcess", wire: Connection) -> None:
         self._process = process
@@ -276,7 +282,7 @@ class _Worker:
 
     @classmethod
     def born(cls, name: str, nice: int, preloaded: Sequence[str]) -> "_Worker":
-        """Start one. Takes milliseconds, but for the first."""
+        """Start a worker. This takes milliseconds; for the first one longer."""
         ours, theirs = wire()
         process = child(serve, theirs, name=name, nice=nice, preloaded=preloaded)
         theirs.close()
@@ -298,7 +304,7 @@ class _Worker:
         return self._process.exitcode == -signal.SIGPROF
 
     def kill(self) -> None:
-        """Kill the process. A caller that waits for its reply gets an error at once."""
+        """Kill the process. A thread that waits for its reply gets an error at once."""
         if self._process.is_alive():  # a number that has been given back may be somebody else's
             self._process.kill()
         # Its thread may still read from the wire: that ends by itself, since the other end is closed.
