@@ -29,7 +29,7 @@ from action_assistant.editor.history import change_index
 from action_assistant.editor.rooms import open_rooms
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
-from action_assistant.web.monitoring import loop_lag
+from action_assistant.web.monitoring import monitoring
 from action_assistant.web.workers import lanes
 from editor.process import BEARER
 from support.openapi import documents
@@ -137,7 +137,7 @@ async def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterat
     monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", TOKEN)
     # Nothing happens by itself, or what is counted would grow with the time that workers take.
     monkeypatch.setattr(change_index, "_PERIOD", 3600.0)
-    monkeypatch.setattr(loop_lag, "_TICK_S", 3600.0)
+    monkeypatch.setattr(monitoring, "_TICK_S", 3600.0)
     monkeypatch.setattr(open_rooms, "_SILENCE", 3600.0)
     monkeypatch.setattr(
         open_rooms.Rooms, "__init__", partialmethod(open_rooms.Rooms.__init__, linger=3600.0)

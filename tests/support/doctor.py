@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from action_assistant.commands.doctor.examination import examine
+from action_assistant.commands.doctor.doctor import examine
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.system.diagnostics import Diagnostic
 from support.product import TOKEN, free_ports, running

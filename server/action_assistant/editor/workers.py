@@ -27,8 +27,8 @@ _PRELOADED: Final = (
     "action_assistant.journal.sqlite",
     "action_assistant.editor.history.graph_history",
     "action_assistant.editor.history.blame",
-    "action_assistant.editor.history.reverting",
-    "action_assistant.editor.history.course_changes",
+    "action_assistant.editor.history.restoring",
+    "action_assistant.editor.history.course_search",
     "action_assistant.editor.history.drafts.merge_previews",
 )
 _NICE: Final = 5

@@ -129,7 +129,7 @@ def test_a_folder_that_is_served_at_another_port_is_told_as_that(data: Path) -> 
 def test_a_check_that_fails_or_takes_too_long_ends_no_other(
     data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from action_assistant.commands.doctor import examination
+    from action_assistant.commands.doctor import doctor
     from action_assistant.commands.doctor.installation import Installation
 
     def broken(_: Installation) -> list[object]:
@@ -139,8 +139,8 @@ def test_a_check_that_fails_or_takes_too_long_ends_no_other(
         time.sleep(5)
         return []
 
-    checks = (broken, slow, examination.CHECKS[0])
+    checks = (broken, slow, doctor.CHECKS[0])
     place = Installation(data=data)
-    found = list(examination.examine(place, checks, seconds=0.5))  # type: ignore[arg-type]
+    found = list(doctor.examine(place, checks, seconds=0.5))  # type: ignore[arg-type]
     assert [each.code for each in found] == ["check-failed", "check-unfinished", ""]
     assert "ZeroDivisionError" in found[0].message

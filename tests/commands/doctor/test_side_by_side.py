@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from action_assistant.commands.doctor import doctor
-from action_assistant.commands.doctor.examination import Check, examine
+from action_assistant.commands.doctor.doctor import Check, examine
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.system.diagnostics import Diagnostic, fine
 

@@ -3,7 +3,7 @@
 import asyncio
 from typing import Any
 
-from action_assistant.editor.api.room_connection import (
+from action_assistant.editor.api.room import (
     RoomConnection,
     serve_by_asgi,
     serve_directly,

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Map
 
-from action_assistant.editor.crdt import log_tail, messages
+from action_assistant.editor.crdt import loading, messages
 from action_assistant.editor.crdt.loading import load
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import Conflict
@@ -69,7 +69,7 @@ SPOILS = [
 async def test_a_gap_wider_than_what_is_read_at_once_is_seen_in_a_past_state_too(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(log_tail, "SLICES", (8, 4))
+    monkeypatch.setattr(loading, "SLICES", (8, 4))
     with contextlib.closing(sqlite3.connect(folder / "editor.db")) as database, database:
         database.execute("DELETE FROM event WHERE stream = 'graph/g' AND seq BETWEEN 8 AND 25")
     journal = await opened(folder)

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, merge_updates
 
-from action_assistant.editor.crdt import loading, log_tail
+from action_assistant.editor.crdt import loading
 from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.folding import Folded, fold, fold_sound
 from action_assistant.editor.crdt.loading import Stored, stored
@@ -226,10 +226,10 @@ async def test_a_long_log_reads_the_same_in_one_piece_or_in_many(
     assert told(await stored(journal, "graph/g", learn=True, run_in_worker=aside)) == whole
     assert told(await stored(journal, "graph/g", learn=True, run_in_worker=dying)) == whole
     middle = told(await stored(journal, "graph/g", 99, learn=True))
-    monkeypatch.setattr(log_tail, "SLICES", (7, 3))
+    monkeypatch.setattr(loading, "SLICES", (7, 3))
     for name, value in (("TOGETHER", 40), ("TOGETHER_BYTES", 999)):
         with monkeypatch.context() as patch:
-            patch.setattr(log_tail, name, value)
+            patch.setattr(loading, name, value)
             many = await stored(journal, "graph/g", learn=True, run_in_worker=aside)
             assert told(many) == whole
             part = await stored(journal, "graph/g", 99, learn=True, run_in_worker=aside)

@@ -8,7 +8,7 @@ import pytest
 from pycrdt import Doc, Map
 
 from action_assistant.editor.documents.document import fill
-from action_assistant.editor.history.course_changes import Followed, followed
+from action_assistant.editor.history.course_search import Followed, followed
 from action_assistant.editor.history.key_changes import LoggedChange, observed
 from action_assistant.journal.events import Event
 from action_assistant.umrf.files import codec

@@ -1,27 +1,220 @@
-"""The socket of a room (docs/room-protocol.md)."""
+"""The socket of a room (docs/room-protocol.md), connected with its room until one side closes it.
 
+Under our own server the messages are read and written directly; under any other, by ASGI with two tasks and an
+event for each message. Both ways keep the same rules.
+"""
+
+import asyncio
+import logging
 from typing import Any, Final
 
 import anyio
 from litestar import WebSocket, websocket
-from litestar.types import ControllerRouterHandler
+from litestar.types import ControllerRouterHandler, Receive, Send
 
-from action_assistant.editor.api.room_connection import (
-    NORMAL,
-    RoomConnection,
-    serve_by_asgi,
-    serve_directly,
-)
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.rate_limits import ByteRateLimits
 from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
 from action_assistant.logs.context import about
 from action_assistant.web.auth.access import person_of, plain, refuse
 from action_assistant.web.auth.roles import allowed
-from action_assistant.web.server.direct import direct_socket
+from action_assistant.web.server.direct import DirectSocket, direct_socket
+
+log: Final = logging.getLogger(__name__)
+
+NORMAL: Final = 1000
+
+
+class RoomConnection:
+    """Reads the messages of one WebSocket and passes them to its room."""
+
+    def __init__(self, room: Room, member: Member, rate_limits: ByteRateLimits) -> None:
+        self.room: Final = room
+        self.member: Final = member
+        self._rate_limits = rate_limits
+
+    def receive(self, data: bytes | None) -> float:
+        """Handle one binary message; None stands for a text message, which is refused. Return for how many
+        seconds the socket is not to be read, beside the time in which it is far ahead of the room. Closes the
+        socket for a message that cannot be parsed."""
+        member = self.member
+        if data is None:
+            member.refuse(messages.UNREADABLE)
+            return 0.0
+        try:
+            message = messages.parse(data)
+        except messages.Malformed as error:
+            log.info("%s sent %s", member.person.id, error)
+            member.refuse(messages.MALFORMED)
+            return 0.0
+        if message is None:
+            return 0.0
+        self.room.receive(member, message)
+        limits = self._rate_limits
+        spend = limits.spend if isinstance(message, messages.Edit) else limits.spend_on_presence
+        return spend(member.person.id, len(data))
+
+    def debt(self) -> float:
+        """Return for how many seconds the socket is not to be read, for what its person sent by other sockets."""
+        return self._rate_limits.spend(self.member.person.id, 0)
+
+    async def pause(self, seconds: float) -> None:
+        """Wait so many seconds, and until the socket may be read again."""
+        await self.member.until_caught_up()
+        wait = seconds + self.member.cpu_debt()
+        if wait > 0:
+            await anyio.sleep(wait)
+
+
+async def serve_directly(connection: RoomConnection, socket: DirectSocket) -> int:
+    """Serve a socket of our own server until it ends; return the close code. Raises what went wrong."""
+    directly = _Directly(connection, socket)
+    connection.room.join(connection.member)
+    socket.take_over(directly)
+    try:
+        return await connection.member.ended()
+    finally:
+        connection.room.leave(connection.member)
+        directly.end()
+
+
+class _Directly:
+    """Reads a socket, and writes to it once for each turn of the event loop."""
+
+    def __init__(self, connection: RoomConnection, socket: DirectSocket) -> None:
+        self._connection = connection
+        self._member = connection.member
+        self._socket = socket
+        self._loop = asyncio.get_running_loop()
+        self._turn_end = connection.room.turn_end
+        self._unsent: list[bytes] = []
+        self._is_due = False
+        self._pause: asyncio.Task[None] | None = None
+        self._failure: Exception | None = None
+        connection.member.on_news = self._write_soon
+        connection.member.write_now = self._write_now
+        self._write_soon()  # something may wait already
+        if (debt := connection.debt()) > 0:
+            self._hold(debt)
+
+    def heard(self, message: bytes | None) -> None:
+        """Handle one message; None stands for text."""
+        member = self._member
+        if member.closed:
+            return
+        try:
+            wait = self._connection.receive(message)
+        except Exception as error:  # noqa: BLE001 - raised where the socket's task ends
+            self._failure = error
+            member.close(NORMAL)
+            return
+        if wait > 0 or member.is_far_ahead or member.is_over_cpu_budget:
+            self._hold(wait)
+
+    def _hold(self, seconds: float) -> None:
+        self._socket.pause_hearing()
+        self._pause = self._loop.create_task(self._hear_later(seconds))
+
+    async def _hear_later(self, seconds: float) -> None:
+        await self._connection.pause(seconds)
+        self._socket.resume_hearing()
+
+    def may_write(self) -> None:
+        """Write on, since the send buffer of the socket has room again."""
+        self._write()
+
+    def gone(self) -> None:
+        """Close the member, since the client has disconnected."""
+        self._member.close(NORMAL)
+
+    def end(self) -> None:
+        """Hand the socket back to its server. Raises an error that a message caused meanwhile."""
+        self._member.on_news = _nothing
+        if self._pause is not None:
+            self._pause.cancel()
+        self._socket.let_go()
+        if self._failure is not None:
+            raise self._failure
+
+    def _write_soon(self) -> None:
+        if not self._is_due:
+            self._is_due = True
+            self._turn_end.do(self._write)
+
+    def _write_now(self, framed: bytes) -> bool:
+        """Write framed messages at once, if nothing waits to be written before them."""
+        return not self._is_due and not self._unsent and self._socket.write_framed(framed)
+
+    def _write(self) -> None:
+        """Write what waits, as far as the client reads it."""
+        self._is_due = False
+        member, socket = self._member, self._socket
+        if member.closed or not socket.is_writable:
+            return
+        unsent = self._unsent or member.gather()
+        self._unsent = unsent[socket.write(unsent) :] if unsent else unsent
+        if not self._unsent and socket.is_writable:
+            member.all_sent()
+            if member.has_news:  # behind what could not be sent earlier
+                self._write_soon()
+
+
+def _nothing() -> None:
+    """Ignore news of a socket that has ended."""
+
+
+async def serve_by_asgi(connection: RoomConnection, receive: Receive, send: Send) -> int:
+    """Serve a socket under any server until it ends; return the close code. Raises what went wrong."""
+    connection.room.join(connection.member)
+    # Two plain tasks: a thousand idle sockets are a thousand times what stands around each.
+    tasks = [
+        asyncio.create_task(_read_messages(receive, connection)),
+        asyncio.create_task(_send_messages(send, connection.member)),
+    ]
+    for task in tasks:
+        task.add_done_callback(lambda _: connection.member.close(NORMAL))
+    try:
+        code = await connection.member.ended()
+    finally:
+        connection.room.leave(connection.member)
+        for task in tasks:
+            task.cancel()
+        await asyncio.wait(tasks)
+    for task in tasks:
+        if not task.cancelled():
+            task.result()  # raises what went wrong
+    return code
+
+
+async def _read_messages(receive: Receive, connection: RoomConnection) -> None:
+    """Read messages until the client disconnects, which closes the member."""
+    if (debt := connection.debt()) > 0:
+        await connection.pause(debt)
+    while True:
+        event = await receive()
+        if event["type"] == "websocket.disconnect":
+            connection.member.close(NORMAL)
+        if event["type"] != "websocket.receive":
+            return
+        wait = connection.receive(event.get("bytes"))
+        if connection.member.refused:
+            return
+        await connection.pause(wait)
+
+
+async def _send_messages(send: Send, member: Member) -> None:
+    """Send the messages of the member until it is closed."""
+    try:
+        while not member.closed:
+            for frame in await member.take():
+                await send({"type": "websocket.send", "bytes": frame, "text": None})
+    except (OSError, RuntimeError):
+        member.close(NORMAL)
+
 
 Socket = WebSocket[Any, Any, Any]
 

@@ -1,22 +1,196 @@
-"""Loads documents from the log: snapshot and tail, folded in a worker, piece by piece."""
+"""Loads documents from the log: a snapshot, and the events after it up to the first one that is damaged. They are
+folded in a worker and applied piece by piece.
+"""
 
 import asyncio
+import itertools
 import logging
-from typing import Final
+import struct
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
 
 import msgspec
+from sqlalchemy import bindparam, select
 
 from action_assistant.editor.crdt.applying import Panicked
 from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.folding import Folded, StreamDamage, fold, fold_sound
-from action_assistant.editor.crdt.log_tail import LogTail
 from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import Replica, ReplicaState
 from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES, pieces_of
 from action_assistant.errors import Refused, Unavailable
+from action_assistant.journal.chain import START, StoredColumns, linked
 from action_assistant.journal.events import StreamSnapshot
 from action_assistant.journal.journal import Journal
+from action_assistant.schema import editor_tables
 from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker, run_here
+
+SLICES: Final = (2_000, 500)  # events read at once; fewer where not all of those can be read
+TOGETHER: Final = 200_000  # events, or
+TOGETHER_BYTES: Final = 16 << 20  # in their bodies, after which those so far are put together
+_COLUMNS: Final = ("seq", "kind", "author", "at", "body", "position", "chain")
+_TYPES: Final = (int, str, str, int, bytes, int, bytes)
+_event = editor_tables.editor_event.c
+_ROWS: Final = (
+    select(*(_event[name] for name in _COLUMNS))
+    .where(
+        _event.stream == bindparam("stream"),
+        _event.seq > bindparam("after"),
+        _event.seq <= bindparam("last"),
+    )
+    .order_by(_event.seq)
+)
+
+
+class LogTail:
+    """Reads on from `after`. At the end `damaged` says whether that was the end of the stream."""
+
+    def __init__(self, journal: Journal, stream: str, after: int, upto: int | None) -> None:
+        self.seq = after
+        self.damaged: StreamDamage | None = None
+        self._journal = journal
+        self._stream = stream
+        self._upto = upto
+        self._chain = START if after == 0 else None
+        self._unchecked: list[StoredColumns] = []
+        self._ended = False
+
+    async def next(self) -> EventColumns | None:
+        """Return the next events, in a batch of limited count and size; None when there are no
+        more. `sound` says which of them are undamaged. Raise Unavailable if the log cannot be
+        read."""
+        slices: list[StoredColumns] = []
+        count = size = 0
+        while not self._ended and count < TOGETHER and size < TOGETHER_BYTES:
+            more = self._in_place(await self._rows())
+            if more is not None:
+                slices.append(more)
+                count += len(more.seqs)
+                size += sum(map(len, more.bodies))
+            elif self.damaged is None:
+                await self._check_end()
+            if more is None or self.damaged is not None:
+                self._ended = True
+        self._unchecked = slices
+        return _columns(slices) if slices else None
+
+    async def sound(self) -> int:
+        """Check the chain of hashes of the events that `next` returned last. Return how many of them, from the
+        first one on, are as they were written; where some are not, the tail ends there."""
+        slices, self._unchecked = self._unchecked, []
+        good = await asyncio.to_thread(_linked, self._chain or START, self._stream, slices)
+        if good < sum(len(each.seqs) for each in slices):
+            self._ended = True
+            self.seq = slices[0].seqs[0] + good - 1
+            self._stop("it is not what was written")
+        elif slices:
+            self._chain = slices[-1].chains[-1]
+        return good
+
+    def _in_place(self, rows: Sequence[Sequence[Any]]) -> StoredColumns | None:
+        """Return the rows before the first row that is not the next event, as columns; None if
+        there is no such row. Only sequence numbers and the types of the bodies are checked here:
+        the chain check finds wrong types in other columns."""
+        if not rows:
+            return None
+        columns = StoredColumns(*zip(*rows, strict=True))
+        expected = range(self.seq + 1, self.seq + 1 + len(rows))
+        if columns.seqs == tuple(expected) and set(map(type, columns.bodies)) == {bytes}:
+            self.seq += len(rows)
+            return columns
+        return self._in_place(rows[: self._good(rows)])
+
+    def _good(self, rows: Sequence[Sequence[Any]]) -> int:
+        """Count the rows before the first one that has a wrong type or a wrong number, and note that one as
+        damage."""
+        for n, row in enumerate(rows):
+            if tuple(map(type, row)) != _TYPES:
+                self._stop("it holds values of the wrong kind", n)
+                return n
+            if row[0] != self.seq + 1 + n:
+                self._stop(f"{row[0]} stands in its place", n)
+                return n
+        return len(rows)
+
+    async def _rows(self) -> Sequence[Sequence[Any]]:
+        if self._chain is None:
+            before = await self._ask(self.seq - 1, 1)
+            self._chain = before[0][6] if before and isinstance(before[0][6], bytes) else START
+        for limit in SLICES:
+            try:
+                return await self._ask(self.seq, limit)
+            except Unavailable:
+                continue
+        return await self._one_by_one()
+
+    async def _one_by_one(self) -> Sequence[Sequence[Any]]:
+        """A row that the database cannot even give out: those before it. Raises Unavailable when
+        that may be for another reason."""
+        if self.seq:
+            await self._ask(self.seq - 1, 1)
+        found: list[Sequence[Any]] = []
+        try:
+            while rows := await self._ask(self.seq + len(found), 1):
+                found += rows
+                if len(found) == SLICES[-1]:
+                    break
+        except Unavailable as error:
+            if not found:
+                if await self._journal.health() is not None:
+                    raise
+                self._stop(error.detail)
+        return found
+
+    async def _ask(self, after: int, limit: int) -> Sequence[Sequence[Any]]:
+        last = after + limit  # without it Postgres may sort all that follows, for each slice anew
+        if self._upto is not None:
+            last = min(last, self._upto)
+        place = {"stream": self._stream, "after": after, "last": last}
+        return await self._journal.plain_rows(_ROWS, place)
+
+    async def _check_end(self) -> None:
+        newest = await self._journal.newest(self._stream)
+        if (newest if self._upto is None else min(newest, self._upto)) > self.seq:
+            # Not what was added since we looked: that comes with the next look.
+            if await self._ask(self.seq, 1):
+                return
+            self._stop("it is missing")
+
+    def _stop(self, why: str, after: int = 0) -> None:
+        self.damaged = StreamDamage(self.seq + after + 1, why)
+        log.error("%s %d is damaged: %s", self._stream, self.damaged.seq, why)
+
+
+def _columns(slices: Sequence[StoredColumns]) -> EventColumns:
+    same: dict[str, str] = {}  # of equal texts one: they travel as such
+    kinds, authors, bodies = list[str](), list[str](), list[bytes]()
+    for each in slices:
+        kinds += map(same.setdefault, each.kinds, each.kinds)
+        authors += map(same.setdefault, each.authors, each.authors)
+        bodies += each.bodies
+    return EventColumns(slices[0].seqs[0], kinds, authors, bodies)
+
+
+def _linked(chain: bytes, stream: str, slices: Sequence[StoredColumns]) -> int:
+    """Count the events, from the first one on, that continue the chain of hashes."""
+    count = 0
+    for each in slices:
+        good = _linked_of_one(chain, stream, each)
+        count += good
+        if good < len(each.seqs):
+            break
+        chain = each.chains[-1]
+    return count
+
+
+def _linked_of_one(chain: bytes, stream: str, events: StoredColumns) -> int:
+    try:
+        return linked(chain, stream, events)
+    except (AttributeError, TypeError, struct.error):  # something in them is not of its type
+        rows: Iterable[Sequence[Any]] = zip(*events, strict=True)
+        typed = list(itertools.takewhile(lambda row: tuple(map(type, row)) == _TYPES, rows))
+        return linked(chain, stream, StoredColumns(*zip(*typed, strict=True))) if typed else 0
+
 
 log: Final = logging.getLogger(__name__)
 

@@ -1,19 +1,239 @@
-"""Answers since when a graph takes another course, by the index and simulations in workers."""
+"""Answers since when a graph takes another course, by the index and by simulations of
+earlier moments in workers."""
 
+import time
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime
 from typing import Annotated, Any, Final
 
 import msgspec
+from msgspec.structs import replace
+from sqlalchemy import Connection
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
+from action_assistant.editor.documents.contents import NOTHING_INSIDE, Inside, graphs_of
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.change_summaries import Changes, names_between
-from action_assistant.editor.history.course_changes import followed_between
+from action_assistant.editor.history.change_summaries import (
+    Changes,
+    State,
+    graph_of,
+    names_between,
+    shortened,
+    state_of,
+    stretch_of,
+)
+from action_assistant.editor.history.key_changes import LoggedChange, owner_of
 from action_assistant.editor.log.document_events import when
 from action_assistant.editor.people.people import People
 from action_assistant.errors import BadInput
-from action_assistant.umrf.semantics import SCRIPT, script_from
+from action_assistant.umrf.courses.expected import keyed, scripted_by_key, scripted_by_name
+from action_assistant.umrf.difference import difference
+from action_assistant.umrf.model import Graph, Key
+from action_assistant.umrf.semantics import SCRIPT, Script, script_from
+from action_assistant.umrf.semantics.steps import (
+    Departure,
+    ExpectedStep,
+    course,
+    departure,
+    step_text,
+    unnamed,
+)
 from action_assistant.web.auth.keys import PersonRef
+
+_EACH: Final = 200  # moments that are all looked at
+_SAMPLES: Final = 64  # of more
+_EVENTS: Final = 4_000  # of one course
+_BUDGET_S: Final = 25.0  # of this process's time, for the samples
+#: Fields of actions that no engine reads.
+_SILENT: Final = frozenset({"description", "x/gui_attributes", "x", "in", "out"})
+
+
+class CourseParting(msgspec.Struct, frozen=True):
+    """The change `seq` from which on the course is another (`parts`), or the first one again. Before it
+    and after it the graph was simulated. `place`, `before`, `after`: the first step in which the two
+    courses differ, from 1, and the step that is taken in each, in words."""
+
+    seq: int
+    author: str
+    at: int
+    parts: bool
+    place: int
+    before: str
+    after: str
+    changes: Changes
+
+
+class Followed(msgspec.Struct, frozen=True):
+    """The changes after which the course of a graph differs, in order of time. `same`: whether the course at
+    the end is that at the beginning. `exact`: whether every moment between was ruled out or simulated;
+    `looked`: the number of simulated moments."""
+
+    same: bool
+    exact: bool
+    looked: int
+    partings: tuple[CourseParting, ...]
+
+
+def followed_between(
+    connection: Connection,
+    graph: str,
+    good: int,
+    bad: int,
+    limit: int,
+    script: Script,
+    named_at: int,
+    inside: Inside,
+) -> Followed:
+    """Search the changes of a graph between the changes `good` and `bad`, as `followed` does. Raise
+    TooLarge if there are more than `limit`."""
+    changes = stretch_of(connection, graph, good, bad, limit)
+    base = index_queries.at(connection, graph, good)
+    return followed(base, changes, script, named_at, inside=inside)
+
+
+def followed(
+    base: Sequence[LoggedChange],
+    changes: Sequence[LoggedChange],
+    script: Script,
+    named_at: int,
+    budget_s: float = _BUDGET_S,
+    inside: Inside = NOTHING_INSIDE,
+) -> Followed:
+    """Find the changes after which the simulated course differs from the one before the first of them.
+    `changes`: in order of time. `base`: the value of each key before them. The names in `script` are those
+    after the change `named_at`. `inside`: the graphs inside, the same at every moment."""
+    past = _Past(base, changes, script, named_at, graphs_of(inside))
+    if not past.moments:
+        return Followed(True, True, 1, ())
+    flips, exact = _flips(past, budget_s)
+    partings = tuple(past.parting(*flip) for flip in flips)
+    return Followed(past.is_same(len(past.moments)), exact, past.looked, partings)
+
+
+def _flips(past: "_Past", budget_s: float) -> tuple[list[tuple[int, int]], bool]:
+    """Neighbouring moments between which the verdict changes, and whether there can be no more."""
+    last = len(past.moments)
+    parts = last if last <= _EACH else _SAMPLES
+    marks = sorted({last * n // parts for n in range(parts + 1)})
+    exact = len(marks) == last + 1
+    begun, found = time.thread_time(), list[tuple[int, int]]()
+    end = past.is_same(last)
+    left = 0
+    for right in marks[1:]:
+        if time.thread_time() - begun > budget_s:
+            exact = False
+            break
+        if past.is_same(left) != past.is_same(right):
+            found.append(_narrowed(past, left, right))
+        left = right
+    if left != last and past.is_same(left) != end:
+        found.append(_narrowed(past, left, last))
+    return found, exact
+
+
+def _narrowed(past: "_Past", left: int, right: int) -> tuple[int, int]:
+    """The neighbours between two moments of different verdicts at which it changes."""
+    verdict = past.is_same(left)
+    while right - left > 1:
+        middle = (left + right) // 2
+        if past.is_same(middle) == verdict:
+            left = middle
+        else:
+            right = middle
+    return left, right
+
+
+class _Past:
+    """Moments after changes that an engine can notice; the moment 0 is before all of them."""
+
+    def __init__(
+        self,
+        base: Sequence[LoggedChange],
+        changes: Sequence[LoggedChange],
+        script: Script,
+        named_at: int,
+        inside: Mapping[str, Graph],
+    ) -> None:
+        self._inside = inside
+        self._base = state_of(base)
+        self._changes = changes
+        self.moments: list[LoggedChange] = list(_noticed(changes))
+        self._courses: dict[int, list[ExpectedStep]] = {}
+        self._script = scripted_by_key(script, graph_of(self._state(named_at)))
+        self._reference = self._course(0)
+
+    @property
+    def looked(self) -> int:
+        """The number of moments that were simulated."""
+        return len(self._courses)
+
+    def is_same(self, moment: int) -> bool:
+        """Tell whether the course of a moment is that of the first one."""
+        return self._course(moment) == self._reference
+
+    def parting(self, left: int, right: int) -> CourseParting:
+        """Describe how the courses of two neighbouring moments differ, as a fact about the later one."""
+        change = self.moments[right - 1]
+        before, after = self._graph(left), self._graph(right)
+        apart = departure(self._course(left), self._course(right))
+        names = {a.key: a.full_name for a in (*before.actions, *after.actions)}
+        owners = {owner_of(c.root, c.key) for c in self._changes if c.seq == change.seq}
+        return CourseParting(
+            change.seq,
+            change.author,
+            change.at,
+            not self.is_same(right),
+            0 if apart is None else apart.place + 1,
+            *_words(apart, names),
+            shortened(difference((0, before), (0, after)), owners),
+        )
+
+    def _course(self, moment: int) -> list[ExpectedStep]:
+        found = self._courses.get(moment)
+        if found is None:
+            graph = self._graph(moment)
+            keys = {a.full_name: a.key for a in graph.actions}
+            played = scripted_by_name(self._script, graph)
+            steps = unnamed(course(graph, played, _EVENTS, self._inside))
+            found = keyed(steps, keys)
+            self._courses[moment] = found
+        return found
+
+    def _graph(self, moment: int) -> Graph:
+        if moment == 0:
+            return graph_of(self._base)
+        return graph_of(self._state(self.moments[moment - 1].seq))
+
+    def _state(self, seq: int) -> State:
+        return self._base | {c.place: c.after for c in self._changes if c.seq <= seq}
+
+
+def _noticed(changes: Sequence[LoggedChange]) -> Iterator[LoggedChange]:
+    """One change of each event that an engine can notice."""
+    last = 0
+    for change in changes:
+        if change.seq != last and _is_noticed(change):
+            last = change.seq
+            yield change
+
+
+def _is_noticed(change: LoggedChange) -> bool:
+    if change.root not in {"actions", "relations"}:
+        return False
+    return change.key.partition("|")[2] not in _SILENT
+
+
+def _words(apart: Departure | None, names: Mapping[Key, str]) -> tuple[str, str]:
+    if apart is None:
+        return "", ""
+
+    def words(step: ExpectedStep | None) -> str:
+        named = None if step is None else replace(step, node=names.get(step.node, step.node))
+        return step_text(named)
+
+    return words(apart.expected), words(apart.found)
+
 
 _MOST: Final = 200_000  # changes of keys between two moments
 

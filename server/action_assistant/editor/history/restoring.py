@@ -1,19 +1,181 @@
-"""Restores a graph or one action of it, or reverts the edits of one person; each by a new edit."""
+"""Restores a graph or one action of it, or reverts the edits of one person; each by a new edit.
 
-from typing import Final
+Workers compute the updates."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
 
 import msgspec
+from msgspec import UNSET
+from sqlalchemy import Connection
 
 from action_assistant.editor.catalogue import server_edits
 from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.documents.values import ends_of
+from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.reverting import one_as_it_was, reverting_edits
+from action_assistant.editor.history.document_places import (
+    arrows_of,
+    by_owner,
+    is_place_of_card,
+    places_of,
+    proves,
+)
+from action_assistant.editor.history.key_changes import (
+    LoggedChange,
+    Packed,
+    Place,
+    owner_of,
+    unpacked,
+)
+from action_assistant.editor.interchange.document_edits import setting
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
-from action_assistant.errors import BadInput, Conflict, NotFound
+from action_assistant.errors import BadInput, Conflict, NotFound, TooLarge
 from action_assistant.journal.journal import Journal
+from action_assistant.umrf.model import ENTRY, EXIT
 from action_assistant.web.workers.lanes import RunInWorker, run_here
+
+
+class RevertedEdits(msgspec.Struct, frozen=True):
+    """The update that takes something back. `left`: of what not all was taken back, since others have
+    changed it or built on it: actions, arrows and notes as `owner_of` names them."""
+
+    update: bytes
+    left: tuple[str, ...]
+
+
+def reverting_edits(
+    connection: Connection, graph: str, state: bytes, author: str, first: int, last: int, limit: int
+) -> RevertedEdits | None:
+    """Return the edits that revert what `author` changed from the change `first` to `last`; None if
+    there is nothing to revert. Raise TooLarge if there are more than `limit` changes."""
+    changes = index_queries.between(connection, graph, first - 1, last, limit + 1, author)
+    if len(changes) > limit:
+        raise TooLarge("That is too much to take back at once; go back to the moment before.")
+    if not changes:
+        return None
+    return reverting(state, changes, index_queries.latest_since(connection, graph, first))
+
+
+def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, owner: str) -> bytes:
+    """Return the update that restores one action or arrow to its state after the change `seq`.
+    Raise NotFound if it did not exist then."""
+    then = index_queries.at(connection, graph, seq)
+    if not owner or all(owner_of(*change.place) != owner for change in then):
+        raise NotFound(f"There was nothing {owner!r} in this graph after its change {seq}.")
+    return as_it_was(state, then, owner)
+
+
+def reverting(
+    state: bytes, changes: Sequence[LoggedChange], latest: Mapping[Place, int]
+) -> RevertedEdits:
+    """Take back the changes of one person in a session, given in order of time. `latest`: the last change
+    of each key that anybody has changed since it began.
+
+    A field that somebody has set since stays as it is; one that somebody else set in between becomes what
+    they made of it. What was made in that session goes only if nobody has changed it or led an arrow to
+    it since; where it stands does not matter.
+    """
+    session = _EditSession(changes, places_of(state), latest)
+    return RevertedEdits(_setting(state, session.targets()), session.left())
+
+
+def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
+    """The update that makes an action, arrow or note what it was. `then`: the changes that gave each key
+    of the graph its value. An action that is not there any more comes back with its arrows."""
+    now = places_of(state)
+    owners = {owner}
+    if ("actions", owner) not in now:
+        alive = {key for root, key in now if root == "actions" and "|" not in key}
+        alive |= {owner, ENTRY, EXIT}
+        for each in {owner_of(*change.place) for change in then}:
+            ends = ends_of(each)
+            if ends is not None and owner in ends[:2] and alive.issuperset(ends[:2]):
+                owners.add(each)
+    targets: dict[Place, Packed] = {place: None for place in now if owner_of(*place) in owners}
+    targets |= {change.place: change.after for change in then if owner_of(*change.place) in owners}
+    return _setting(state, targets)
+
+
+class _EditSession:
+    """The changes of one person by key, compared with the document now."""
+
+    def __init__(
+        self,
+        changes: Sequence[LoggedChange],
+        now: Mapping[Place, Any],
+        latest: Mapping[Place, int],
+    ) -> None:
+        self._now = now
+        self._latest = latest
+        self._first: dict[Place, Packed] = {}
+        self._last: dict[Place, LoggedChange] = {}
+        for change in changes:
+            place, before = change.place, change.before
+            if change.root == "comments":
+                continue  # what people said stays
+            if place not in self._last or self._last[place].after != before:
+                self._first[place] = before
+            self._last[place] = change
+        self._places = by_owner(now)
+        self._arrows = arrows_of({_owner(place) for place in latest} & self._places.keys())
+        made = {owner for owner in map(_owner, self._first) if self._was_made(owner)}
+        self._made = made
+        self._kept = set[str]()  # of those, what stays
+        while more := {o for o in made - self._kept if self._is_in_use(o)}:
+            self._kept |= more
+
+    def targets(self) -> dict[Place, Packed]:
+        """Return the values that keys get back."""
+        return {p: old for p, old in self._first.items() if self._goes_back(p)}
+
+    def left(self) -> tuple[str, ...]:
+        """Return the owners of which something is not reverted."""
+        stay = {
+            owner_of(*place)
+            for place, old in self._first.items()
+            if not self._goes_back(place) and old != self._last[place].after
+        }
+        return tuple(sorted(stay))
+
+    def _goes_back(self, place: Place) -> bool:
+        owner = _owner(place)
+        if owner in self._made:
+            return owner not in self._kept
+        return self._is_untouched(place)
+
+    def _is_mine(self, place: Place) -> bool:
+        return place in self._last and self._is_untouched(place)
+
+    def _is_untouched(self, place: Place) -> bool:
+        """Tell whether nobody has set a key since this person did."""
+        mine = self._last[place]
+        return self._latest[place] == mine.seq and self._now.get(place) == unpacked(mine.after)
+
+    def _was_made(self, owner: str) -> bool:
+        """Tell whether a thing that exists now was made by these changes."""
+        proofs = [place for place in self._places.get(owner, ()) if proves(place)]
+        return bool(proofs) and all(self._first.get(place, b"") is None for place in proofs)
+
+    def _is_in_use(self, owner: str) -> bool:
+        """Tell whether others have changed a thing, or connected an arrow to it that stays."""
+        own = [place for place in self._places[owner] if not is_place_of_card(place)]
+        if any(place in self._latest and not self._is_mine(place) for place in own):
+            return True
+        return not self._arrows.get(owner, set()) <= self._made - self._kept
+
+
+def _owner(place: Place) -> str:
+    return owner_of(*place)
+
+
+def _setting(state: bytes, targets: Mapping[Place, Packed]) -> bytes:
+    return setting(
+        state, {p: UNSET if value is None else unpacked(value) for p, value in targets.items()}
+    )
+
 
 _MOST: Final = 100_000  # changes of keys that are taken back at once
 

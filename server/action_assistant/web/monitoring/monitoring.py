@@ -1,5 +1,7 @@
-"""Puts together the metrics, the readiness and the status of one process."""
+"""Puts together the metrics, the readiness and the status of one process, with the lag of its event loop."""
 
+import asyncio
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime
@@ -7,15 +9,21 @@ from pathlib import Path
 from typing import Final
 
 import anyio
-from prometheus_client import CollectorRegistry, ProcessCollector, disable_created_metrics
+from prometheus_client import (
+    CollectorRegistry,
+    Histogram,
+    Metric,
+    ProcessCollector,
+    disable_created_metrics,
+)
 from prometheus_client.exposition import generate_latest
+from prometheus_client.registry import Collector
 
 from action_assistant.journal.migrate import revisions_of
 from action_assistant.version import VERSION
 from action_assistant.web.http.requests import RequestCounts
 from action_assistant.web.monitoring.backups import backups_shown
 from action_assistant.web.monitoring.gauges import Family, Looked
-from action_assistant.web.monitoring.loop_lag import LoopLag
 from action_assistant.web.monitoring.readiness import Check, DiskCheck, Parts, Readiness
 from action_assistant.web.monitoring.status import (
     ProcessName,
@@ -30,6 +38,43 @@ from action_assistant.web.monitoring.status import (
 from action_assistant.web.monitoring.storage import StorageWatch
 from action_assistant.web.monitoring.watched import Watched
 from action_assistant.web.workers.lanes import Lane
+
+_TICK_S: Final = 0.25
+_REMEMBERED: Final = 240  # ticks: a minute
+_BUCKETS: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10)
+
+
+class LoopLag(Collector):
+    """Sleeps for a while again and again, and notes how much later it woke up."""
+
+    def __init__(self) -> None:
+        self._last: deque[float] = deque(maxlen=_REMEMBERED)
+        self._lag = Histogram(
+            "action_assistant_loop_lag_seconds",
+            "How much later than asked for the event loop did something, looked at each 0.25 s.",
+            registry=None,
+            buckets=_BUCKETS,
+        )
+
+    async def run(self) -> None:
+        """Measure the lag of the event loop until cancelled."""
+        loop = asyncio.get_running_loop()
+        while True:
+            due = loop.time() + _TICK_S
+            await asyncio.sleep(_TICK_S)
+            late = max(0.0, loop.time() - due)
+            self._lag.observe(late)
+            self._last.append(late)
+
+    @property
+    def worst_s(self) -> float:
+        """Return the worst lag of the event loop in the last minute, in seconds."""
+        return max(self._last, default=0.0)
+
+    def collect(self) -> Iterator[Metric]:
+        """Yield the metrics that a Prometheus registry asks for."""
+        yield from self._lag.collect()
+
 
 disable_created_metrics()  # type: ignore[no-untyped-call]  # each counter and histogram would be told twice
 

@@ -11,8 +11,7 @@ import pytest
 
 from action_assistant.errors import CannotStart
 from action_assistant.logs.context import about, begin, is_about, request_id, subjects
-from action_assistant.logs.formats import ConsoleLog, JsonLog
-from action_assistant.logs.setup import LogSettings, log_settings
+from action_assistant.logs.setup import ConsoleLog, JsonLog, LogSettings, log_settings
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.keys import Keys
 
