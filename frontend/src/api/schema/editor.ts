@@ -25,11 +25,11 @@ export interface EditorApi {
     };
     /**
      * ActionUse
-     * @description A graph that uses an action of the library. `seq`: its change that was looked at; `count`: how
+     * @description A graph that uses an action of the library. `seq`: its change that was examined; `count`: how
      *     many of its actions are uses.
      *
-     *     `changed`: whether an update would change the graph; `difference` is what it would change, and
-     *     `suggested` are renames that are likely, of which none is in it unless it was asked for.
+     *     `changed`: an update would change the graph. `difference`: what the update would change.
+     *     `suggested`: likely renames, which are not in it unless requested.
      */
     ActionUse: {
         graph: string;
@@ -71,8 +71,8 @@ export interface EditorApi {
     };
     /**
      * AskedMerge
-     * @description Into which side what the other did is brought, and whose value counts where both changed the same,
-     *     by the places of the conflicts.
+     * @description The side that the other side's changes are merged into, and, by the place of a conflict, the
+     *     side whose value is chosen.
      */
     AskedMerge: {
         /**
@@ -87,9 +87,9 @@ export interface EditorApi {
     };
     /**
      * AskingSince
-     * @description Between which moments to look: after the change `good`, and after `bad` (left out: now). What the
-     *     actions do, as in a script of `simulate`, is the same at every moment; it names actions as they were
-     *     called at `named_at` (left out: at `bad`).
+     * @description The request: search between the change `good` and the change `bad` (missing: the newest).
+     *     `script`: what the actions do, as in a script of `simulate`, the same for every change.
+     *     `named_at`: the change after which actions had the names in `script` (missing: `bad`).
      */
     AskingSince: {
         good: number;
@@ -200,8 +200,8 @@ export interface EditorApi {
     };
     /**
      * Changes
-     * @description The changes of somebody as a difference, with at most 30 things of each kind, and the number of others.
-     *     `comments`: the number of threads with new comments.
+     * @description The changes of one person as a difference, with at most 30 items of each kind; `more`: the
+     *     number of others. `comments`: the number of threads with new comments.
      */
     Changes: {
         /** @default [] */
@@ -219,7 +219,7 @@ export interface EditorApi {
     };
     /**
      * Command
-     * @description A command that a person gives to the running graph, and its time.
+     * @description A command of a person to the running graph, and its time.
      */
     Command: {
         at_ms: number;
@@ -247,9 +247,10 @@ export interface EditorApi {
     };
     /**
      * CourseChange
-     * @description From the change `seq` on the course is another one (`parts`), or the first one again. `place`,
-     *     `before`, `after`: the first step, from 1, in which the courses before and after this change differ,
-     *     and what is done in it, in words. `changes` is what the change did to the graph.
+     * @description From the change `seq` on the course differs from the first one (`parts`), or equals it again.
+     *     `place`, `before`, `after`: the first step, from 1, in which the courses before and after
+     *     this change differ, and that step in each, in words. `changes`: the effect of the change on
+     *     the graph.
      */
     CourseChange: {
         seq: number;
@@ -337,9 +338,9 @@ export interface EditorApi {
     };
     /**
      * DraftConflict
-     * @description A conflict between both sides of a draft. `place` is the name by which a choice refers to it; `what`
-     *     names the thing in words; `removed`: the side that removed it while the other changed it. `origin` and
-     *     `draft`: the changes of each side to it.
+     * @description A conflict between both sides of a draft. `place`: the key by which a choice names it.
+     *     `what`: the thing, in words. `removed`: the side that removed it while the other changed it.
+     *     `origin`, `draft`: the changes of each side to it.
      */
     DraftConflict: {
         place: string;
@@ -380,8 +381,8 @@ export interface EditorApi {
     };
     /**
      * DraftView
-     * @description A draft. `seq` and `origin_seq` are the last changes of it and of what it is a draft of; `ahead` and
-     *     `behind`: how many things either changed since they were one, null where that cannot be said.
+     * @description A draft. `seq`, `origin_seq`: the last changes of draft and origin. `ahead`, `behind`: how
+     *     many things the draft and the origin changed since they were equal; null if that is unknown.
      */
     DraftView: {
         id: string;
@@ -418,7 +419,7 @@ export interface EditorApi {
     };
     /**
      * EditsOfOne
-     * @description A request to revert what one person, given by id, changed from the change `from_seq` to `seq`.
+     * @description A request to revert the changes of one person (by id) from the change `from_seq` to `seq`.
      */
     EditsOfOne: {
         author: string;
@@ -482,8 +483,8 @@ export interface EditorApi {
     };
     /**
      * FieldBlame
-     * @description The author of one field, named as in the keys of the document (docs/contracts.md 1): `in/speed`,
-     *     `on_true`, "" for the name of an action; and `position`.
+     * @description The author of one field. Fields are named as in the keys of the document (docs/contracts.md
+     *     1): `in/speed`, `on_true`, "" for the name of an action; also `position`.
      */
     FieldBlame: {
         value: unknown;
@@ -497,8 +498,9 @@ export interface EditorApi {
     };
     /**
      * FieldValue
-     * @description The value that somebody gave a field by the change `seq`, and the one before. null is no value.
-     *     `merged`: how it came from a draft, where that person gave it the value; `seq` is then the merge.
+     * @description The value that a person gave a field by the change `seq`, and the value before; null is no
+     *     value. `merged`: how the value came from a draft, where that person set it; `seq` is then the
+     *     change of the merge.
      */
     FieldValue: {
         value: unknown;
@@ -557,8 +559,9 @@ export interface EditorApi {
     };
     /**
      * GoneBack
-     * @description The result of going back. `seq`: the last change of the graph now. `left`: keys of actions, notes and
-     *     arrows that were not fully reverted, since others have changed them or built on them.
+     * @description The result of a restore or revert. `seq`: the last change of the graph now. `left`: keys of
+     *     actions, notes and arrows that were not fully reverted, since others have changed or used
+     *     them.
      */
     GoneBack: {
         seq: number;
@@ -566,8 +569,9 @@ export interface EditorApi {
     };
     /**
      * GraphAsAction
-     * @description A graph, as the action that stands for it in another one: it takes what its first actions lack,
-     *     and gives what its last one gives. Robots run it so where they have indexed it.
+     * @description A graph as the action that stands for it in other graphs: its inputs are those that its first
+     *     actions lack, its outputs those of its last action. A robot runs it if it has indexed the
+     *     graph.
      */
     GraphAsAction: {
         graph: string;
@@ -578,7 +582,7 @@ export interface EditorApi {
     };
     /**
      * GraphMoment
-     * @description A graph, and its change that somebody has seen.
+     * @description A graph, and its change that a person has seen.
      */
     GraphMoment: {
         graph: string;
@@ -695,11 +699,11 @@ export interface EditorApi {
      * HistoryEntry
      * @description One entry of the history of a graph, from `at` to `until`.
      *
-     *     `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to show the graph after this
-     *     entry; edits begin at `from_seq`, and others may have edited between the two. `restored`: the change that
-     *     was restored; `adapted`: the change of the action whose parameters were taken over; `reverted`: the edits
-     *     that were reverted; `merged`: the edits that were merged. `changes`: what this person changed; null where
-     *     there is nothing, or too much to list here.
+     *     `seq`: the change after which `…/umrf?at=` and `…/restore` show the graph after this entry.
+     *     Edits begin at `from_seq`, and others may have edited in between. `restored`: the change that
+     *     was restored; `adapted`: the change of the action whose parameters were taken over; `reverted`:
+     *     the edits that were reverted; `merged`: the edits that were merged. `changes`: what this person
+     *     changed; null if there is nothing or too much to list.
      */
     HistoryEntry: {
         /** @enum {string} */
@@ -720,9 +724,10 @@ export interface EditorApi {
     };
     /**
      * ImportReport
-     * @description A report on an imported file: its dialect, what was translated, and its problems.
+     * @description A report on an imported file: its dialect, the notes on what was translated, and its
+     *     problems.
      *
-     *     `remarks` are the notes with their places; all places are in the file as it was sent.
+     *     `remarks`: the notes with their places; all places are in the file as it was sent.
      */
     ImportReport: {
         dialect: string;
@@ -816,7 +821,8 @@ export interface EditorApi {
     };
     /**
      * KeyChange
-     * @description One key of the document. A value that is left out: the key is not there.
+     * @description The change of one key of the document. A missing `before` or `after` means that the key has
+     *     no value.
      */
     KeyChange: {
         root: string;
@@ -868,12 +874,12 @@ export interface EditorApi {
     };
     /**
      * LibraryAction
-     * @description An action that the library has, or that graphs use.
+     * @description An action of the library, or one that graphs use.
      *
-     *     `document` is its document in the library, `seq` the last change of that. Without one, parameters
-     *     are those of all graphs together; of what they say differently, and of descriptions and types, the
-     *     graph changed last counts. `differs_in`: of `used_in`, the graphs that use it with other parameters
-     *     than the document has. `first_seen` is when the first of them was made.
+     *     `document`: its document in the library, `seq` the last change of that document. Without a
+     *     document, the parameters are those of all graphs together; where graphs differ, the graph
+     *     changed last counts. `differs_in`: the graphs of `used_in` that use it with other parameters
+     *     than the document has. `first_seen`: when the first document or graph with it was made.
      */
     LibraryAction: {
         name: string;
@@ -891,10 +897,9 @@ export interface EditorApi {
     };
     /**
      * LibraryParameter
-     * @description One parameter. `path` joins keys with `/` as in UMRF; no `pvf_type`: the file names none.
-     *
-     *     `text` is its JSON as a new use begins with it: without a value that a graph gave it, and with the
-     *     value that a document of the library has.
+     * @description One parameter. `path`: keys joined with `/` as in UMRF. `pvf_type`: missing if the file names
+     *     none. `text`: the JSON with which a new use begins: with the value of a library document, but
+     *     without values of graphs.
      */
     LibraryParameter: {
         path: string;
@@ -962,11 +967,11 @@ export interface EditorApi {
     };
     /**
      * MergePreview
-     * @description The effect of a merge on the side `into`, where conflicts without a choice stay as they are there.
-     *
-     *     `seq`, `draft_seq`: the compared changes of both sides. `changes`: what would change. `problems`: those that
-     *     are new on this side. `umrf`: the resulting text. `authors`: the people whose changes are merged.
-     *     `origin_did`, `draft_did`: the changes of each side since the last merge.
+     * @description The effect of a merge on the side `into`, where a conflict without a choice keeps this side's
+     *     value. `seq`, `draft_seq`: the compared changes of origin and draft. `changes`: what would
+     *     change. `problems`: those that would be new. `umrf`: the resulting text. `authors`: the
+     *     people whose changes are merged. `origin_did`, `draft_did`: the changes of each side since
+     *     the last merge.
      */
     MergePreview: {
         /** @enum {string} */
@@ -983,8 +988,8 @@ export interface EditorApi {
     };
     /**
      * MergedBy
-     * @description The origin of a value that was merged: the graph and its change there, the person who merged it and when,
-     *     and the name of the draft.
+     * @description The origin of a merged value: the graph and its change there, who merged it and when, and the
+     *     name of the draft.
      */
     MergedBy: {
         graph: string;
@@ -996,7 +1001,7 @@ export interface EditorApi {
     };
     /**
      * MergedDraft
-     * @description The side into which was merged, and how far its log goes now; whether that changed anything.
+     * @description The graph that was merged into, its last change now, and whether the merge changed it.
      */
     MergedDraft: {
         graph: string;
@@ -1028,8 +1033,8 @@ export interface EditorApi {
     };
     /**
      * NewDraft
-     * @description A request for a draft: its name, and the change of the graph that it begins with; the last one if left
-     *     out.
+     * @description A request for a draft: its name, and the change of the graph that it begins with (missing:
+     *     the last one).
      */
     NewDraft: {
         /** @default  */
@@ -1137,7 +1142,7 @@ export interface EditorApi {
     };
     /**
      * PackageList
-     * @description The packages of a graph after its change `seq`: one for each name of an action.
+     * @description The packages of a graph after its change `seq`: one for each distinct name of an action.
      */
     PackageList: {
         seq: number;
@@ -1203,8 +1208,8 @@ export interface EditorApi {
     };
     /**
      * Pieces
-     * @description A UMRF text as the keys that a document would hold. `notes`: what was translated; `remarks`
-     *     are the same with their places in the text.
+     * @description A UMRF text as keys and values of a document. `notes`: what was translated; `remarks`: the
+     *     notes with their places in the text.
      */
     Pieces: {
         dialect: string;
@@ -1251,8 +1256,8 @@ export interface EditorApi {
     };
     /**
      * Preview
-     * @description The graph that importing a file would make. `problems`: those of the file, then those of the graph.
-     *     `remarks` are the notes with their places; all places are in the file as it was sent.
+     * @description The graph that importing a file would make. `problems`: those of the file, then those of the
+     *     graph. `remarks`: the notes with their places; all places are in the file as it was sent.
      */
     Preview: {
         dialect: string;
@@ -1371,7 +1376,7 @@ export interface EditorApi {
     };
     /**
      * Rehearsal
-     * @description The events of a simulated run, in order. `cut`: whether there are more than are listed.
+     * @description The events of a simulated run, in order. `cut`: the list is incomplete.
      */
     Rehearsal: {
         seq: number;
@@ -1380,8 +1385,8 @@ export interface EditorApi {
     };
     /**
      * Rehearsing
-     * @description A request to simulate the graph after its change `seq`, the newest if left out. `script`: what its
-     *     actions do, as in a script of `simulate`; `commands`: what people do meanwhile.
+     * @description A request to simulate the graph after its change `seq` (missing: the newest). `script`: what
+     *     its actions do, as in a script of `simulate`; `commands`: what people do during the run.
      */
     Rehearsing: {
         /** @default null */
@@ -1519,10 +1524,10 @@ export interface EditorApi {
     };
     /**
      * SinceWhen
-     * @description The changes between `good` and `bad` after which the course of a graph differs, in order of time. `same`:
-     *     whether the course at `bad` is that at `good`. `exact`: whether there are no others; otherwise only some
-     *     moments were simulated, and the course may have changed and changed back between them. `looked`: the number
-     *     of simulated moments.
+     * @description The changes between `good` and `bad` after which the course of a graph differs, in order of
+     *     time. `same`: the course at `bad` equals that at `good`. `exact`: there are certainly no
+     *     others; otherwise only some changes were simulated, and the course may have changed and
+     *     changed back between them. `looked`: the number of simulations.
      */
     SinceWhen: {
         good: number;
@@ -1584,8 +1589,8 @@ export interface EditorApi {
     };
     /**
      * TextEdit
-     * @description The changes that an edited text makes to the graph after `seq`, and the errors that are new with it, with
-     *     their places in that text.
+     * @description The changes that an edited text makes to the graph after the change `seq`, and the new
+     *     errors, with their places in the text.
      */
     TextEdit: {
         seq: number;
@@ -1674,7 +1679,7 @@ export interface EditorApi {
     };
     /**
      * WantedMerge
-     * @description The merge that was looked at: of the origin as it was after its change `seq`, and of the draft after
+     * @description The merge that was previewed: of the origin after its change `seq`, and of the draft after
      *     its change `draft_seq`.
      */
     WantedMerge: {

@@ -13,7 +13,8 @@ class Panicked(Exception):
 
 
 class _Applying:
-    """Tells the failures of the CRDT library from all others. Holds nothing: one serves for all."""
+    """Context manager that turns failures of the CRDT library into our errors. It has no state, so
+    one instance serves all callers."""
 
     def __enter__(self) -> None:
         pass
@@ -32,8 +33,8 @@ _APPLYING: Final = _Applying()
 
 
 def applying() -> AbstractContextManager[None]:
-    """Around a call of the CRDT library with foreign bytes, and nothing else. Raises Malformed,
-    Panicked."""
+    """Return the context manager for a call of the CRDT library with foreign bytes. It raises
+    Malformed for bytes that the library refuses, Panicked if the library fails."""
     return _APPLYING
 
 

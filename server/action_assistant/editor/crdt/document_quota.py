@@ -78,11 +78,12 @@ def refuse_too_long(update: bytes) -> None:
 
 
 class QuotaExceeded(Exception):
-    """The document would hold more than one may; the message says of what."""
+    """The document would exceed a limit, which the message names."""
 
 
 class DocumentQuota:
-    """The bounds of one document: never below what it holds."""
+    """The limits of one document: bytes, actions and fields. A document that is larger already may
+    stay so, but not grow."""
 
     def __init__(self, doc: "Doc[Any]") -> None:
         self._doc = doc
@@ -122,7 +123,7 @@ class DocumentQuota:
 
 
 def actions_in(doc: "Doc[Any]") -> int:
-    """Count the actions of a document. Their keys are those without a field."""
+    """Return the number of actions of a document: the keys without a field name."""
     return sum("|" not in key for key in doc.get("actions", type=Map).keys())  # noqa: SIM118
 
 

@@ -15,7 +15,7 @@ EventRow: TypeAlias = tuple[str, str, bytes]
 
 
 class EventColumns(msgspec.Struct, frozen=True):
-    """`first` is the seq of the first one; the columns are equally long."""
+    """Consecutive events of one stream, column by column. `first`: the seq of the first event."""
 
     first: int
     kinds: list[str]
@@ -57,7 +57,7 @@ class EventColumns(msgspec.Struct, frozen=True):
         )
 
     def by_kind(self) -> Iterator["EventColumns"]:
-        """Parts of one kind each, in order."""
+        """Yield runs of consecutive events of one kind, in order."""
         if self.kinds.count(self.kinds[0]) == len(self):  # as nearly always, and at once
             yield self
             return

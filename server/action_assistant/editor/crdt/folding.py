@@ -18,7 +18,8 @@ class StreamDamage(msgspec.Struct, frozen=True):
 
 
 class Folded(msgspec.Struct, frozen=True):
-    """A document after some events, `seq` the last one; `damaged` is the one that cannot be applied."""
+    """A snapshot of a document after the event `seq`. `damaged`: the next event, if it cannot be
+    applied."""
 
     document: bytes
     seq: int
@@ -26,8 +27,8 @@ class Folded(msgspec.Struct, frozen=True):
 
 
 def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
-    """Fold events that rooms have accepted, as `fold` with learning does, but read each one only as far as
-    needed. Events that no room would accept may end the process."""
+    """Fold events that rooms have accepted, with the result of `fold` with `learn`, but without
+    reading every event completely. Other events could crash the process."""
     replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None
@@ -54,8 +55,8 @@ def fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
 
 
 def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Folded:
-    """Fold the events before the first one that cannot be applied. Starts with a new replica, since one in
-    which something failed cannot be used any more."""
+    """Fold the events before the first one that cannot be applied. A new replica is used, since a
+    replica in which something failed is unusable."""
     bad, why = _first_bad(document, events)
     damaged = StreamDamage(events.first + bad, why)
     if not bad:

@@ -198,10 +198,8 @@ _SMALL: Final = 32 * 1024  # bytes that are put together at once: milliseconds, 
 
 
 class Loaded(msgspec.Struct, frozen=True):
-    """A document read from the log, at `seq`. `kept` is the seq of the snapshot it began from.
-
-    `damaged`: the log goes on, and this is why the document does not.
-    """
+    """A document read from the log up to `seq`. `kept`: the seq of the snapshot that it was read
+    from; `damaged`: why the document ends before the log does."""
 
     replica: Replica
     seq: int
@@ -210,8 +208,8 @@ class Loaded(msgspec.Struct, frozen=True):
 
 
 class Stored(msgspec.Struct, frozen=True):
-    """A document read from the log as the bytes of a snapshot, empty where nothing was stored. The other fields
-    are those of `Loaded`."""
+    """A document read from the log, as the bytes of a snapshot; empty if nothing was stored. The
+    other fields are those of `Loaded`."""
 
     document: bytes
     seq: int
@@ -244,8 +242,8 @@ async def load(
 
 
 async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None:
-    """Make the document of a snapshot, a large one in pieces with turns of the loop between them. Return an
-    empty one where nothing was stored, and None when these bytes are no snapshot of ours."""
+    """Make a replica from a snapshot; a large one is applied in pieces, so that other tasks run in
+    between. Return an empty replica for empty bytes, None if the bytes are no snapshot."""
     if not document:
         return Replica()
     kept = ReplicaState.read(document)
@@ -263,7 +261,7 @@ async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None
 
 
 async def pieces_aside(update: bytes, run_in_worker: RunInWorker) -> list[bytes]:
-    """Split a large update in a worker. Return it as it is where that fails."""
+    """Split a large update in a worker; return the update alone if it is small or the worker fails."""
     if run_in_worker is run_here or len(update) <= PIECE_BYTES:
         return [update]
     try:

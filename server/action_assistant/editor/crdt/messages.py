@@ -296,12 +296,14 @@ def acks(messages: int, seq: int) -> bytes:
 
 
 def compared(seq: int, entries: int, total: int) -> bytes:
-    """A fingerprint of the document at `seq`."""
+    """Return the message with the fingerprint of the document at `seq`: the number of its entries
+    and the sum of their hashes."""
     return bytes((COMPARE,)) + number(seq) + number(entries) + number(total)
 
 
 def read_only(why: str) -> bytes:
-    """Return a message that nobody may change this document. `why`: the reason, as a sentence."""
+    """Return the message that the document cannot be changed by anybody. `why`: the reason, as a
+    sentence."""
     return bytes((READ_ONLY,)) + text(why.encode())
 
 

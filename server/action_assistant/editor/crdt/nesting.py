@@ -15,7 +15,8 @@ Span: TypeAlias = tuple[int, int, int]
 
 
 class Placed(msgspec.Struct, frozen=True):
-    """A struct whose place is told by another one: inside it, or else beside it."""
+    """A struct whose position is given by another struct, `client` and `clock`: `inside` of it,
+    else beside it."""
 
     span: Span
     client: int
@@ -24,7 +25,7 @@ class Placed(msgspec.Struct, frozen=True):
 
 
 class Nesting:
-    """The depth of everything that does not lie in a root. A document of ours has nothing such."""
+    """The nesting depth of all structs that do not lie in a root. Documents of our page have none."""
 
     def __init__(self, spans: dict[int, list[tuple[int, int, int]]] | None = None) -> None:
         #: Per client `(first clock, clock after the last, depth)`, in order.
@@ -55,7 +56,8 @@ class Nesting:
             insort(self.spans.setdefault(client, []), (start, end, depth))
 
     def _resolved(self, placed: list[Placed], known: Mapping[int, int]) -> dict[Span, int]:
-        """The depth of each, without recursion: who stands on another waits for that one."""
+        """Return the depth of each struct, without recursion: a struct waits for the one that gives
+        its position."""
         by_client: dict[int, list[Placed]] = {}
         for each in placed:  # within a client they come in order
             by_client.setdefault(each.span[0], []).append(each)

@@ -27,8 +27,8 @@ _SMALLEST: Final = 6  # bytes of a struct in an update
 
 
 class OpeningTime:
-    """Bounds the time that opening one document takes: the last measured time, and an estimate for what was
-    added since."""
+    """Bounds the time that opening a document takes, by the last measurement and an estimate for
+    what was added since."""
 
     def __init__(self) -> None:
         self._came = 0  # structs that were ever added
@@ -40,7 +40,7 @@ class OpeningTime:
 
     @property
     def came(self) -> int:
-        """The number of structs ever added. It serves as the time of a measurement."""
+        """The number of structs ever added, which also dates a measurement."""
         return self._came
 
     def opened(self, seconds: float, size: int, came: int | None = None) -> None:
@@ -67,12 +67,13 @@ class OpeningTime:
 
     @property
     def is_due(self) -> bool:
-        """Tell whether a new measurement should start, so that no edit has to wait for one."""
+        """Return whether a new measurement should start now, early enough that no edit waits for
+        it."""
         return self._came > self._due_from
 
     def _bound(self) -> None:
-        """After how many structs that ever came it is due, and in doubt: asked for with each edit, and
-        counted with each measurement."""
+        """Compute the numbers of added structs from which a measurement is due, and from which the
+        time is in doubt."""
         spare = max(_SPARE + self._seconds, (self._limit - self._seconds) / 2)
         self._due_from = self._after(spare * _EARLY)
         self._doubtful_from = -1.0 if self.is_too_long else self._after(spare)

@@ -60,9 +60,9 @@ class TooMuchWaits(Exception):
 class Replica:
     """A Yjs document.
 
-    What waits for an earlier update is held back here: the library loses edits when it holds several
-    that wait. So the document never has anything pending. `owners` says whose a client is: that of
-    the person who first used it.
+    An update that needs a missing earlier one is held back here, since the library loses edits if
+    several wait. So the library's document never has pending updates. `owners`: the person who
+    first used a client id.
     """
 
     def __init__(self) -> None:
@@ -108,8 +108,9 @@ class Replica:
         read: UpdateOutline,
         pieces: Sequence[bytes],
     ) -> UpdateEffect:
-        """Apply an update that was tried on a copy, as `take` does, in pieces that bring the same; rest after
-        each for as long as it took. Nothing else may change the document meanwhile. Raises as `take` does."""
+        """Apply an update that was tried on a copy, as `take` does, but by its `pieces`, with
+        pauses as long as each took. The caller must keep others from changing the document
+        meanwhile. Raises as `take` does."""
         if self._waiting and update in self._waiting:
             return UpdateEffect.NOTHING
         new = self._check(update, author, holder, read)
@@ -129,7 +130,8 @@ class Replica:
         holder: Callable[[int], str | None],
         read: UpdateOutline,
     ) -> list[int]:
-        """Return the clients of which an update brings something new. Raise what forbids it."""
+        """Return the clients of which an update has new structs. Raise the error for which `take`
+        refuses an update."""
         known = self._known
         new = [client for client, _, end in read.brings if end > known.get(client, 0)]
         for client in new:
@@ -159,9 +161,10 @@ class Replica:
         return brought
 
     def replay(self, events: EventColumns, *, learn: bool = True) -> None:
-        """Apply events of the log in their order. Raises Malformed, Panicked.
+        """Apply events of the log in order. Raise Malformed or Panicked if one cannot be applied.
 
-        `learn`: also whose each client is and how deep things lie, for a document that goes on.
+        `learn`: also collect the owners of clients and the nesting depths, which a document needs
+        to be edited.
         """
         for group in events.by_kind():
             kind = group.kinds[0]
@@ -174,8 +177,9 @@ class Replica:
                 self._known = clocks(self.doc.get_state())
 
     def replay_sound(self, events: EventColumns) -> None:
-        """Replay events that rooms have accepted, as `replay` with learning does, but without reading each as a
-        whole. For a document that is then sent as a snapshot. Raises Malformed, Panicked, Uncertain."""
+        """Replay events that rooms have accepted, as `replay` with `learn` does, but without
+        reading each completely. The document can then only be stored as a snapshot. Raise
+        Malformed, Panicked or Uncertain if that fails."""
         for group in events.by_kind():
             if group.kinds[0] == DEFERRED:
                 self._replay_one_by_one(group)
@@ -184,7 +188,7 @@ class Replica:
                 self._replay_together(group.part(at, len(group)))
 
     def _until_nothing_waits(self, events: EventColumns) -> int:
-        """One by one, as long as something waits; how many that were."""
+        """Replay events one by one until no update waits; return how many were replayed."""
         done = 0
         while self._waiting and done < len(events):
             self._replay_one_by_one(events.part(done, done + 1))
@@ -192,7 +196,7 @@ class Replica:
         return done
 
     def _replay_together(self, events: EventColumns) -> None:
-        """Updates that wait for nothing, in a document in which nothing waits."""
+        """Replay updates at once, where neither these nor earlier updates wait."""
         if self.nesting.spans or lies_deep(events.bodies) or has_paired_texts(events.bodies):
             self._replay_one_by_one(events)
             return
@@ -204,8 +208,8 @@ class Replica:
         self._quota.took(events.size)
 
     def replay_each(self, events: Sequence[Event]) -> Iterator[Event]:
-        """Replay events one by one without learning, and yield each after it was applied, for callers that
-        observe the document. Raises Malformed, Panicked."""
+        """Replay events one by one without learning, and yield each after it was applied, for
+        callers that observe the document. Raise Malformed or Panicked if one cannot be applied."""
         for event in events:
             if event.kind == UPDATED and not self._waiting:
                 self._apply(event.body)
@@ -221,8 +225,8 @@ class Replica:
         self.go_on(kept, kept.state)
 
     def open_piece(self, piece: bytes) -> float:
-        """Apply one of the pieces of a snapshot or an update; return the seconds of processor time that it
-        took. Raises Malformed, Panicked."""
+        """Apply a piece of a snapshot or update; return the processor time in seconds. Raise
+        Malformed or Panicked if it cannot be applied."""
         begun = time.thread_time()
         self._apply(piece)
         took = time.thread_time() - begun
@@ -243,8 +247,8 @@ class Replica:
         }
 
     def state(self) -> bytes:
-        """Return the whole document as one update. A large one is kept until the next change, since making
-        its bytes takes 4 ms for each MB."""
+        """Return the whole document as one update. A large one is cached until the next change,
+        since encoding takes 4 ms for each MB."""
         if self._state is not None:
             return self._state
         state: bytes = self.doc.get_update()
@@ -285,7 +289,8 @@ class Replica:
     def _grew(
         self, update: bytes, read: UpdateOutline, *, is_applied: bool = False
     ) -> UpdateEffect:
-        """Apply what is ready, and what waited for it."""
+        """Apply an update that is ready, then the waiting updates that become ready by it; return
+        the effect."""
         try:
             changed = self._applied(update, read, is_applied=is_applied)
         except Malformed as error:
@@ -298,12 +303,12 @@ class Replica:
         return UpdateEffect.NEWS
 
     def released(self) -> list[bytes]:
-        """Updates that waited and do not any more, since this was asked last."""
+        """Return the updates that waited and were applied since the last call."""
         released, self._released = self._released, []
         return released
 
     def freed_by(self, read: UpdateOutline) -> list[bytes]:
-        """Return the waiting updates that could be applied after this one."""
+        """Return the waiting updates that become ready once this update is applied."""
         known = dict(self._known)
         freed: dict[bytes, None] = {}
         news = [read] if read.ready(known) else []
@@ -320,7 +325,7 @@ class Replica:
 
     @property
     def waits(self) -> bool:
-        """Tell whether any update waits for an earlier one."""
+        """Return whether any update waits for an earlier one."""
         return bool(self._waiting)
 
     @property
@@ -329,16 +334,17 @@ class Replica:
         return sum(map(len, self._waiting))
 
     def held_back(self) -> list[tuple[bytes, str]]:
-        """Updates that wait for earlier ones, and who wrote them, in the order in which they came."""
+        """Return the waiting updates with their authors, in the order of arrival."""
         return [(update, author) for update, (_, author) in self._waiting.items()]
 
     @property
     def waiting(self) -> tuple[bytes, ...]:
-        """Updates that wait for earlier ones."""
+        """Return the updates that wait for earlier ones."""
         return tuple(self._waiting)
 
     def _applied(self, update: bytes, read: UpdateOutline, *, is_applied: bool = False) -> bool:
-        """Apply what is ready, unless its pieces were; whether it changed anything."""
+        """Apply a ready update, unless its pieces were applied already; return whether the document
+        changed."""
         known = self._known
         self._state = None
         depths = self.nesting.depths(read.placed, known)
@@ -357,8 +363,8 @@ class Replica:
         return changed
 
     def _deletes(self, update: bytes) -> bool:
-        """Apply what brings no clocks that are not known; whether it changed anything all the same. Only
-        the document can tell; it is not watched all the time, since that costs as much as applying."""
+        """Apply an update without new structs; return whether its deletions changed the document.
+        The document is observed only here, since observing costs as much as applying."""
         changed = False
 
         def observed(event: Any) -> None:
@@ -379,7 +385,7 @@ class Replica:
             self._known[client] = max(end, self._known.get(client, 0))
 
     def _release(self) -> bool:
-        """Apply what has become ready; whether there was any."""
+        """Apply the waiting updates that are ready now; return whether there were any."""
         ready = [each for each, (read, _) in self._waiting.items() if read.ready(self._known)]
         for update in ready:
             read, _ = self._waiting.pop(update)
@@ -413,11 +419,11 @@ class Replica:
 
 
 class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
-    """The content of a snapshot: the document, the updates that wait beside it with their authors, and the
+    """The content of a snapshot: the document, the waiting updates with their authors, and the
     owners of clients.
 
-    `form` was the number 1 before waiting updates were kept, so that an old program does not take a newer
-    snapshot for one of its own.
+    `form` was the number 1 before waiting updates were stored, so that an old program refuses a
+    newer snapshot.
     """
 
     form: Literal["with what waits"] | int
@@ -439,7 +445,7 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @classmethod
     def replica(cls, kept: bytes) -> Replica | None:
-        """The document again; None when these bytes are none of ours."""
+        """Return the replica of a snapshot; None if the bytes are no snapshot."""
         found = cls.read(kept)
         if found is None:
             return None
@@ -457,13 +463,14 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @classmethod
     def state_of(cls, kept: bytes) -> bytes:
-        """The document alone, as one update; nothing new for what is no snapshot."""
+        """Return the document of a snapshot as one update; an empty update if the bytes are no
+        snapshot."""
         found = cls.read(kept)
         return NOTHING_NEW if found is None else found.state
 
     @classmethod
     def read(cls, kept: bytes) -> "ReplicaState | None":
-        """Decode a snapshot; None when these bytes are none of ours."""
+        """Decode a snapshot; return None if the bytes are no snapshot."""
         try:
             return msgspec.msgpack.decode(kept, type=cls)
         except (msgspec.DecodeError, UnicodeDecodeError):

@@ -30,12 +30,12 @@ _ENDS: Final = (_KIND + b"\x00", b"\x80\x00")
 
 
 class Uncertain(Exception):
-    """Only reading these updates as a whole tells what they did."""
+    """The quick reading of these updates is not enough; they have to be read completely."""
 
 
 class Clients:
-    """The clients of some updates: `authors`, who used each first; `ends`, how many clocks each has
-    after them."""
+    """The client ids of some updates. `authors`: the first author of each; `ends`: its next clock
+    after the updates."""
 
     def __init__(self, bodies: Sequence[bytes], authors: Sequence[str]) -> None:
         """Read the client ids of updates and their authors. Raise Malformed if an update cannot be
@@ -73,7 +73,7 @@ def lies_deep(bodies: Sequence[bytes]) -> bool:
 
 
 def _doubtful(bodies: Sequence[bytes]) -> list[int]:
-    """Places of those in which the pattern may be found."""
+    """Return the indices of the updates in which the pattern of a nested struct may occur."""
     text = _APART.join([body[:-1] for body in bodies]).translate(_KINDS)
     found: set[int] = set()
     starts: list[int] = []
@@ -88,13 +88,13 @@ def _doubtful(bodies: Sequence[bytes]) -> list[int]:
 
 
 def _starts(bodies: Sequence[bytes]) -> list[int]:
-    """Return the offset of each body in the joined text, and the end of it. An empty body counts one byte, its
-    separator."""
+    """Return the offset of each body in the joined text, and the length of that text. An empty body
+    counts one byte, its separator."""
     return list(itertools.accumulate((len(body) or 1 for body in bodies), initial=0))
 
 
 def check_nothing_is_missing(known: Mapping[int, int], ends: Mapping[int, int]) -> None:
-    """Raise Uncertain where a document lacks something that updates built on. `known`: how many clocks it
-    has of each client, `ends`: how many it should have."""
+    """Raise Uncertain if a document lacks structs of its updates. `known`: the next clock of each
+    client in the document; `ends`: the expected one."""
     if any(known.get(client, 0) < end for client, end in ends.items()):
         raise Uncertain

@@ -32,12 +32,13 @@ class TriedOutline(UpdateOutline, frozen=True):
 
 
 class TooSlow(Exception):
-    """An update that holds everybody up"""
+    """Applying this update would block the server for too long."""
 
 
 def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> TriedOutline:
-    """The outline of an update that may be applied to a document of this state, and after it the
-    updates that waited for it. For workers: one that takes far too long ends the process. Raises Malformed, Panicked, TooSlow."""
+    """Apply an update, and then the updates that waited for it, to a copy of the document `state`;
+    return its outline and the time to open the document. Run it in a worker, which ends if it
+    takes far too long. Raise Malformed, Panicked or TooSlow if the update must be refused."""
     read = outline(update)
     placed = read.placed if any(each.inside for each in read.placed) else ()
     if len(placed) > _INSIDE:
@@ -78,7 +79,8 @@ def adds_nothing(state: bytes, update: bytes) -> bool:
 
 @contextlib.contextmanager
 def _ended_after(seconds: float) -> Iterator[None]:
-    """A worker ends when it has worked for so long: the library cannot be interrupted."""
+    """Let this worker process end after so many seconds of processor time, since the library cannot
+    be interrupted."""
     if multiprocessing.parent_process() is None:
         yield
         return

@@ -31,8 +31,9 @@ _MOST: Final = 1000  # values of one field
 
 
 class FieldValue(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The value that somebody gave a field by the change `seq`, and the one before. None is no value.
-    `merged`: how it came from a draft, where that person gave it the value; `seq` is then the merge."""
+    """The value that a person gave a field by the change `seq`, and the value before; None is no
+    value. `merged`: how the value came from a draft, where that person set it; `seq` is then the
+    change of the merge."""
 
     value: Any
     before: Any
@@ -43,8 +44,8 @@ class FieldValue(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class FieldBlame(FieldValue, frozen=True, kw_only=True, omit_defaults=True):
-    """The author of one field, named as in the keys of the document (docs/contracts.md 1): `in/speed`,
-    `on_true`, "" for the name of an action; and `position`."""
+    """The author of one field. Fields are named as in the keys of the document (docs/contracts.md
+    1): `in/speed`, `on_true`, "" for the name of an action; also `position`."""
 
     field: str
 
@@ -61,7 +62,7 @@ class DocumentStep(msgspec.Struct, frozen=True):
 
 
 class Blame:
-    """Asks the index who did what; the answers are JSON that a worker wrote."""
+    """Answers who changed what, from the index; answers are JSON that a worker wrote."""
 
     def __init__(self, index: ChangeIndex) -> None:
         self._index = index
@@ -103,7 +104,7 @@ def fields_of(connection: Connection, graph: str, owner: str, at: int) -> list[F
 def values_of(
     connection: Connection, graph: str, owner: str, field: str, at: int
 ) -> list[FieldValue]:
-    """All values of a field up to a change."""
+    """Return all values of a field up to the change `at`, newest first."""
     changes: list[LoggedChange] = []
     for root, key in keys_of(owner, field):
         changes += index_queries.of_key(connection, graph, root, key, at)
@@ -114,7 +115,7 @@ def values_of(
 def steps(
     connection: Connection, graph: str, after: int, upto: int, limit: int
 ) -> list[DocumentStep]:
-    """Changes of keys, in order of time."""
+    """Return the newest `limit` changes of keys with `after < seq <= upto`, oldest first."""
     return [
         DocumentStep(c.seq, c.author, c.root, c.key, unpacked(c.before), unpacked(c.after))
         for c in index_queries.between(connection, graph, after, upto, limit)
@@ -140,7 +141,7 @@ def _values(
 
 
 def keys_of(owner: str, field: str) -> Sequence[tuple[Root, str]]:
-    """The keys that may hold a field of an owner."""
+    """Return the keys that may hold a field of an owner."""
     if owner == "":
         return [("meta", field)]
     if field == "position":
@@ -152,8 +153,8 @@ def keys_of(owner: str, field: str) -> Sequence[tuple[Root, str]]:
 
 
 def in_one_go(changes: Iterable[LoggedChange], alone: Set[int] = frozenset()) -> list[LoggedChange]:
-    """Changes of one key, those that one person made in a row as one, but for some that stand alone. One
-    that was taken back in the same go is none."""
+    """Combine consecutive changes of one key by one person, unless a change is in `alone`. A change
+    that was undone soon is dropped."""
     found: list[LoggedChange] = []
     for change in changes:
         last = found[-1] if found else None

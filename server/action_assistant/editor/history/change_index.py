@@ -64,15 +64,16 @@ class ChangeIndex:
             return done
 
     async def head(self, graph: str) -> int:
-        """Return the last change of a graph that is in the index, 0 where there is none."""
+        """Return the last change of a graph that is in the index; 0 if it has none."""
         rows = await self._journal.query(select(_head.seq).where(_head.graph == graph))
         return rows[0].seq if rows else 0
 
     async def value(
         self, question: Callable[Concatenate[Connection, P], T], *args: P.args, **kw: P.kwargs
     ) -> T:
-        """Return what a question finds in the database, as of one moment, asked in a worker. It is to be
-        small: the loop reads it. Raises what the question raises, Unavailable, TooMany."""
+        """Answer a question from one consistent snapshot of the database, in a worker. The answer
+        must be small, since the event loop decodes it. Raise the question's errors; Unavailable
+        or TooMany if no worker can answer."""
         bound: Callable[..., T] = partial(question, **kw) if kw else question
         if self._run_in_worker is run_here:
             return await self._journal.ask(lambda connection: bound(connection, *args))
@@ -81,13 +82,13 @@ class ChangeIndex:
     async def text(
         self, question: Callable[Concatenate[Connection, P], Any], *args: P.args, **kw: P.kwargs
     ) -> bytes:
-        """Return what a question finds as JSON that the worker wrote. Raises as `value`."""
+        """Answer a question as JSON, which the worker encodes. Raises as `value` does."""
         return await self.value(_as_json, partial(question, **kw) if kw else question, args)
 
     @asynccontextmanager
     async def kept_up(self) -> AsyncIterator[None]:
-        """While you are inside, graphs that change are looked at now and then, so that who asks for
-        a history seldom waits."""
+        """Keep the index up to date in the background, inside of the `async with`, so that a
+        request for a history rarely waits."""
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._keep_up)
             yield
@@ -113,7 +114,8 @@ class ChangeIndex:
             await anyio.sleep(_PERIOD)
 
     async def _behind(self) -> dict[str, tuple[int, int]]:
-        """Graphs whose newest events are not in the index: which the newest is, and how many there are."""
+        """Return the graphs whose newest events are not in the index: the newest seq, and the
+        number of missing events."""
         stream, newest = editor_head.c.stream, editor_head.c.seq
         indexed = func.coalesce(_head.seq, 0)
         same = stream == graph_stream("") + _head.graph
@@ -129,8 +131,8 @@ class ChangeIndex:
         return {graph: numbers for graph, numbers in found.items() if graph is not None}
 
     async def _keep(self, graph: str, found: IndexGrowth) -> None:
-        """Store rows slice by slice, so that others' commits come between, and the head last: rows after the
-        head count as not there."""
+        """Store the new rows in slices, so that other commits come in between, and the head last.
+        Rows after the head do not count."""
         if found.leftovers:
             await self._delete_after(graph, found.after)
         for each in found.slices:
@@ -144,7 +146,7 @@ class ChangeIndex:
         await self._journal.derive(keep)
 
     async def _forget(self, graph: str) -> None:
-        """Start anew. Without a head no row counts, so they are deleted after it."""
+        """Drop the index of a graph: first its head, without which no row counts, then the rows."""
         await self._journal.derive(partial(_drop_head, graph=graph))
         await self._delete_after(graph, 0)
 

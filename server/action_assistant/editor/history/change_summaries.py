@@ -34,8 +34,8 @@ _ENDS: Final = {ENTRY, EXIT}
 
 
 class Changes(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The changes of somebody as a difference, with at most 30 things of each kind, and the number of others.
-    `comments`: the number of threads with new comments."""
+    """The changes of one person as a difference, with at most 30 items of each kind; `more`: the
+    number of others. `comments`: the number of threads with new comments."""
 
     fields: tuple[Field, ...] = ()
     actions: tuple[ActionChange, ...] = ()
@@ -46,7 +46,7 @@ class Changes(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Stretch(msgspec.Struct, frozen=True, array_like=True):
-    """The changes of one person from `first` to `last`, which are to be told."""
+    """The changes from `first` to `last`, of which those by `author` are summarised."""
 
     author: str
     first: int
@@ -56,8 +56,8 @@ class Stretch(msgspec.Struct, frozen=True, array_like=True):
 def told(
     base: Sequence[LoggedChange], changes: Sequence[LoggedChange], stretches: Sequence[Stretch]
 ) -> list[Changes]:
-    """Return the changes of each stretch. `changes` are in order of time; `base` holds the values before them
-    of the keys that they touch."""
+    """Return the changes of each stretch. `changes`: in order of time; `base`: the values of the
+    touched keys before them."""
     state = state_of(base)
     own: list[dict[Place, tuple[Packed, Packed]]] = [{} for _ in stretches]
     found = [Changes() for _ in stretches]
@@ -77,12 +77,12 @@ def told(
 
 
 def state_of(changes: Iterable[LoggedChange]) -> State:
-    """The values that changes in order of time leave."""
+    """Return the values of all keys after these changes, which are in order of time."""
     return {change.place: change.after for change in changes}
 
 
 def maps_of(state: Mapping[Place, Packed]) -> Maps:
-    """Values as the maps of a document."""
+    """Return values as the root maps of a document."""
     maps: Maps = {root: {} for root in ROOTS}
     for (root, key), value in state.items():
         if value is not None:
@@ -91,7 +91,8 @@ def maps_of(state: Mapping[Place, Packed]) -> Maps:
 
 
 def document(changes: Sequence[LoggedChange]) -> bytes:
-    """The maps of a document that changes left, as JSON; bytes, which no client of ours writes, left out."""
+    """Return the root maps after these changes as JSON; values that are bytes, which our page never
+    writes, are left out."""
     maps = maps_of(state_of(changes))
     plain = {
         root: {key: value for key, value in fields.items() if not isinstance(value, bytes)}
@@ -101,7 +102,7 @@ def document(changes: Sequence[LoggedChange]) -> bytes:
 
 
 def graph_of(state: Mapping[Place, Packed]) -> Graph:
-    """The graph that these values show."""
+    """Return the graph that these values describe."""
     return read_maps(maps_of(state))
 
 
@@ -111,7 +112,7 @@ def document_at(connection: Connection, graph: str, seq: int) -> bytes:
 
 
 def differing(connection: Connection, graph: str, then: int, now: int) -> Difference:
-    """Return what differs between two moments."""
+    """Return the difference between a graph after the changes `then` and `now`."""
     was, is_now = (
         graph_of(state_of(index_queries.at(connection, graph, seq))) for seq in (then, now)
     )
@@ -121,8 +122,8 @@ def differing(connection: Connection, graph: str, then: int, now: int) -> Differ
 def names_between(
     connection: Connection, graph: str, after: int, upto: int, limit: int
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the name of a graph after the change `upto`, and all names of its actions since the change
-    `after`. Raises TooLarge where there are more changes between than `limit`."""
+    """Return the name of a graph after the change `upto`, and all names of its actions since the
+    change `after`. Raise TooLarge if there are more than `limit` changes in between."""
     return names(stretch_of(connection, graph, after, upto, limit, whole=True))
 
 
@@ -138,7 +139,8 @@ def stretch_of(
 
 
 def names(changes: Iterable[LoggedChange]) -> tuple[str, tuple[str, ...]]:
-    """The name of a graph that changes in order of time leave, and all names that they give actions."""
+    """Return the last name of a graph, and all names that its actions had, from changes in order of
+    time."""
     own, uses = "", set[str]()
     for change in changes:
         is_name = change.place == ("meta", "name")
@@ -160,7 +162,7 @@ def _is_name_of_action(change: LoggedChange) -> bool:
 
 
 class _Current:
-    """Finds the stretch of a change. The stretches of one person do not overlap."""
+    """Finds the stretch to which a change belongs. The stretches of one person do not overlap."""
 
     def __init__(self, stretches: Sequence[Stretch]) -> None:
         self._of: dict[str, list[tuple[int, Stretch]]] = {}
@@ -175,7 +177,8 @@ class _Current:
 
 
 def _told(own: Mapping[Place, tuple[Packed, Packed]], state: State) -> Changes:
-    """The difference that one person made of what they touched, whatever others did to it since."""
+    """Return the difference that one person made to the things they touched, without later changes
+    by others."""
     owners = {owner_of(*place) for place in own}
     names = {("actions", key) for owner in owners for key in _ends(owner)}
     around = {p: value for p, value in state.items() if owner_of(*p) in owners or p in names}
@@ -186,14 +189,14 @@ def _told(own: Mapping[Place, tuple[Packed, Packed]], state: State) -> Changes:
 
 
 def _ends(owner: str) -> set[str]:
-    """The actions between which an arrow is."""
+    """Return the actions at the ends of an arrow; an empty set for other owners."""
     ends = ends_of(owner)
     return set() if ends is None else {ends.parent, ends.child} - _ENDS
 
 
 def shortened(found: Difference, owners: Set[str]) -> Changes:
-    """At most some of each kind, and nothing that merely follows, as another number follows from a name
-    that somebody else took."""
+    """Return at most 30 items of each kind, without changes that only follow from others, such as a
+    new number after a name was taken."""
     actions = tuple(change for change in found.actions if change.aid in owners)
     comments = sum(owner.startswith("c/") for owner in owners)
     kinds: tuple[tuple[Any, ...], ...] = (actions, found.relations, found.notes)
@@ -208,7 +211,7 @@ def shortened(found: Difference, owners: Set[str]) -> Changes:
 
 
 def _most(actions: Sequence[ActionChange]) -> tuple[ActionChange, ...]:
-    """Return at most 30 changes of actions; those that only move a card come last."""
+    """Return at most 30 changes of actions; changes of the position only come last."""
 
     def moved_only(change: ActionChange) -> bool:
         return change.change == "changed" and all(f.field == "position" for f in change.fields)

@@ -239,9 +239,9 @@ _MOST: Final = 200_000  # changes of keys between two moments
 
 
 class AskingSince(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Between which moments to look: after the change `good`, and after `bad` (left out: now). What the
-    actions do, as in a script of `simulate`, is the same at every moment; it names actions as they were
-    called at `named_at` (left out: at `bad`)."""
+    """The request: search between the change `good` and the change `bad` (missing: the newest).
+    `script`: what the actions do, as in a script of `simulate`, the same for every change.
+    `named_at`: the change after which actions had the names in `script` (missing: `bad`)."""
 
     good: int
     script: Annotated[Any, SCRIPT]
@@ -250,9 +250,10 @@ class AskingSince(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CourseChange(msgspec.Struct, frozen=True):
-    """From the change `seq` on the course is another one (`parts`), or the first one again. `place`,
-    `before`, `after`: the first step, from 1, in which the courses before and after this change differ,
-    and what is done in it, in words. `changes` is what the change did to the graph."""
+    """From the change `seq` on the course differs from the first one (`parts`), or equals it again.
+    `place`, `before`, `after`: the first step, from 1, in which the courses before and after
+    this change differ, and that step in each, in words. `changes`: the effect of the change on
+    the graph."""
 
     seq: int
     author: PersonRef
@@ -265,10 +266,10 @@ class CourseChange(msgspec.Struct, frozen=True):
 
 
 class SinceWhen(msgspec.Struct, frozen=True):
-    """The changes between `good` and `bad` after which the course of a graph differs, in order of time. `same`:
-    whether the course at `bad` is that at `good`. `exact`: whether there are no others; otherwise only some
-    moments were simulated, and the course may have changed and changed back between them. `looked`: the number
-    of simulated moments."""
+    """The changes between `good` and `bad` after which the course of a graph differs, in order of
+    time. `same`: the course at `bad` equals that at `good`. `exact`: there are certainly no
+    others; otherwise only some changes were simulated, and the course may have changed and
+    changed back between them. `looked`: the number of simulations."""
 
     good: int
     bad: int

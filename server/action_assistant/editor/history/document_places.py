@@ -55,7 +55,7 @@ def is_place_of_card(place: Place) -> bool:
 
 
 def by_owner(places: Iterable[Place]) -> dict[str, list[Place]]:
-    """Places by what they speak of."""
+    """Group keys of a document by the action, arrow or note that they describe."""
     found: dict[str, list[Place]] = defaultdict(list)
     for place in places:
         found[owner_of(*place)].append(place)
@@ -63,7 +63,7 @@ def by_owner(places: Iterable[Place]) -> dict[str, list[Place]]:
 
 
 def arrows_of(owners: Iterable[str]) -> dict[str, set[str]]:
-    """The arrows of each action."""
+    """Return the arrows of each action."""
     found: dict[str, set[str]] = defaultdict(set)
     for owner in owners:
         for end in (ends_of(owner) or ())[:2]:
@@ -72,5 +72,5 @@ def arrows_of(owners: Iterable[str]) -> dict[str, set[str]]:
 
 
 def exist(places: Mapping[Place, Any]) -> set[str]:
-    """The actions, arrows and notes that there are."""
+    """Return the actions, arrows and notes that exist in these values."""
     return {owner_of(*place) for place in places if proves(place)}

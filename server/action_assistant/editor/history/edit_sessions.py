@@ -24,8 +24,8 @@ Kind: TypeAlias = Literal[
 
 
 class Step(NamedTuple):
-    """An event as it is grouped. `seq`: the change of the document, None for what is none. `told`: which
-    event about the graph it is, for who tells more of it."""
+    """An event to be grouped. `seq`: the change of the document; None if it is none. `told`: for an
+    event about the graph, its seq in that other stream; 0 for a change."""
 
     kind: Kind
     author: str
@@ -35,8 +35,9 @@ class Step(NamedTuple):
 
 
 class EditSession(msgspec.Struct, frozen=True):
-    """The edits of one person between `at` and `until`, from the change `from_seq` to `seq`; others may have
-    edited meanwhile. For an entry that is no edit, `from_seq` is None and `seq` the change before it."""
+    """The edits of one person between `at` and `until`, from the change `from_seq` to `seq`; others
+    may have edited in between. For an entry that is no edit, `from_seq` is None and `seq` is the
+    change before it."""
 
     kind: Kind
     author: str
@@ -48,8 +49,8 @@ class EditSession(msgspec.Struct, frozen=True):
 
 
 def edit_sessions(steps: Iterable[Step]) -> list[EditSession]:
-    """Group steps, which are in order of time, into sessions, which are in the order of their ends. A step that
-    is no edit ends the sessions of everybody, since it may be about the document at that moment."""
+    """Group steps, given in order of time, into sessions, sorted by their ends. A step that is no
+    edit ends all open sessions, since it may refer to the document at that time."""
     done: dict[int, EditSession] = {}
     open_of: dict[str, int] = {}
     seq = 1

@@ -68,11 +68,11 @@ _Special: TypeAlias = int | TakenFrom | Reverted | MergedIn
 class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """One entry of the history of a graph, from `at` to `until`.
 
-    `seq` is the change of the document that `…/umrf?at=` and `…/restore` take to show the graph after this
-    entry; edits begin at `from_seq`, and others may have edited between the two. `restored`: the change that
-    was restored; `adapted`: the change of the action whose parameters were taken over; `reverted`: the edits
-    that were reverted; `merged`: the edits that were merged. `changes`: what this person changed; None where
-    there is nothing, or too much to list here.
+    `seq`: the change after which `…/umrf?at=` and `…/restore` show the graph after this entry.
+    Edits begin at `from_seq`, and others may have edited in between. `restored`: the change that
+    was restored; `adapted`: the change of the action whose parameters were taken over; `reverted`:
+    the edits that were reverted; `merged`: the edits that were merged. `changes`: what this person
+    changed; None if there is nothing or too much to list.
     """
 
     kind: Kind
@@ -120,7 +120,8 @@ def history_of(
 
 
 def last_edit_of(connection: Connection, graph: str, limit: int, before: int | None) -> int:
-    """The last change that a history tells of, up to which it needs the index; 0 where there is none."""
+    """Return the last change that this page of the history shows, up to which it needs the index; 0
+    if it shows none."""
     special = _special(connection, graph, stored_people(connection))
     edits = _edits(_shown(connection, graph, special, limit, before))
     return max((each.last for each in edits), default=0)
@@ -137,7 +138,7 @@ def _shown(
 
 
 def _edits(shown: Sequence[EditSession]) -> list[Stretch]:
-    """Return the stretches of those sessions that changed the document."""
+    """Return the sessions that changed the document as stretches of changes."""
     return [
         Stretch(session.author, session.from_seq, session.seq)
         for session in shown
@@ -152,7 +153,8 @@ def _edit_sessions(
     limit: int,
     before: int | None,
 ) -> list[EditSession]:
-    """More than `limit`, or all that the last events make: the first of them may be a part of one."""
+    """Return more than `limit` sessions, or all that the last events make up. The first one may be
+    incomplete."""
     for most in _EVENTS:
         rows = _rows(connection, graph, before, most)
         found = edit_sessions(step for row in reversed(rows) if (step := _step(row, special)))
@@ -225,8 +227,8 @@ def _rows(connection: Connection, graph: str, before: int | None, most: int) -> 
 def _special(
     connection: Connection, graph: str, person: Callable[[str], PersonRef]
 ) -> dict[int, _Special]:
-    """Changes that went back to others, took over parameters, took something back or merged. Merges that
-    changed nothing are under 0, which is no change."""
+    """Return the changes that were a restore, an adaption, a revert or a merge, by seq. A merge
+    that changed nothing has the key 0."""
     event = editor_tables.editor_event.c
     kinds = [h.RESTORED, h.ADAPTED, h.REVERTED, h.MERGED]
     chosen = select(event.kind, event.body).where(
@@ -257,7 +259,7 @@ def _merged(merged: h.GraphMerged, person: Callable[[str], PersonRef]) -> Merged
 
 
 def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
-    """The event as it is grouped; None for those that nobody is told."""
+    """Return an event as a step to be grouped; None if the history does not show it."""
     at = h.when(row.at)
     if row.kind in {h.UPDATED, h.DEFERRED}:
         if row.seq == 1:
@@ -280,7 +282,7 @@ def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
 
 
 def _touched(rows: Sequence[LoggedChange]) -> set[str]:
-    """Return the owners of the changed keys, with the actions at the ends of arrows among them."""
+    """Return the owners of the changed keys, and the actions at both ends of changed arrows."""
     owners = {owner_of(row.root, row.key) for row in rows}
     ends = {end for owner in owners if (found := ends_of(owner)) for end in found[:2]}
     return owners | ends

@@ -28,10 +28,11 @@ COLUMNS: Final = ("graph", "owner", *LoggedChange._fields)
 
 
 class IndexGrowth(msgspec.Struct, frozen=True):
-    """The rows that the index lacks, as slices of MessagePack, and the head that follows them.
+    """The rows that the index lacks, as slices of MessagePack, and the next head: `seq` and
+    `document`.
 
-    `after`: the head before. `leftovers`: whether rows after it are stored from an attempt that did not finish.
-    `unreadable`: whether the document of the head is of another version, so that the index is made anew.
+    `after`: the present head. `leftovers`: rows after it exist from an interrupted attempt.
+    `unreadable`: the document of the head is of another version, so the index must be built again.
     """
 
     after: int
@@ -44,7 +45,7 @@ class IndexGrowth(msgspec.Struct, frozen=True):
 
 
 def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth | None:
-    """Return what the next events of a graph add to its index; None where there are no more."""
+    """Return what the next events of a graph add to its index; None if there are no more events."""
     seq, kept = _head(connection, graph)
     document = _unpacked(kept)
     more = select(literal(1)).where(_c.graph == graph, _c.seq > seq).limit(1)
@@ -66,7 +67,8 @@ def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth |
 def between(
     connection: Connection, graph: str, after: int, upto: int, limit: int, by: str | None = None
 ) -> list[LoggedChange]:
-    """Return the newest changes with `after < seq <= upto`, in order of time; `by` one person."""
+    """Return the newest `limit` changes with `after < seq <= upto`, oldest first; with `by` only
+    those of this person."""
     chosen = _CHANGE.where(_c.graph == graph, _c.seq > after, _c.seq <= upto)
     if by is not None:
         chosen = chosen.where(_c.author == by)
@@ -95,7 +97,7 @@ def latest(connection: Connection, graph: str, seq: int, of: Collection[str]) ->
 
 
 def latest_since(connection: Connection, graph: str, seq: int) -> dict[Place, int]:
-    """Return the last change of each key that the change `seq` or a later one changed."""
+    """Return the last change of each key that was changed at or after the change `seq`."""
     head, _ = _head(connection, graph)
     newest = select(_c.root, _c.key, func.max(_c.seq).label("seq"))
     chosen = newest.where(_c.graph == graph, _c.seq >= seq, _c.seq <= head)
@@ -106,14 +108,14 @@ def latest_since(connection: Connection, graph: str, seq: int) -> dict[Place, in
 def of_key(
     connection: Connection, graph: str, root: Root, key: str, upto: int
 ) -> list[LoggedChange]:
-    """Return all changes of one key, in order of time."""
+    """Return all changes of one key up to `upto`, oldest first."""
     same = (_c.graph == graph, _c.root == root, _c.key == key, _c.seq <= upto)
     return _changes(connection, _CHANGE.where(*same).order_by(_c.seq))
 
 
 def _packed(document: bytes) -> bytes:
-    """The document as the head keeps it: the writer holds others for as long as it stores that, and a large one
-    shrinks to a tenth."""
+    """Return the document as the head stores it. A large one is compressed to about a tenth, since
+    storing it blocks the writer."""
     return document if len(document) < _LARGE else zlib.compress(document, level=1)
 
 
@@ -159,7 +161,7 @@ def _changes(connection: Connection, chosen: Select[Any]) -> list[LoggedChange]:
 
 
 def _last(graph: str, seq: int, *also: ColumnElement[bool]) -> Select[Any]:
-    """The last change of each key up to a change."""
+    """Return the query for the last change of each key up to `seq`."""
     newest = (
         select(_c.root, _c.key, func.max(_c.seq).label("seq"))
         .where(_c.graph == graph, _c.seq <= seq, *also)

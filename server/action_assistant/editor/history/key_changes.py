@@ -40,10 +40,8 @@ class LoggedChange(NamedTuple):
 
 
 class ObservedEvents(msgspec.Struct, frozen=True):
-    """The changes of keys by some events, and the document after them, as the bytes of a snapshot, at `seq`.
-
-    `damaged`: whether the event after `seq` cannot be applied.
-    """
+    """The changes of keys by some events, and the snapshot of the document after the event `seq`.
+    `damaged`: the next event cannot be applied."""
 
     document: bytes
     seq: int
@@ -89,12 +87,12 @@ def owner_of(root: Root, key: str) -> str:
 
 
 def unpacked(value: Packed) -> Any:
-    """The plain value; None where there is none."""
+    """Decode a stored value; None stands for no value."""
     return None if value is None else msgspec.msgpack.decode(value)
 
 
 class _Observer:
-    """Hears what each root map says of its changes, until somebody asks."""
+    """Collects the changes of each root map until they are read."""
 
     def __init__(self, replica: Replica) -> None:
         self._heard: dict[Place, tuple[object, object]] = {}
@@ -104,7 +102,7 @@ class _Observer:
         }
 
     def changes(self, event: Event) -> list[LoggedChange]:
-        """Return the changes observed since the last call; `event` made them."""
+        """Return the changes since the last call, which `event` made."""
         heard, self._heard = self._heard, {}
         return [
             LoggedChange(event.seq, event.author, event.at, *place, _packed(before), _packed(after))
@@ -129,7 +127,7 @@ def _map(replica: Replica, root: Root) -> "Map[Any]":
 
 
 def _plain(value: object) -> object:
-    """Nested shared types, which no client of ours writes, count as nothing."""
+    """Return a plain value; None for nested shared types, which our page never writes."""
     return value if isinstance(value, PLAIN) else None
 
 

@@ -20,8 +20,8 @@ from action_assistant.web.auth.keys import PersonRef
 
 
 class MergeOrigin(msgspec.Struct, frozen=True):
-    """A record that the change `seq` of a graph merged what `source` was after its change `upto`. `name`: the
-    name of the draft; None where the graph itself was made as a draft."""
+    """The origin of the change `seq` of a graph: a merge of the graph `source` up to its change
+    `upto`. `name`: the name of the draft; None if the graph was made as a draft of `source`."""
 
     seq: int
     source: str
@@ -30,8 +30,8 @@ class MergeOrigin(msgspec.Struct, frozen=True):
 
 
 class Original(msgspec.Struct, frozen=True):
-    """A change in the log in which somebody made it. `via`: the merge by which it entered the graph that
-    was asked about, and the number that it has in the log that was merged."""
+    """A change where it was first made. `via`: the merge that brought it into the given graph, None
+    if it was made there; `seq`: its number in the log of the merged graph."""
 
     change: LoggedChange
     via: MergeOrigin | None = None
@@ -39,8 +39,8 @@ class Original(msgspec.Struct, frozen=True):
 
 
 class MergedBy(msgspec.Struct, frozen=True):
-    """The origin of a value that was merged: the graph and its change there, the person who merged it and when,
-    and the name of the draft."""
+    """The origin of a merged value: the graph and its change there, who merged it and when, and the
+    name of the draft."""
 
     graph: str
     seq: int
@@ -66,12 +66,13 @@ async def bring_up(index: ChangeIndex, graph: str, seq: int | None = None) -> in
 
 
 def sources(connection: Connection, graph: str) -> list[tuple[str, int]]:
-    """Return the graphs from which something came, each with its change that was the last then."""
+    """Return the graphs from which changes were merged or drafted, each with its last change at
+    that time."""
     return sorted({(graft.source, graft.upto) for graft in grafts_of(connection, graph).values()})
 
 
 def grafts_of(connection: Connection, graph: str) -> dict[int, MergeOrigin]:
-    """Return what came into a graph, by the change with which it came."""
+    """Return the merges into a graph, by the change that each made."""
     event = editor_event.c
     rows = connection.execute(
         select(event.kind, event.body).where(
@@ -93,8 +94,8 @@ def grafts_of(connection: Connection, graph: str) -> dict[int, MergeOrigin]:
 def originals(
     connection: Connection, graph: str, changes: Sequence[LoggedChange]
 ) -> list[Original]:
-    """Return each change as somebody made it, wherever that was. The indexes of all sources are to reach
-    as far as `bring_up` brings them."""
+    """Return each change where it was first made, in this graph or a merged one. Call `bring_up`
+    first."""
     grafts = grafts_of(connection, graph)
     found = [Original(change) for change in changes]
     by_graft: dict[int, list[int]] = defaultdict(list)
@@ -115,7 +116,7 @@ def originals(
 def _there(
     connection: Connection, graft: MergeOrigin, changes: Iterable[LoggedChange]
 ) -> dict[Place, LoggedChange]:
-    """The changes that made the same of the same keys in the other graph, as it was then."""
+    """Return the changes that gave the same keys the same values in the merged graph."""
     wanted = {change.place: change.after for change in changes}
     owners = {owner_of(*place) for place in wanted}
     return {
@@ -128,8 +129,8 @@ def _there(
 def merged_by(
     change: LoggedChange, original: Original, person: Callable[[str], PersonRef]
 ) -> MergedBy | None:
-    """Return how a change of a graph came there; None of one that was made there, or that a draft began
-    with. `person`: who the author of an event is."""
+    """Return how a change came into the graph; None if it was made in the graph or the draft began
+    with it. `person`: returns the person of an author's id."""
     via = original.via
     if via is None or via.name is None:
         return None

@@ -181,7 +181,7 @@ _MOST: Final = 100_000  # changes of keys that are taken back at once
 
 
 class EditsOfOne(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to revert what one person, given by id, changed from the change `from_seq` to `seq`."""
+    """A request to revert the changes of one person (by id) from the change `from_seq` to `seq`."""
 
     author: str
     from_seq: int
@@ -189,15 +189,16 @@ class EditsOfOne(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GoneBack(msgspec.Struct, frozen=True):
-    """The result of going back. `seq`: the last change of the graph now. `left`: keys of actions, notes and
-    arrows that were not fully reverted, since others have changed them or built on them."""
+    """The result of a restore or revert. `seq`: the last change of the graph now. `left`: keys of
+    actions, notes and arrows that were not fully reverted, since others have changed or used
+    them."""
 
     seq: int
     left: tuple[str, ...] = ()
 
 
 class Restoring:
-    """Makes the edits, and says in the log what they are."""
+    """Makes restores and reverts, and records in the log what they are."""
 
     def __init__(
         self,
@@ -214,7 +215,8 @@ class Restoring:
         self._run_in_worker = run_in_worker
 
     async def restore(self, graph: str, author: str, seq: int) -> GoneBack:
-        """Make a graph what it was after its change `seq`. Raises NotFound, Conflict, Unavailable."""
+        """Restore a graph to its state after the change `seq`. Raise NotFound for an unknown graph,
+        Conflict for an unknown change, Unavailable if the journal cannot be read or written."""
         then = await self._graph_reader.at(graph, seq)
         async with self._rooms.enter(h.graph_stream(graph)) as room:
             before = room.seq
@@ -224,8 +226,9 @@ class Restoring:
         return await self._said(graph, author, before, seq, now)
 
     async def restore_one(self, graph: str, author: str, seq: int, owner: str) -> GoneBack:
-        """Make one action, arrow or note what it was after the change `seq`. Raises NotFound, Conflict,
-        Unavailable."""
+        """Restore one action, arrow or note to its state after the change `seq`. Raise NotFound if
+        it did not exist then, Conflict for an unknown change, Unavailable if the journal cannot
+        be read or written."""
         upto = await self._index.upto(graph)
         if not 1 <= seq <= upto:
             raise Conflict(
@@ -239,7 +242,9 @@ class Restoring:
         return await self._said(graph, author, before, seq, now)
 
     async def revert(self, graph: str, author: str, edits: EditsOfOne) -> GoneBack:
-        """Take back what somebody did. Raises BadInput, NotFound, TooLarge, Unavailable."""
+        """Revert the edits of one person. Raise BadInput for an impossible range, NotFound for an
+        unknown graph, TooLarge for too many changes, Unavailable if the journal cannot be read
+        or written."""
         first, last = edits.from_seq, edits.seq
         if not 2 <= first <= last:
             raise BadInput(

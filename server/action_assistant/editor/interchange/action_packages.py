@@ -40,7 +40,7 @@ class PackageRefusal(msgspec.Struct, frozen=True):
 
 
 class PackageList(msgspec.Struct, frozen=True):
-    """The packages of a graph after its change `seq`: one for each name of an action."""
+    """The packages of a graph after its change `seq`: one for each distinct name of an action."""
 
     seq: int
     packages: tuple[PackageOutline, ...]
@@ -101,7 +101,7 @@ def archive(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> b
 
 
 def _of(sight: GraphAtSeq, kind: DocumentKind) -> Graph:
-    """The graph; of a library's document one with its action alone."""
+    """Return the graph of a document; for an action of the library a graph with this action alone."""
     graph = read(sight).moment.graph
     if kind == "graph":
         return graph
@@ -110,8 +110,8 @@ def _of(sight: GraphAtSeq, kind: DocumentKind) -> Graph:
 
 
 def _actions(graph: Graph, kind: DocumentKind) -> tuple[Action, ...]:
-    """One action of each name. What the library gives as a value is the action's own; in graphs each
-    node gives its own."""
+    """Return one action of each name: in a graph without values, since each use gives its own; in
+    the library with them."""
     return distinct_actions(graph) if kind == "graph" else graph.actions
 
 

@@ -25,16 +25,16 @@ Side: TypeAlias = Literal["ours", "theirs"]
 
 
 def chosen(base: object, ours: object, theirs: object) -> Side | None:
-    """Return the side whose value wins; None where both sides changed it in different ways. UNSET stands for no
-    value."""
+    """Return the side whose value wins; None if both sides changed it in different ways. UNSET
+    stands for no value."""
     if is_same(ours, theirs) or is_same(theirs, base):
         return "ours"
     return "theirs" if is_same(ours, base) else None
 
 
 def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
-    """Call `edit` on a copy of the document with this encoded state, and return the changes that it
-    makes as one update."""
+    """Call `edit` on a copy of the document with this encoded state, and return its changes as one
+    update."""
     copy: Doc[Any] = Doc()
     if state:
         copy.apply_update(state)
@@ -49,13 +49,13 @@ def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
 
 
 def first(graph: Graph) -> bytes:
-    """The update that makes a document of a graph."""
+    """Return the update that makes the document of a graph."""
     return difference(b"", lambda doc: document.fill(doc, graph))
 
 
 def drafted(then: GraphAtSeq) -> tuple[bytes, GraphInfo]:
-    """The update that makes a document that holds what another one did, under the same keys, and what
-    lists say of it; without what people said."""
+    """Return the update that makes a document with the content and keys of another one, without
+    comments; and its description for lists."""
     maps = {**maps_of(then.state), "comments": {}}
     update = difference(b"", lambda doc: document.change(doc, maps))
     return update, info(then)
@@ -64,8 +64,8 @@ def drafted(then: GraphAtSeq) -> tuple[bytes, GraphInfo]:
 def renaming(
     state: bytes, name: str | None, description: str | None, kind: DocumentKind = "graph"
 ) -> bytes:
-    """The update that gives a graph, or the action of a library's document, another name or
-    description."""
+    """Return the update that gives a graph, or the action of a library document, another name or
+    description; None keeps the old one."""
 
     def renamed(old: Graph) -> Graph:
         action = first_action(old)
@@ -82,8 +82,8 @@ def renaming(
 
 
 def calling_actions(state: bytes, before: str, name: str) -> bytes:
-    """Return the update that gives every action called `before` this name, key by key. Numbers that
-    collide are told apart by the reader."""
+    """Return the update that renames every action called `before`, key by key. Equal numbers are
+    resolved when the document is read."""
 
     def edit(doc: Doc[Any]) -> None:
         actions = doc.get("actions", type=Map)
@@ -96,7 +96,7 @@ def calling_actions(state: bytes, before: str, name: str) -> bytes:
 
 
 def editing(state: bytes, edit: Callable[[Graph], Graph]) -> bytes:
-    """The update that makes what `edit` makes of the graph, and touches nothing else."""
+    """Return the update that changes the graph to the result of `edit`, and touches no other keys."""
 
     def edited(doc: Doc[Any]) -> None:
         maps = document.maps_of(doc)
@@ -107,7 +107,8 @@ def editing(state: bytes, edit: Callable[[Graph], Graph]) -> bytes:
 
 
 def setting(state: bytes, targets: Mapping[tuple[str, str], object]) -> bytes:
-    """The update that gives keys of root maps these values, and touches nothing else. UNSET: none."""
+    """Return the update that gives keys of root maps these values (UNSET: removes them), and
+    touches no other keys."""
 
     def edit(doc: Doc[Any]) -> None:
         maps = document.maps_of(doc)
@@ -122,7 +123,7 @@ def setting(state: bytes, targets: Mapping[tuple[str, str], object]) -> bytes:
 
 
 def restoring(state: bytes, then: bytes) -> bytes:
-    """The update that goes back to another document."""
+    """Return the update that gives a document the content of the document `then`; comments stay."""
 
     def edit(doc: Doc[Any]) -> None:
         comments = document.maps_of(doc)["comments"]
@@ -132,7 +133,7 @@ def restoring(state: bytes, then: bytes) -> bytes:
 
 
 def changed(maps: Maps, old: Graph, new: Graph) -> Maps:
-    """The maps with the difference between two graphs applied, and nothing else touched."""
+    """Return the maps with the difference between two graphs applied; all other keys stay."""
     before, after = document.flatten(old), document.flatten(new)
     result = {root: dict(fields) for root, fields in maps.items()}
     for root, fields in after.items():

@@ -40,7 +40,8 @@ _Wanted: TypeAlias = dict[tuple[str, str], object]
 
 
 class KeyChange(msgspec.Struct, frozen=True):
-    """One key of the document. A value that is left out: the key is not there."""
+    """The change of one key of the document. A missing `before` or `after` means that the key has
+    no value."""
 
     root: str
     key: str
@@ -49,8 +50,8 @@ class KeyChange(msgspec.Struct, frozen=True):
 
 
 class TextEdit(msgspec.Struct, frozen=True):
-    """The changes that an edited text makes to the graph after `seq`, and the errors that are new with it, with
-    their places in that text."""
+    """The changes that an edited text makes to the graph after the change `seq`, and the new
+    errors, with their places in the text."""
 
     seq: int
     changes: tuple[KeyChange, ...]
@@ -70,10 +71,10 @@ def text_edit(
     known: Iterable[Problem] = (),
     inside: Inside = NOTHING_INSIDE,
 ) -> TextEdit:
-    """Compare `text`, edited from the canonical text of `moment`, with its graph, and return the changes.
-    `known`: the problems that the graph has already, with these graphs `inside`.
+    """Compare `text`, edited from the canonical text of `moment`, with its graph, and return the
+    changes. `known`: the present problems of the graph, with these graphs `inside`.
 
-    Raises BadInput, NotUmrf, TooLarge with the place.
+    Raise BadInput, NotUmrf or TooLarge, with the place, for a text that cannot be read.
     """
     shown = codec.read(codec.write(moment.graph))
     wanted = importing.read(text)
@@ -87,7 +88,7 @@ def text_edit(
 
 
 def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
-    """Importing reads more than an edit may say: what it would leave out or assume is refused."""
+    """Raise NotUmrf for an edited text from which an import would drop or assume something."""
     if wanted.dialect != "D3":
         raise NotUmrf(
             f"This reads as an older form of UMRF ({wanted.dialect}). Import it as a graph of its "
@@ -100,7 +101,7 @@ def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
 
 
 def _worse(known: Iterable[Problem], new: Graph, inside: Inside) -> tuple[Problem, ...]:
-    """Errors that come with the edit."""
+    """Return the errors that are new in the edited graph."""
     old = {(problem.code, problem.message) for problem in known}
     found = check(new, graphs=graphs_of(inside), resolution=inside.resolution)
     errors = [problem for problem in found if problem.severity == "error"]
@@ -115,7 +116,8 @@ def _real(graph: Graph) -> list[Action]:
 
 
 def _keys_of(moment: Graph, shown: Graph) -> dict[Key, Key]:
-    """The aids of what was written and read again: the actions by place, ghosts by name."""
+    """Return the original key of each action that was written and read again: actions by index,
+    ghosts by name."""
     pairs = zip(_real(shown), _real(moment), strict=True)
     keys = {copy.key: action.key for copy, action in pairs}
     ghosts = {action.full_name: action.key for action in moment.actions if action.missing}
@@ -126,8 +128,8 @@ def _keys_of(moment: Graph, shown: Graph) -> dict[Key, Key]:
 
 
 def _aligned(old: Graph, wanted: Graph) -> dict[Key, Key]:
-    """The aids of the edited actions: those of the same full name, then, where one was renamed,
-    those that stand at the same place between the others; the rest are new."""
+    """Return the keys of the edited actions: the key of the action with the same full name, else of
+    the renamed action at the same position between its neighbours, else a new one."""
     free: dict[tuple[str, bool], list[Key]] = defaultdict(list)
     for action in old.actions:
         free[action.full_name, action.missing].append(action.key)
@@ -144,7 +146,8 @@ def _aligned(old: Graph, wanted: Graph) -> dict[Key, Key]:
 
 
 def _gaps(order: Sequence[Key], kept: set[Key]) -> dict[Key, list[Key]]:
-    """Group the keys that were not kept by the kept key before them; "" stands for the beginning."""
+    """Group the keys that are not in `kept` by the kept key before them; "" stands for the
+    beginning."""
     found: dict[Key, list[Key]] = defaultdict(list)
     last = ""
     for key in order:
@@ -165,7 +168,8 @@ def _under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
 
 
 def _refuse_ghosts(old: Graph, new: Graph, text: str) -> None:
-    """An arrow to an action that is not there is a slip here, most often half a renaming."""
+    """Raise NotUmrf for a new arrow to an action that does not exist, most often half of a
+    renaming."""
     known = {action.full_name for action in old.actions if action.missing}
     for action in new.actions:
         if action.missing and action.full_name not in known:
@@ -175,7 +179,7 @@ def _refuse_ghosts(old: Graph, new: Graph, text: str) -> None:
 
 
 def _place(text: str, path: str) -> dict[str, object] | None:
-    """A place as refusals tell it; None for the whole text."""
+    """Return a place for a refusal; None for the whole text."""
     found = places_of(text, [path])[path]
     place: dict[str, object] = {"path": found.path, "line": found.line, "column": found.column}
     return place if found.path else None
@@ -219,7 +223,7 @@ def key_changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
 
 
 def _fields(old: Graph, new: Graph) -> _Wanted:
-    """Return the keys whose values differ between both graphs, without those that hold an order."""
+    """Return the keys whose values differ between both graphs, without keys that hold an order."""
     before, after = document.flatten(old), document.flatten(new)
     wanted: _Wanted = {}
     for root, fields in after.items():
@@ -234,7 +238,7 @@ def _fields(old: Graph, new: Graph) -> _Wanted:
 
 
 def _leftovers(maps: Maps, old: Graph, new: Graph) -> _Wanted:
-    """Remove what else is stored under the keys of actions and relations that are gone."""
+    """Return the other keys of removed actions and relations, to be removed."""
     gone = {action.key for action in old.actions} - {action.key for action in new.actions}
     there = {f"{r.parent}>{r.child};{r.listing}" for r in new.relations}
     lost = {f"{r.parent}>{r.child};{r.listing}" for r in old.relations} - there
@@ -252,7 +256,8 @@ def _leftovers(maps: Maps, old: Graph, new: Graph) -> _Wanted:
 
 
 def _orders(maps: Maps, old: Graph, new: Graph) -> _Wanted:
-    """Numbers for what is new or stands elsewhere, between those of its neighbours."""
+    """Return order numbers for items that are new or moved, between the numbers of their
+    neighbours."""
     wanted: _Wanted = {}
     lists = [("actions", "order", _by_place(old), _by_place(new))]
     before, after = _by_end(old), _by_end(new)
@@ -273,7 +278,8 @@ def _by_place(graph: Graph) -> list[str]:
 
 
 def _by_end(graph: Graph) -> dict[tuple[str, Key], list[str]]:
-    """The relations of every end in their order there, by `po` and `co`."""
+    """Return the relations at each action, in their order: by parent under `po`, by child under
+    `co`."""
     flat = document.flatten(graph)["relations"]
     found: dict[tuple[str, Key], list[tuple[float, str]]] = defaultdict(list)
     for key, value in flat.items():
@@ -324,8 +330,8 @@ def _between(now: Sequence[str], numbers: Mapping[str, float]) -> dict[str, floa
 
 
 class MergingOutcome(msgspec.Struct, frozen=True):
-    """The update that brings in what an edited text changes. `conflicts`: keys that somebody else has
-    given another value meanwhile; then there is no update. `problems`: errors that come with it."""
+    """The update that merges an edited text. `conflicts`: keys that another person has changed
+    meanwhile; if there are any, the update is empty. `problems`: the new errors."""
 
     update: bytes
     conflicts: tuple[str, ...]
@@ -333,11 +339,9 @@ class MergingOutcome(msgspec.Struct, frozen=True):
 
 
 def merging(then: GraphAtSeq, state: bytes, text: bytes, inside: Inside) -> MergingOutcome:
-    """Merge an edited text into a graph that may have changed since. `text` was edited from that of the moment
-    `then`; `state` is the document now; `inside` are the graphs inside.
-
-    Raises BadInput, NotUmrf, TooLarge with the place.
-    """
+    """Merge an edited text into a graph that may have changed since. `then`: the state from whose
+    text it was edited; `state`: the document now; `inside`: the graphs inside. Raise BadInput,
+    NotUmrf or TooLarge, with the place, for a text that cannot be read."""
     found = read(then)
     edit = text_edit(found.moment, text, found.problems(inside), inside)
     now = maps_of(state)
@@ -349,6 +353,6 @@ def merging(then: GraphAtSeq, state: bytes, text: bytes, inside: Inside) -> Merg
 
 
 def _is_other(now: Maps, change: KeyChange) -> bool:
-    """Tell whether a key has neither the value from before the edit nor the wanted one."""
+    """Return whether a key has neither the value from before the edit nor the wanted one."""
     value = now.get(change.root, {}).get(change.key, UNSET)
     return chosen(change.before, value, change.after) is None

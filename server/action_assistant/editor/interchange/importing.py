@@ -29,9 +29,10 @@ from action_assistant.umrf.model import Graph, Key, Note, Problem
 
 
 class ImportReport(msgspec.Struct, frozen=True):
-    """A report on an imported file: its dialect, what was translated, and its problems.
+    """A report on an imported file: its dialect, the notes on what was translated, and its
+    problems.
 
-    `remarks` are the notes with their places; all places are in the file as it was sent.
+    `remarks`: the notes with their places; all places are in the file as it was sent.
     """
 
     dialect: str
@@ -41,8 +42,8 @@ class ImportReport(msgspec.Struct, frozen=True):
 
 
 class Preview(msgspec.Struct, frozen=True):
-    """The graph that importing a file would make. `problems`: those of the file, then those of the graph.
-    `remarks` are the notes with their places; all places are in the file as it was sent."""
+    """The graph that importing a file would make. `problems`: those of the file, then those of the
+    graph. `remarks`: the notes with their places; all places are in the file as it was sent."""
 
     dialect: str
     notes: tuple[str, ...]
@@ -53,8 +54,8 @@ class Preview(msgspec.Struct, frozen=True):
 
 
 class Pieces(msgspec.Struct, frozen=True):
-    """A UMRF text as the keys that a document would hold. `notes`: what was translated; `remarks`
-    are the same with their places in the text."""
+    """A UMRF text as keys and values of a document. `notes`: what was translated; `remarks`: the
+    notes with their places in the text."""
 
     dialect: str
     notes: tuple[str, ...]
@@ -76,8 +77,9 @@ class ImportedFile(msgspec.Struct, frozen=True):
 
 
 def imported(body: bytes, keys: tuple[Key, ...] = ()) -> ImportedFile:
-    """Return what is stored of a file. `keys`: of its actions in their order, where they have some; else
-    they get fresh ones. Raises BadInput, NotUmrf, TooLarge with the place."""
+    """Return what is stored of a file. `keys`: the keys of its actions in order; without them
+    actions get new ones. Raise BadInput, NotUmrf or TooLarge, with the place, for a file that
+    cannot be imported."""
     found = fitting(read_graph(body))
     named = dict(zip((action.key for action in found.graph.actions), keys, strict=False))
     update = document_edits.first(under_keys(_directed(found.graph), named))
@@ -88,7 +90,8 @@ def imported(body: bytes, keys: tuple[Key, ...] = ()) -> ImportedFile:
 
 
 def names(body: bytes) -> tuple[str, tuple[str, ...]]:
-    """The name of the graph in a file, and those of its actions. Raises BadInput, NotUmrf, TooLarge."""
+    """Return the name of the graph in a file, and the names of its actions. Raise BadInput, NotUmrf
+    or TooLarge for a file that cannot be read."""
     graph = read(body).graph
     return graph.name, uses_of(graph)
 
@@ -106,7 +109,7 @@ def preview(body: bytes, inside: Inside = NOTHING_INSIDE) -> bytes:
 
 
 def pieces(body: bytes) -> bytes:
-    """JSON of `Pieces`. Raises as `imported` does."""
+    """Return the JSON of `Pieces` for a UMRF text. Raises as `imported` does."""
     found = fitting(read(body))
     maps = document.flatten(document.with_aids(found.graph))
     return msgspec.json.encode(
@@ -123,7 +126,8 @@ def pieces(body: bytes) -> bytes:
 
 
 def read_graph(body: bytes) -> codec.Reading:
-    """The UMRF file of a graph. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
+    """Read the UMRF file of a graph. Raise BadInput, NotUmrf or TooLarge, with the place, for any
+    other file."""
     found = read(body)
     if found.dialect in ACTION_DIALECTS:
         raise NotUmrf(
@@ -136,20 +140,22 @@ def read_graph(body: bytes) -> codec.Reading:
 
 
 def _directed(graph: Graph) -> Graph:
-    """The graph with a direction to lay it out in. What stands somewhere keeps the one it has."""
+    """Return the graph with a direction for its layout; a graph whose actions have positions keeps
+    its own."""
     placed = any(action.position is not None for action in graph.actions)
     return graph if placed else replace(graph, direction="right")
 
 
 def fitting(found: codec.Reading) -> codec.Reading:
-    """Raises TooLarge for more than a document may hold."""
+    """Return the reading. Raise TooLarge if a document cannot hold its graph."""
     refuse_too_much(found.graph, found.dialect)
     refuse_too_wide(document.flatten(document.with_aids(found.graph)))
     return found
 
 
 def read(body: bytes) -> codec.Reading:
-    """A UMRF file, of a graph or of one action. Raises BadInput, NotUmrf, TooLarge with the place in the text."""
+    """Read a UMRF file, of a graph or of one action. Raise BadInput, NotUmrf or TooLarge, with the
+    place, for any other file."""
     try:
         return codec.read(body)
     except codec.Unreadable as error:

@@ -24,15 +24,15 @@ _SCRIPT_LIMIT: Final = 500  # behaviours
 
 
 class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A command that a person gives to the running graph, and its time."""
+    """A command of a person to the running graph, and its time."""
 
     at_ms: float
     verb: Literal["stop", "pause", "resume"]
 
 
 class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to simulate the graph after its change `seq`, the newest if left out. `script`: what its
-    actions do, as in a script of `simulate`; `commands`: what people do meanwhile."""
+    """A request to simulate the graph after its change `seq` (missing: the newest). `script`: what
+    its actions do, as in a script of `simulate`; `commands`: what people do during the run."""
 
     seq: int | None = None
     script: Annotated[Any, semantics.SCRIPT] = None
@@ -41,7 +41,7 @@ class Rehearsing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Rehearsal(msgspec.Struct, frozen=True):
-    """The events of a simulated run, in order. `cut`: whether there are more than are listed."""
+    """The events of a simulated run, in order. `cut`: the list is incomplete."""
 
     seq: int
     trace: tuple[semantics.Trace, ...]

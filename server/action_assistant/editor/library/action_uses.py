@@ -18,11 +18,9 @@ from action_assistant.umrf.signatures import action_of_graph
 
 
 class LibraryParameter(msgspec.Struct, frozen=True):
-    """One parameter. `path` joins keys with `/` as in UMRF; no `pvf_type`: the file names none.
-
-    `text` is its JSON as a new use begins with it: without a value that a graph gave it, and with the
-    value that a document of the library has.
-    """
+    """One parameter. `path`: keys joined with `/` as in UMRF. `pvf_type`: missing if the file names
+    none. `text`: the JSON with which a new use begins: with the value of a library document, but
+    without values of graphs."""
 
     path: str
     pvf_type: str | None
@@ -31,12 +29,12 @@ class LibraryParameter(msgspec.Struct, frozen=True):
 
 
 class LibraryAction(msgspec.Struct, frozen=True, kw_only=True):
-    """An action that the library has, or that graphs use.
+    """An action of the library, or one that graphs use.
 
-    `document` is its document in the library, `seq` the last change of that. Without one, parameters
-    are those of all graphs together; of what they say differently, and of descriptions and types, the
-    graph changed last counts. `differs_in`: of `used_in`, the graphs that use it with other parameters
-    than the document has. `first_seen` is when the first of them was made.
+    `document`: its document in the library, `seq` the last change of that document. Without a
+    document, the parameters are those of all graphs together; where graphs differ, the graph
+    changed last counts. `differs_in`: the graphs of `used_in` that use it with other parameters
+    than the document has. `first_seen`: when the first document or graph with it was made.
     """
 
     name: str
@@ -53,8 +51,9 @@ class LibraryAction(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class GraphAsAction(msgspec.Struct, frozen=True):
-    """A graph, as the action that stands for it in another one: it takes what its first actions lack,
-    and gives what its last one gives. Robots run it so where they have indexed it."""
+    """A graph as the action that stands for it in other graphs: its inputs are those that its first
+    actions lack, its outputs those of its last action. A robot runs it if it has indexed the
+    graph."""
 
     graph: str
     name: str
@@ -73,8 +72,8 @@ class ActionSource(msgspec.Struct, frozen=True):
 
 
 class FoundActions(msgspec.Struct, frozen=True):
-    """The actions of a document that differ in what a library says of them, and its labels. `whole`:
-    the action that stands for a graph; None for one without a name or without actions."""
+    """The distinct actions of a document, and its labels. `whole`: the action that stands for a
+    graph; None if the graph has no name or no actions."""
 
     actions: tuple[Action, ...] = ()
     labels: tuple[str, ...] = ()
@@ -86,7 +85,7 @@ NOTHING: Final = msgspec.msgpack.encode(FoundActions())
 
 
 def found(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
-    """The actions of a document, as msgpack of `FoundActions`."""
+    """Return the actions of a document, as msgpack of `FoundActions`."""
     graph = read(sight).moment.graph
     if kind == "graph":
         actions = _distinct(graph)
@@ -121,8 +120,8 @@ def merged(sources: list[tuple[ActionSource, bytes]]) -> bytes:
 
 
 def as_actions(sources: list[tuple[ActionSource, bytes]]) -> bytes:
-    """JSON of a list of `GraphAsAction`, by name; of several of one name the oldest first, which is the
-    one that actions of that name stand for."""
+    """Return the JSON of a list of `GraphAsAction`, sorted by name; of equal names the oldest
+    first, for which actions of that name stand."""
     aged = sorted(sources, key=lambda each: (each[0].made_at, each[0].document))
     listed = [
         GraphAsAction(
@@ -139,7 +138,7 @@ def as_actions(sources: list[tuple[ActionSource, bytes]]) -> bytes:
 
 
 def _by_age(uses: list[tuple[ActionSource, Action]]) -> tuple[str, ...]:
-    """The graphs, the oldest first."""
+    """Return the graphs of these uses, oldest first."""
     ordered = sorted(uses, key=lambda use: (use[0].made_at, use[0].document))
     return tuple(dict.fromkeys(source.document for source, _ in ordered))
 
@@ -181,7 +180,7 @@ def _of_uses(name: str, uses: list[tuple[ActionSource, Action]]) -> LibraryActio
 
 
 def together(name: str, uses: Sequence[Action]) -> Action:
-    """One action of what several uses say, the first before the others; without their values."""
+    """Combine several uses into one action without values; where they differ, the first use counts."""
     return Action(
         key="",
         name=name,

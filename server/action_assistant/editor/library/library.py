@@ -35,12 +35,13 @@ class Library:
         self._shown: dict[_Listing, tuple[dict[str, int], bytes]] = {}
 
     async def all(self) -> bytes:
-        """Every action by name: JSON of a list of `LibraryAction`. Documents that cannot be read are
-        left out."""
+        """Return every action, sorted by name: the JSON of a list of `LibraryAction`. Documents
+        that cannot be read are left out."""
         return await self._listed(merged)
 
     async def graphs(self) -> bytes:
-        """Every graph as the action that stands for it: JSON of a list of `GraphAsAction`."""
+        """Return every graph as the action that stands for it: the JSON of a list of
+        `GraphAsAction`."""
         return await self._listed(as_actions)
 
     async def _listed(self, listing: _Listing) -> bytes:

@@ -28,7 +28,7 @@ from action_assistant.web.workers.lanes import RunInWorker
 
 
 class NewAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """An action without parameters, or, `from_graphs`, with those that graphs know of it."""
+    """A new action without parameters, or, with `from_graphs`, with the parameters that graphs use."""
 
     name: str
     description: str = ""
@@ -36,7 +36,7 @@ class NewAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GraphMoment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A graph, and its change that somebody has seen."""
+    """A graph, and its change that a person has seen."""
 
     graph: str
     seq: int
@@ -71,8 +71,9 @@ class LibraryEdits:
         self._making = anyio.Lock()
 
     async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
-        """The document of an action from a `NewAction` or its file; with JSON of an `ImportReport` in
-        the second case. Raises BadInput, NotUmrf, TooLarge with the place, Conflict, NotFound."""
+        """Create the document of an action from a `NewAction` or from a file; for a file also
+        return the JSON of an `ImportReport`. Raise BadInput, NotUmrf or TooLarge, with the
+        place, for a bad file; Conflict for a taken name; NotFound if no graph uses the action."""
         try:
             wanted = msgspec.json.decode(body, type=NewAction)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
@@ -112,7 +113,7 @@ class LibraryEdits:
         return action
 
     async def uses(self, action: str, renames: Renames) -> tuple[int, bytes]:
-        """The change of the action that was looked at, and JSON of a list of `ActionUse`."""
+        """Return the action's last change, and the JSON of a list of `ActionUse` for it."""
         sight = await self._graph_reader.now(action)
         name = (await self._catalogue.get(action)).name
         graphs = await self._using(name)
@@ -122,8 +123,8 @@ class LibraryEdits:
     async def update_uses(
         self, action: str, seq: int, graphs: Sequence[GraphMoment], renames: Renames, author: str
     ) -> list[UpdatedGraph]:
-        """Brings the uses in graphs to what the action was after its change `seq`, one edit for each
-        graph. Raises Conflict, before anything is written, for a graph that has changed meanwhile."""
+        """Update the uses in graphs to the action after its change `seq`, one edit for each graph.
+        Raise Conflict, before anything is written, if a graph has changed meanwhile."""
         sight = await self._graph_reader.at(action, seq)
         name = (await self._catalogue.get(action)).name
         if len({each.graph for each in graphs}) < len(graphs):
@@ -162,7 +163,7 @@ class LibraryEdits:
         return await self._catalogue.get(action)
 
     async def replacing_would(self, action: str, body: bytes) -> bytes:
-        """JSON of the `Difference` that `replace` would make now. Raises as it does."""
+        """Return the JSON of the `Difference` that `replace` would make. Raises as `replace` does."""
         await self._catalogue.require(action, "action")
         sight = await self._graph_reader.now(action)
         found: bytes = await self._files(library_updates.replacing_would, sight, body)
@@ -171,8 +172,9 @@ class LibraryEdits:
     async def replace(
         self, action: str, body: bytes, author: str, seq: int | None = None
     ) -> GraphView:
-        """The action becomes what its file says. Raises BadInput, NotUmrf, TooLarge with the place,
-        Conflict for the file of another, and where its change `seq` is not its last one any more."""
+        """Replace an action by the content of its file. Raise BadInput, NotUmrf or TooLarge, with
+        the place, for a bad file; Conflict for the file of another action, or if `seq` is not
+        the last change."""
         await self._catalogue.require(action, "action")
         name = (await self._catalogue.get(action)).name
         async with self._rooms.enter(h.graph_stream(action)) as room:
@@ -225,7 +227,7 @@ class LibraryEdits:
         return UpdatedGraph(document, seq, seq > before)
 
     async def _using(self, name: str) -> list[GraphAtSeq]:
-        """The graphs that use an action, the last changed first."""
+        """Return the graphs that use an action, the last changed first."""
         known = msgspec.json.decode(await self._library.all(), type=list[LibraryAction])
         used_in = {graph for each in known if each.name == name for graph in each.used_in}
         views = [view for view in await self._catalogue.all() if view.id in used_in]
@@ -237,7 +239,7 @@ async def _now(room: Room, document: str) -> GraphAtSeq:
 
 
 async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
-    """The graph that somebody has seen, if it still is so."""
+    """Return the graph that a person has seen. Raise Conflict if it has changed since."""
     found = await _now(room, moment.graph)
     if found.seq != moment.seq:
         raise _changed(moment, found.seq)

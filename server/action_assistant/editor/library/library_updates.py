@@ -26,11 +26,11 @@ from action_assistant.umrf.parameters import without_value
 
 
 class ActionUse(msgspec.Struct, frozen=True, kw_only=True):
-    """A graph that uses an action of the library. `seq`: its change that was looked at; `count`: how
+    """A graph that uses an action of the library. `seq`: its change that was examined; `count`: how
     many of its actions are uses.
 
-    `changed`: whether an update would change the graph; `difference` is what it would change, and
-    `suggested` are renames that are likely, of which none is in it unless it was asked for.
+    `changed`: an update would change the graph. `difference`: what the update would change.
+    `suggested`: likely renames, which are not in it unless requested.
     """
 
     graph: str
@@ -52,7 +52,8 @@ class BroughtAction(msgspec.Struct, frozen=True):
 
 
 def brought(body: bytes) -> BroughtAction:
-    """The action of a UMRF file of one action. Raises BadInput, NotUmrf, TooLarge with the place."""
+    """Return the action of a UMRF file of one action. Raise BadInput, NotUmrf or TooLarge, with the
+    place, for any other file."""
     found = importing.read(body)
     if found.dialect not in ACTION_DIALECTS:
         raise NotUmrf(
@@ -92,12 +93,12 @@ def of_graphs(name: str, sights: Sequence[GraphAtSeq]) -> Action:
 
 
 def written(sight: GraphAtSeq) -> bytes:
-    """The file of the action of a library's document. Raises NotFound for a document without one."""
+    """Return the file of the action of a library document. Raise NotFound if the document has none."""
     return write_action(_action_of(sight)).encode()
 
 
 def uses(sight: GraphAtSeq, graphs: Sequence[GraphAtSeq], renames: Renames) -> bytes:
-    """JSON of an `ActionUse` for each of the graphs that has one."""
+    """Return the JSON of an `ActionUse` for each graph that uses the action."""
     action = _action_of(sight)
     found = (_use(action, each, renames) for each in graphs)
     return msgspec.json.encode([use for use in found if use is not None])
@@ -122,7 +123,7 @@ def _use(action: Action, sight: GraphAtSeq, renames: Renames) -> ActionUse | Non
 
 
 def updating(sight: GraphAtSeq, graph: GraphAtSeq, renames: Renames) -> bytes:
-    """The update of a graph's document that brings its uses to what the library says."""
+    """Return the update of a graph's document that makes its uses equal to the library's action."""
     action = _action_of(sight)
     return editing(graph.state, lambda old: updated(old, action, renames))
 
@@ -153,8 +154,8 @@ def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
 
 
 def replacing(sight: GraphAtSeq, body: bytes) -> bytes:
-    """The update that makes the action what a file says of it, all but its place. Raises as `brought`
-    does, and Conflict for the file of another action."""
+    """Return the update that makes the action equal to a file, except for its position. Raises as
+    `brought` does, and Conflict for the file of another action."""
     return editing(sight.state, _replaced(_action_of(sight), body))
 
 

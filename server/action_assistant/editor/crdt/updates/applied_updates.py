@@ -16,8 +16,8 @@ _KIND: Final = 31  # the bits of a struct that say what it is; none of them: it 
 def check_cut_items(
     doc: "Doc[Any]", update: bytes, read: UpdateOutline, known: Mapping[int, int]
 ) -> None:
-    """Raise Malformed where an item goes on from a struct of which nothing but its length is left: Yjs
-    fails at that. An item of which nothing is known goes on from nothing."""
+    """Raise Malformed if an item continues a struct of which only the length is left, since Yjs
+    fails at that."""
     if not any(start < known.get(client, 0) < end for client, start, end in read.brings):
         return
     for client in cut_items(update, known):
@@ -29,8 +29,8 @@ def check_cut_items(
 
 
 def check_whole(doc: "Doc[Any]", read: UpdateOutline) -> None:
-    """Raise Panicked where the library has not applied all of an update, since parts of it wait for each
-    other. Within one client that is seen beforehand."""
+    """Raise Panicked if the library has not applied all of an update, since structs of several
+    clients wait for each other."""
     if len(read.brings) > 1:
         reached = clocks(doc.get_state())
         if any(reached.get(client, 0) < end for client, _, end in read.brings):
@@ -38,13 +38,13 @@ def check_whole(doc: "Doc[Any]", read: UpdateOutline) -> None:
 
 
 def check_unchanged(doc: "Doc[Any]", known: Mapping[int, int], error: Malformed) -> None:
-    """Raise Panicked where the library has refused an update after applying some of it."""
+    """Raise Panicked if the library has refused an update after applying a part."""
     if clocks(doc.get_state()) != {client: clock for client, clock in known.items() if clock}:
         raise Panicked(f"partly applied: {error}") from error
 
 
 def clocks(state: bytes) -> dict[int, int]:
-    """A state vector as numbers: what is known of each client."""
+    """Decode a state vector: the next clock of each client."""
     reader = ByteReader(state)
     return {reader.number(): reader.number() for _ in range(reader.number())}
 

@@ -28,7 +28,7 @@ _AS_CLASSES: Final = b"\xf0\x80\x80\x80"
 
 
 class PairedTexts:
-    """The texts of one document that have characters of two UTF-16 units."""
+    """The texts of one document with surrogate pairs (characters of two UTF-16 units)."""
 
     def __init__(self, kept: Iterable[PairedText] = ()) -> None:
         self._by_client: Final[dict[int, list[PairedText]]] = {}
@@ -36,12 +36,12 @@ class PairedTexts:
         self._add(kept)
 
     def all(self) -> list[PairedText]:
-        """Return the texts, those of each client in their order."""
+        """Return all texts, grouped by client."""
         return [each for found in self._by_client.values() for each in found]
 
     def check(self, update: bytes, read: UpdateOutline, known: Mapping[int, int]) -> None:
-        """Raise Malformed for an update that would part a character, in a document that has so many
-        clocks of each client, or that brings more of them than can be kept."""
+        """Raise Malformed for an update that would split a surrogate pair, or that has more of them
+        than can be stored. `known`: the next clock of each client in the document."""
         if not self._by_client and not read.paired:
             return
         news = _new(read, known)
@@ -58,7 +58,8 @@ class PairedTexts:
                 raise Malformed("a change within one character")
 
     def learn(self, read: UpdateOutline, known: Mapping[int, int]) -> None:
-        """The update is applied to a document that had so many clocks of each client."""
+        """Add the texts of an update that is applied. `known`: the next clock of each client before
+        that."""
         if read.paired:
             self._add(_new(read, known))
 
@@ -92,8 +93,8 @@ def has_paired_texts(bodies: Sequence[bytes]) -> bool:
 
 
 def paired_texts_in(state: bytes) -> list[PairedText]:
-    """Search a document for such texts, if its snapshot does not list them. Return none where the search would
-    take long."""
+    """Search a document for texts with surrogate pairs, if its snapshot does not list them; return
+    an empty list if it is too large for that."""
     if len(state) <= _MOST_SOUGHT and _OF_TWO.search(state):
         with suppress(Malformed):
             return list(scanned(state, stored=True).paired)

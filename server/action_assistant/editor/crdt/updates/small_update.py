@@ -28,8 +28,8 @@ class _NotSmall(Exception):
 
 
 def small_outline(update: bytes) -> UpdateOutline | None:
-    """Return the outline of a small ordinary update, the same as the scanner's; None where the scanner has to
-    read it."""
+    """Return the outline of a small ordinary update, equal to the scanner's; None if only the
+    scanner can read it."""
     if len(update) > _LARGEST:
         return None
     try:
@@ -39,7 +39,8 @@ def small_outline(update: bytes) -> UpdateOutline | None:
 
 
 def _outline(update: bytes) -> UpdateOutline:
-    """Raises _NotSmall; IndexError for what is too short."""
+    """Return the outline of an update. Raise _NotSmall for an update that needs the scanner,
+    IndexError if it is too short."""
     needs: dict[int, int] = {}
     placed: list[Placed] = []
     brings: tuple[tuple[int, int, int], ...] = ()
@@ -78,7 +79,7 @@ def _outline(update: bytes) -> UpdateOutline:
 
 
 def _number(update: bytes, at: int) -> tuple[int, int]:
-    """A varUint of at most 56 bit."""
+    """Read a varUint of at most 56 bit; return it and the offset after it."""
     byte = update[at]
     at += 1
     if byte < 128:
@@ -96,8 +97,8 @@ def _number(update: bytes, at: int) -> tuple[int, int]:
 def _beside(
     update: bytes, at: int, info: int, needs: dict[int, int]
 ) -> tuple[tuple[int, int], int]:
-    """Read the origins of a struct. Return the left neighbour, or the right one where there is no left one, and
-    the offset behind them."""
+    """Read the origins of a struct. Return its left neighbour (or the right one if it has no left
+    one), and the offset after them."""
     beside: tuple[int, int] | None = None
     for side in (0x80, 0x40):
         if info & side:
@@ -113,7 +114,8 @@ def _beside(
 
 
 def _root(update: bytes, at: int, info: int) -> tuple[bool, int]:
-    """The name of a root, and the key there: whether it is that of an action."""
+    """Skip the name of a root and a key in it; return whether the key is one of an action, and the
+    offset."""
     size = update[at + 1]
     if update[at] != 1 or size > 127:
         raise _NotSmall
@@ -143,7 +145,7 @@ def _content(update: bytes, at: int, kind: int) -> tuple[int, int]:
 
 
 def _value(update: bytes, at: int, deepest: int) -> int:
-    """Skip one value; return the offset behind it."""
+    """Skip one value; return the offset after it."""
     kind = update[at]
     at += 1
     if kind in {_TEXT, _BYTES}:

@@ -26,8 +26,8 @@ _MOST_WHOLE: Final = 2**53 - 1  # of a whole number, to either side
 
 
 class ContentReader:
-    """Reads one content after the other. `stored`: of an update that a room took, also what it would not
-    take today, so that a graph that holds such can be opened."""
+    """Reads the contents of structs, one after the other. `stored`: also accept old content that
+    today's rules refuse, so that old graphs still open."""
 
     def __init__(self, reader: ByteReader, *, stored: bool = False) -> None:
         self._reader = reader
@@ -68,7 +68,8 @@ class ContentReader:
         return 1
 
     def _texts_of_json(self) -> int:
-        """Written by the first Yjs; the library counts it otherwise than pages do."""
+        """Read content that only the first versions of Yjs wrote, and return its clocks. It is
+        refused in new updates, since the library counts it otherwise than pages do."""
         if not self._stored:
             raise Malformed("content that only the first Yjs wrote")
         count = length(self._reader)
@@ -119,7 +120,7 @@ class ContentReader:
             self._any()
 
     def _any(self) -> None:
-        """One value, without recursion: a stack of how many members are still to come."""
+        """Skip one value, without recursion: a stack holds the number of members left."""
         reader = self._reader
         open_: list[tuple[int, bool]] = [(1, False)]
         while open_:
@@ -165,5 +166,5 @@ def _counted(reader: ByteReader, count: int) -> int:
 
 
 def _no_constant(name: str) -> NoReturn:
-    """`NaN` and the infinities: Python's JSON has them, the others' has not."""
+    """Refuse `NaN` and the infinities, which only Python's JSON knows. Raise ValueError always."""
     raise ValueError(name)

@@ -32,10 +32,13 @@ class PairedText(msgspec.Struct, frozen=True, array_like=True):
 
 
 class UpdateOutline(msgspec.Struct, frozen=True):
-    """The outline of an update. `brings`: the structs in it, as `(client, from clock, to clock)`. `needs`: how
-    many clocks of each client a document must have before. `placed`: structs that may lie inside of others.
-    `fields`: how many keys may be new, `actions`: how many of them are new actions; `structs`: the number of
-    structs; `paired`: texts with characters of two clocks, which must not be split."""
+    """The outline of an update.
+
+    `brings`: its structs, as `(client, from clock, to clock)`. `needs`: the next clock of each
+    client that a document must have before. `placed`: structs that may be nested. `fields`: keys
+    that may be new; `actions`: how many of these are actions. `structs`: the number of structs.
+    `paired`: texts with surrogate pairs, which must not be split.
+    """
 
     brings: tuple[tuple[int, int, int], ...]
     needs: dict[int, int]
@@ -46,8 +49,8 @@ class UpdateOutline(msgspec.Struct, frozen=True):
     paired: tuple[PairedText, ...] = ()
 
     def ready(self, known: dict[int, int]) -> bool:
-        """Tell whether a document with these clocks of each client (`known`) has everything that the update
-        builds on."""
+        """Return whether a document with these next clocks of clients (`known`) has all that the
+        update builds on."""
         ends: dict[int, int] = {}
         if len(self.brings) == 1:  # nearly always
             client, start, end = self.brings[0]

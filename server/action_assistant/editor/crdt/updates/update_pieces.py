@@ -15,7 +15,8 @@ _SKIP: Final = 10
 
 
 class _Structs:
-    """The structs of one client: `ends` in clocks, `offsets` in bytes, and the clocks that each builds on."""
+    """The structs of one client: `ends` in clocks, `offsets` in bytes, and the clocks that each
+    needs."""
 
     def __init__(self, start: int, offset: int) -> None:
         self.ends: Final = [start]
@@ -25,12 +26,13 @@ class _Structs:
 
     @property
     def reached(self) -> int:
-        """The clock up to which the pieces so far go."""
+        """The clock up to which structs were given out."""
         return self.ends[self.given]
 
 
 class _Splitter(Scan):
-    """Notes where each struct of an update lies, and what it builds on. Raises Malformed for one with gaps."""
+    """Records the offset of each struct of an update, and what it needs. Raises Malformed for an
+    update with gaps."""
 
     def __init__(self, update: bytes) -> None:
         self._bytes_reader = ByteReader(update)
@@ -63,8 +65,8 @@ class _Splitter(Scan):
 
 
 def pieces_of(update: bytes, size: int = PIECE_BYTES) -> list[bytes]:
-    """Return updates of about `size` bytes that bring the same, each built on those before it only. An update
-    that is small, or that cannot be split, is returned as it is."""
+    """Split an update into updates of about `size` bytes with the same result, each of which needs
+    only earlier ones. Return a small or unsplittable update alone."""
     if len(update) <= size:
         return [update]
     try:
@@ -93,7 +95,8 @@ def _packed(update: bytes, of: dict[int, _Structs], size: int) -> Iterator[bytes
 
 
 def _in_order(of: dict[int, _Structs]) -> Iterator[int]:
-    """Give out every struct after those that it builds on: yield its client. Raises Malformed for a circle."""
+    """Yield the client of each struct, every struct after those it needs. Raise Malformed for a
+    cycle."""
     for first in of:
         wanted = [(first, of[first].ends[-1])]  # clients, each up to a clock; the last one first
         while wanted:
@@ -111,7 +114,8 @@ def _in_order(of: dict[int, _Structs]) -> Iterator[int]:
 
 
 def _missing(of: dict[int, _Structs], client: int, structs: _Structs) -> tuple[int, int] | None:
-    """Return what has to come before the next of these structs, as a client and a clock; None where all is there."""
+    """Return the client and clock that must come before the next of these structs; None if nothing
+    is missing."""
     for other, clock in structs.needs[structs.given]:
         if other != client and other in of and of[other].reached < clock <= of[other].ends[-1]:
             return other, clock

@@ -25,7 +25,8 @@ _GC, _DELETED, _STRING, _SKIP = 0, 1, 4, 10
 
 
 def outline(update: bytes) -> UpdateOutline:
-    """Read an update. Raises Malformed for what is none, is beyond the bounds, or fails in a page."""
+    """Return the outline of an update. Raise Malformed if it cannot be read, exceeds the limits, or
+    would fail in a page."""
     return small_outline(update) or scanned(update)
 
 
@@ -110,7 +111,7 @@ class Scan:
         )
 
     def _client_structs(self) -> None:
-        """All that is there of the next client."""
+        """Read all structs of the next client."""
         reader = self._reader
         count, client, clock = reader.number(), _client(reader), reader.number()
         if client in self._seen:
@@ -132,7 +133,7 @@ class Scan:
             self._needs[other] = max(end, self._needs.get(other, 0))
 
     def _one(self, client: int, start: int, info: int, needs: dict[int, int]) -> int:
-        """One struct; the clock after it."""
+        """Read one struct; return the clock after it."""
         size, reference, fresh = self._struct(info, needs)
         if needs.get(client, 0) > start and not self._stored:
             raise Malformed("a struct that stands on itself or on a later one")
@@ -153,8 +154,8 @@ class Scan:
         return clock
 
     def _struct(self, info: int, needs: dict[int, int]) -> tuple[int, _Reference | None, _Fresh]:
-        """Read one struct. Return how many clocks it takes, the struct that tells where it lies, and the kind
-        of key that may be new with it."""
+        """Read one struct. Return how many clocks it takes, the struct that gives its position, and
+        the kind of key that may be new."""
         reader, kind = self._reader, info & 31
         if kind == _GC:
             return length(reader), None, _NONE

@@ -26,15 +26,15 @@ from action_assistant.web.auth.keys import PersonRef
 
 
 class AskedMerge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Into which side what the other did is brought, and whose value counts where both changed the same,
-    by the places of the conflicts."""
+    """The side that the other side's changes are merged into, and, by the place of a conflict, the
+    side whose value is chosen."""
 
     into: DraftSide = "origin"
     choices: dict[str, DraftSide] = {}
 
 
 class WantedMerge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The merge that was looked at: of the origin as it was after its change `seq`, and of the draft after
+    """The merge that was previewed: of the origin after its change `seq`, and of the draft after
     its change `draft_seq`."""
 
     seq: int
@@ -44,12 +44,11 @@ class WantedMerge(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MergePreview(msgspec.Struct, frozen=True, kw_only=True):
-    """The effect of a merge on the side `into`, where conflicts without a choice stay as they are there.
-
-    `seq`, `draft_seq`: the compared changes of both sides. `changes`: what would change. `problems`: those that
-    are new on this side. `umrf`: the resulting text. `authors`: the people whose changes are merged.
-    `origin_did`, `draft_did`: the changes of each side since the last merge.
-    """
+    """The effect of a merge on the side `into`, where a conflict without a choice keeps this side's
+    value. `seq`, `draft_seq`: the compared changes of origin and draft. `changes`: what would
+    change. `problems`: those that would be new. `umrf`: the resulting text. `authors`: the
+    people whose changes are merged. `origin_did`, `draft_did`: the changes of each side since
+    the last merge."""
 
     into: DraftSide
     seq: int
@@ -64,7 +63,7 @@ class MergePreview(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class MergedDraft(msgspec.Struct, frozen=True):
-    """The side into which was merged, and how far its log goes now; whether that changed anything."""
+    """The graph that was merged into, its last change now, and whether the merge changed it."""
 
     graph: str
     seq: int
@@ -72,7 +71,7 @@ class MergedDraft(msgspec.Struct, frozen=True):
 
 
 class DraftMerges:
-    """Looks at merges, and makes them."""
+    """Previews and makes merges of drafts."""
 
     def __init__(
         self,
@@ -91,7 +90,8 @@ class DraftMerges:
         self._checks = checks
 
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
-        """Compute what a merge would do now, without storing anything. Raises NotFound, Unavailable."""
+        """Compute a merge without storing anything. Raise NotFound for an unknown draft,
+        Unavailable if the journal cannot be read."""
         pair = await self._drafts.pair(draft)
         inside = await self._brought_up(pair, asked.into)
         found = await self._index.value(
@@ -111,8 +111,9 @@ class DraftMerges:
         )
 
     async def merge(self, draft: str, author: str, wanted: WantedMerge) -> MergedDraft:
-        """Bring in what the other side did. Raises Conflict where either has moved on since it was looked
-        at, or something has no choice; NotFound, Unavailable."""
+        """Merge the changes of the other side. Raise Conflict if a side has changed since the
+        preview or a conflict has no choice; NotFound for an unknown draft; Unavailable if the
+        journal cannot be written."""
         row = (await self._drafts.pair(draft)).row
         target: str = row.draft_of if wanted.into == "origin" else draft
         async with self._rooms.enter(h.graph_stream(target)) as room:
@@ -138,7 +139,8 @@ class DraftMerges:
         return MergedDraft(target, now, seq > 0)
 
     async def _entered(self, graph: str, before: int, now: int, update: bytes) -> int:
-        """Return the change that an update became, which others may precede; 0 where it changed nothing."""
+        """Return the change that this update became, among the changes after `before`; 0 if it
+        changed nothing."""
         events = await self._journal.read(h.graph_stream(graph), after=before, upto=now)
         return next((event.seq for event in events if event.body == update), 0)
 
@@ -150,7 +152,7 @@ class DraftMerges:
         return await self._checks.inside(*sides)
 
     async def _since(self, pair: DraftPair, source: str, target: str) -> int:
-        """The first change of one side that the other has not been given."""
+        """Return the first change of one side that was not merged into the other."""
         if pair.row.base_graph == source:
             return int(pair.row.base_seq) + 1
         grafts = await self._index.value(grafts_of, source)
@@ -166,7 +168,7 @@ def _require_moments(pair: DraftPair, wanted: WantedMerge) -> None:
 
 
 def _require_choices(left: UnmadeChoices | None) -> None:
-    """Raises Conflict where something has no choice."""
+    """Raise Conflict if a conflict has no choice."""
     if left is not None:
         things = "one thing" if left.count == 1 else f"{left.count} things"
         raise Conflict(

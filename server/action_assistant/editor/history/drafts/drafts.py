@@ -61,8 +61,8 @@ class DraftMoment(msgspec.Struct, frozen=True):
 
 
 class DraftView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
-    """A draft. `seq` and `origin_seq` are the last changes of it and of what it is a draft of; `ahead` and
-    `behind`: how many things either changed since they were one, None where that cannot be said."""
+    """A draft. `seq`, `origin_seq`: the last changes of draft and origin. `ahead`, `behind`: how
+    many things the draft and the origin changed since they were equal; None if that is unknown."""
 
     id: str
     name: str
@@ -82,15 +82,15 @@ class DraftView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
 
 
 class NewDraft(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request for a draft: its name, and the change of the graph that it begins with; the last one if left
-    out."""
+    """A request for a draft: its name, and the change of the graph that it begins with (missing:
+    the last one)."""
 
     name: str = ""
     seq: int | None = None
 
 
 class DraftPair(msgspec.Struct, frozen=True):
-    """A draft and what it is one of, as they are, beside what they were when they were last one."""
+    """A draft and its origin in their present states, and the last state in which they were equal."""
 
     row: Any
     base: DraftBase
@@ -99,7 +99,7 @@ class DraftPair(msgspec.Struct, frozen=True):
 
 
 class Drafts:
-    """All drafts. Raises NotFound for what is none, or deleted."""
+    """All drafts. Its methods raise NotFound for an id that is no draft or is deleted."""
 
     def __init__(
         self,
@@ -117,7 +117,9 @@ class Drafts:
         self._distances: LruCache[_Moments, tuple[int, int]] = LruCache(_REMEMBERED)
 
     async def make(self, origin: str, author: str, new: NewDraft) -> DraftView:
-        """A draft of a graph. Raises BadInput, NotFound, Conflict, Unavailable."""
+        """Make a draft of a graph. Raise BadInput for a bad name, NotFound for an unknown graph,
+        Conflict for a change that it does not have, Unavailable if the journal cannot be
+        written."""
         await self._catalogue.require(origin, "graph")
         name = " ".join(new.name.split())
         if len(name) > NAME_LIMIT:
@@ -130,7 +132,7 @@ class Drafts:
         return await self.get(made.id)
 
     async def of(self, origin: str) -> list[DraftView]:
-        """The drafts of a graph, the last changed first."""
+        """Return the drafts of a graph, the last changed first."""
         await self._catalogue.require(origin)
         there = graph_table.c.deleted_at.is_(None)
         rows = await self._rows(graph_table.c.draft_of == origin, there)
@@ -165,15 +167,16 @@ class Drafts:
         return await self.get(draft)
 
     async def withdraw(self, draft: str, author: str) -> DraftView:
-        """Take a proposal back. Raises Conflict where there is none."""
+        """Withdraw a proposal. Raise Conflict if the draft is not proposed."""
         if (await self._proposal(await self._row(draft)))[0] is None:
             raise Conflict("This draft is not proposed.")
         await self._journal.append(h.about_stream(draft), [h.draft(h.WITHDRAWN, author)])
         return await self.get(draft)
 
     async def answer(self, draft: str, author: str, body: h.DraftAnswered) -> DraftView:
-        """Say yes or no to a proposal of somebody else, having seen the draft as it is. Raises BadInput,
-        Conflict."""
+        """Answer another person's proposal with yes or no, about the draft's change that they have
+        seen. Raise BadInput for a malformed answer; Conflict if it is not proposed, has changed,
+        or the proposal is their own."""
         row = await self._row(draft)
         proposal, device = await self._proposal(row)
         if proposal is None:
@@ -202,8 +205,9 @@ class Drafts:
         return await self.get(draft)
 
     async def _proposal(self, row: Row[Any]) -> tuple[DraftProposal | None, str]:
-        """The proposal that is open, and the browser that it came from. Earlier versions stored answers to
-        one's own proposal, and to changes that were not there: those do not count."""
+        """Return the open proposal of a draft (None without one), and the browser it came from.
+        Answers that earlier versions stored to one's own proposal or to unknown changes do not
+        count."""
         found: DraftProposal | None = None
         device = ""
         answers: dict[str, DraftAnswer] = {}
@@ -270,8 +274,8 @@ class Drafts:
     async def _distance(
         self, row: Row[Any], origin: Row[Any]
     ) -> tuple[int | None, int | None, int]:
-        """Count the changes of each side since they were equal; also return the last change of the origin. The
-        counts are None where the origin is deleted."""
+        """Return how many things the draft and the origin changed since they were equal (None if
+        the origin is deleted), and the last change of the origin."""
         newest = [await self._journal.newest(h.graph_stream(g)) for g in (origin.id, row.id)]
         if origin.deleted_at is not None:
             return None, None, newest[0]

@@ -43,9 +43,9 @@ _TOLD: Final = 50  # of which it says the places
 
 
 class DraftConflict(msgspec.Struct, frozen=True, kw_only=True):
-    """A conflict between both sides of a draft. `place` is the name by which a choice refers to it; `what`
-    names the thing in words; `removed`: the side that removed it while the other changed it. `origin` and
-    `draft`: the changes of each side to it."""
+    """A conflict between both sides of a draft. `place`: the key by which a choice names it.
+    `what`: the thing, in words. `removed`: the side that removed it while the other changed it.
+    `origin`, `draft`: the changes of each side to it."""
 
     place: str
     what: str
@@ -62,7 +62,7 @@ class DraftBase(msgspec.Struct, frozen=True):
 
 
 class UnmadeChoices(msgspec.Struct, frozen=True):
-    """Conflicts that have no choice: how many, what the first are about, and where they are."""
+    """The conflicts without a choice: their number, and the first ones in words and by place."""
 
     count: int
     what: tuple[str, ...]
@@ -70,8 +70,8 @@ class UnmadeChoices(msgspec.Struct, frozen=True):
 
 
 class MadeMerge(msgspec.Struct, frozen=True):
-    """A merge as it is stored: the update, and whose changes the keys that it sets hold, the last one
-    first. `any_conflicts`: whether something was to be chosen; `left`: what had no choice."""
+    """A merge to be stored: the update, and the authors of the values that it sets, the last one
+    first. `any_conflicts`: there were conflicts; `left`: the conflicts without a choice."""
 
     update: bytes
     authors: tuple[str, ...]
@@ -80,9 +80,9 @@ class MadeMerge(msgspec.Struct, frozen=True):
 
 
 class FoundMerge(msgspec.Struct, frozen=True):
-    """The update that merges, which is of use only when every conflict has a choice. `places`: the keys
-    that it sets. `problems`: those that come with it. `did`: what each side did since they were one.
-    `umrf`: the text of what comes of it, with the identities of its actions."""
+    """The result of a merge. `update`: usable only if every conflict has a choice. `places`: the
+    keys that it sets. `problems`: those that are new. `did`: what each side did since they were
+    equal. `umrf`: the resulting text, with the keys of its actions."""
 
     update: bytes
     places: tuple[Place, ...]
@@ -108,7 +108,8 @@ def merging_since(
 
 
 class WrittenPreview(msgspec.Struct, frozen=True):
-    """The parts of a merge preview, each as JSON; and the authors of the merged changes, the last one first."""
+    """The parts of a merge preview, each as JSON, and the authors of the merged changes, the last
+    one first."""
 
     changes: bytes
     conflicts: bytes
@@ -152,7 +153,7 @@ def made_merge(
     choices: Mapping[str, DraftSide],
     inside: Inside,
 ) -> MadeMerge:
-    """Make a merge, with what is needed to store it. See `merging_since`."""
+    """Compute a merge with all that is needed to store it. See `merging_since`."""
     found = merging_since(connection, base, origin, draft, into, choices, inside)
     left = [conflict for conflict in found.conflicts if conflict.place not in choices]
     unmade = UnmadeChoices(
@@ -168,7 +169,7 @@ def made_merge(
 def authors_of(
     connection: Connection, source: GraphAtSeq, places: Collection[Place]
 ) -> tuple[str, ...]:
-    """Return whose changes these keys of a graph hold, the last one first."""
+    """Return the authors of the present values of these keys, the last one first."""
     wanted = frozenset(places)
     owners = {owner_of(*place) for place in wanted}
     last = index_queries.latest(connection, source.graph, source.seq, owners)
@@ -181,7 +182,7 @@ def authors_of(
 def apart_since(
     connection: Connection, base: DraftBase, origin: GraphAtSeq, draft: GraphAtSeq
 ) -> tuple[int, int]:
-    """Return how many things the origin and the draft changed since they were one."""
+    """Return how many things the origin and the draft each changed since they were equal."""
     did = apart(index_queries.at(connection, base.graph, base.seq), origin, draft)
     return count(did["origin"]), count(did["draft"])
 
@@ -194,8 +195,8 @@ def merging(
     choices: Mapping[str, DraftSide],
     inside: Inside = NOTHING_INSIDE,
 ) -> FoundMerge:
-    """Merge one side of a draft into the side `into`. `base`: the changes that gave each key the value that it
-    had when both sides were last equal. `inside`: the graphs inside of either side."""
+    """Merge the other side of a draft into the side `into`. `base`: the changes that made up the
+    state in which both sides were last equal. `inside`: the graphs inside of either side."""
     was = maps_of(state_of(base))
     sides: dict[DraftSide, GraphAtSeq] = {"origin": origin, "draft": draft}
     ours, theirs = sides[into], sides[_other(into)]
@@ -238,7 +239,7 @@ def count(changes: Changes) -> int:
 
 
 class _Teller:
-    """Says what conflicts are about."""
+    """Describes conflicts in words."""
 
     def __init__(self, base: Maps, sides: Mapping[DraftSide, Maps], into: DraftSide) -> None:
         self._base = _places(base)
@@ -261,7 +262,7 @@ class _Teller:
         return self._name(owner) if is_aid(owner) else "the note" if owner else "the graph"
 
     def told(self, conflict: FoundConflict) -> DraftConflict:
-        """A conflict in words, with what each side did."""
+        """Return a conflict in words, with the changes of each side."""
         label, key = self.label(conflict.owner), conflict.key
         if key is None:
             tell, what = self._thing, label
@@ -292,7 +293,7 @@ class _Teller:
         return shortened(Difference(0, 0, (), actions, relations), {owner})
 
     def _key(self, conflict: FoundConflict, side: DraftSide) -> Changes:
-        """The value that a side gave a key."""
+        """Return the change of one side to the key of a conflict."""
         place = conflict.key or ("meta", "")
         owner, ends = conflict.owner, ends_of(conflict.owner)
         before, after = self._base.get(place), self._sides[side].get(place)
@@ -349,7 +350,7 @@ def _named(side: Side, into: DraftSide) -> DraftSide:
 
 
 def _places(maps: Maps) -> dict[Place, Any]:
-    """The keys that a merge looks at: what people said is none of them."""
+    """Return the keys and values that a merge considers: all but comments."""
     return {
         (root, key): value
         for root in ROOTS

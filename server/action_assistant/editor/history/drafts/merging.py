@@ -34,8 +34,8 @@ _ENDS: Final = frozenset({ENTRY, EXIT})
 
 
 class FoundConflict(msgspec.Struct, frozen=True):
-    """A conflict: both sides changed a key (`key`), or the side `removed` removed what the other side changed.
-    `place` is the name by which a choice refers to it."""
+    """A conflict: both sides changed the key `key`, or the side `removed` removed a thing that the
+    other side changed. `place`: the key by which a choice names it."""
 
     place: str
     owner: str
@@ -58,7 +58,7 @@ def merged(base: Places, ours: Places, theirs: Places, choices: Choices) -> KeyM
 
 
 def _plain(places: Places) -> dict[Place, Any]:
-    """Return the values without comments, which stay where they were written, and without empty ones."""
+    """Return the values that are not None, without comments, which are not merged."""
     return {p: value for p, value in places.items() if p[0] != "comments" and value is not None}
 
 
@@ -133,7 +133,7 @@ class _Merge:
             self._whole[owner] = self._choices.get(place, "ours")
 
     def _is_used(self, action: str, side: Side) -> bool:
-        """Tell whether a side changed an action or an arrow of it."""
+        """Return whether a side changed an action or one of its arrows."""
         return self._is_changed(action, side) or any(
             self._is_changed(arrow, side)
             for arrow in self._arrows.get(action, ())
@@ -150,8 +150,8 @@ class _Merge:
         )
 
     def _take_along(self, actions: Iterable[str]) -> None:
-        """The arrows of an action that one side removed are those of the side that counts; first of
-        those that stay."""
+        """Take the arrows of an action that one side removed from the side that was chosen for the
+        action; actions that stay come first."""
         whole = {action: self._whole[action] for action in actions if action in self._whole}
         stays = {action for action, side in whole.items() if action in self._there[side]}
         for action in sorted(whole, key=lambda each: (each not in stays, each)):
@@ -179,7 +179,8 @@ class _Merge:
         return self._choices.get(name, "ours")
 
     def _join(self, place: Place) -> None:
-        """An order of names: ours, without what they removed, and what they added at its end."""
+        """Merge an ordered list of names: our list, without the names that they removed, and with
+        the names that they added at its end."""
         values = [side.get(place, UNSET) for side in (self._base, *self._sides.values())]
         if (side := chosen(*values)) is not None:
             self._take([place], side)
@@ -204,7 +205,8 @@ class _Merge:
     # --- arrows without ends -----------------------------------------------------------------------
 
     def _drop(self, arrows: Iterable[str]) -> None:
-        """No arrow comes to be without its ends; what was like that on our side is left alone."""
+        """Remove arrows that would have lost an end by the merge; arrows without an end that our
+        side had before stay."""
         alive = exist(self._result) | _ENDS
         ours, there = self._sides["ours"], self._there["ours"]
         for arrow in arrows:
