@@ -239,7 +239,7 @@ def count(changes: Changes) -> int:
 
 
 class _Teller:
-    """Describes conflicts in words."""
+    """Describes the conflicts of a merge in words."""
 
     def __init__(self, base: Maps, sides: Mapping[DraftSide, Maps], into: DraftSide) -> None:
         self._base = _places(base)
