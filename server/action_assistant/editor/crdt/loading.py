@@ -75,8 +75,8 @@ class LogTail:
         return _columns(slices) if slices else None
 
     async def sound(self) -> int:
-        """Check the chain of hashes of the events that `next` returned last. Return how many of them, from the
-        first one on, are as they were written; where some are not, the tail ends there."""
+        """Check the chain of the events that `next` returned last. Return how many of them, counted
+        from the first, are undamaged. At a damaged event the tail ends."""
         slices, self._unchecked = self._unchecked, []
         good = await asyncio.to_thread(_linked, self._chain or START, self._stream, slices)
         if good < sum(len(each.seqs) for each in slices):
@@ -101,8 +101,8 @@ class LogTail:
         return self._in_place(rows[: self._good(rows)])
 
     def _good(self, rows: Sequence[Sequence[Any]]) -> int:
-        """Count the rows before the first one that has a wrong type or a wrong number, and note that one as
-        damage."""
+        """Return the number of rows before the first one with a wrong type or seq, and record that
+        row as damage."""
         for n, row in enumerate(rows):
             if tuple(map(type, row)) != _TYPES:
                 self._stop("it holds values of the wrong kind", n)
@@ -124,8 +124,8 @@ class LogTail:
         return await self._one_by_one()
 
     async def _one_by_one(self) -> Sequence[Sequence[Any]]:
-        """A row that the database cannot even give out: those before it. Raises Unavailable when
-        that may be for another reason."""
+        """Return the rows before a row that the database cannot read. Raise Unavailable if the
+        failure may have another cause."""
         if self.seq:
             await self._ask(self.seq - 1, 1)
         found: list[Sequence[Any]] = []
@@ -172,7 +172,7 @@ def _columns(slices: Sequence[StoredColumns]) -> EventColumns:
 
 
 def _linked(chain: bytes, stream: str, slices: Sequence[StoredColumns]) -> int:
-    """Count the events, from the first one on, that continue the chain of hashes."""
+    """Return how many events, counted from the first, continue the chain."""
     count = 0
     for each in slices:
         good = _linked_of_one(chain, stream, each)

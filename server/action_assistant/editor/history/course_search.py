@@ -50,9 +50,9 @@ _SILENT: Final = frozenset({"description", "x/gui_attributes", "x", "in", "out"}
 
 
 class CourseParting(msgspec.Struct, frozen=True):
-    """The change `seq` from which on the course is another (`parts`), or the first one again. Before it
-    and after it the graph was simulated. `place`, `before`, `after`: the first step in which the two
-    courses differ, from 1, and the step that is taken in each, in words."""
+    """The change `seq` from which on the simulated course differs from the first one (`parts`), or
+    equals it again. `place`, `before`, `after`: the first step, from 1, in which the courses
+    before and after this change differ, and that step in each, in words."""
 
     seq: int
     author: str
@@ -65,9 +65,9 @@ class CourseParting(msgspec.Struct, frozen=True):
 
 
 class Followed(msgspec.Struct, frozen=True):
-    """The changes after which the course of a graph differs, in order of time. `same`: whether the course at
-    the end is that at the beginning. `exact`: whether every moment between was ruled out or simulated;
-    `looked`: the number of simulated moments."""
+    """The changes after which the course of a graph differs, in order of time. `same`: the last
+    course equals the first. `exact`: every change between was simulated or cannot matter;
+    `looked`: the number of simulations."""
 
     same: bool
     exact: bool
@@ -100,9 +100,9 @@ def followed(
     budget_s: float = _BUDGET_S,
     inside: Inside = NOTHING_INSIDE,
 ) -> Followed:
-    """Find the changes after which the simulated course differs from the one before the first of them.
-    `changes`: in order of time. `base`: the value of each key before them. The names in `script` are those
-    after the change `named_at`. `inside`: the graphs inside, the same at every moment."""
+    """Find the changes after which the simulated course differs from the first one. `changes`: in
+    order of time. `base`: the value of each key before them. `named_at`: the change after which
+    actions had the names in `script`. `inside`: the graphs inside, the same for every change."""
     past = _Past(base, changes, script, named_at, graphs_of(inside))
     if not past.moments:
         return Followed(True, True, 1, ())
@@ -112,7 +112,8 @@ def followed(
 
 
 def _flips(past: "_Past", budget_s: float) -> tuple[list[tuple[int, int]], bool]:
-    """Neighbouring moments between which the verdict changes, and whether there can be no more."""
+    """Return neighbouring changes between which the course changes, and whether these are certainly
+    all."""
     last = len(past.moments)
     parts = last if last <= _EACH else _SAMPLES
     marks = sorted({last * n // parts for n in range(parts + 1)})
@@ -133,7 +134,8 @@ def _flips(past: "_Past", budget_s: float) -> tuple[list[tuple[int, int]], bool]
 
 
 def _narrowed(past: "_Past", left: int, right: int) -> tuple[int, int]:
-    """The neighbours between two moments of different verdicts at which it changes."""
+    """Return the two neighbours between `left` and `right`, whose courses differ, at which the
+    course changes."""
     verdict = past.is_same(left)
     while right - left > 1:
         middle = (left + right) // 2
@@ -145,7 +147,8 @@ def _narrowed(past: "_Past", left: int, right: int) -> tuple[int, int]:
 
 
 class _Past:
-    """Moments after changes that an engine can notice; the moment 0 is before all of them."""
+    """The states of a graph after each change that an engine can notice; number 0 is the state
+    before all of them."""
 
     def __init__(
         self,
@@ -165,15 +168,16 @@ class _Past:
 
     @property
     def looked(self) -> int:
-        """The number of moments that were simulated."""
+        """The number of states that were simulated."""
         return len(self._courses)
 
     def is_same(self, moment: int) -> bool:
-        """Tell whether the course of a moment is that of the first one."""
+        """Return whether the course of a state equals that of state 0."""
         return self._course(moment) == self._reference
 
     def parting(self, left: int, right: int) -> CourseParting:
-        """Describe how the courses of two neighbouring moments differ, as a fact about the later one."""
+        """Return how the courses of two neighbouring states differ, as a description of the later
+        change."""
         change = self.moments[right - 1]
         before, after = self._graph(left), self._graph(right)
         apart = departure(self._course(left), self._course(right))
@@ -210,7 +214,7 @@ class _Past:
 
 
 def _noticed(changes: Sequence[LoggedChange]) -> Iterator[LoggedChange]:
-    """One change of each event that an engine can notice."""
+    """Yield one change for each event that an engine can notice."""
     last = 0
     for change in changes:
         if change.seq != last and _is_noticed(change):

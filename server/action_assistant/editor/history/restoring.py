@@ -39,8 +39,8 @@ from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 
 class RevertedEdits(msgspec.Struct, frozen=True):
-    """The update that takes something back. `left`: of what not all was taken back, since others have
-    changed it or built on it: actions, arrows and notes as `owner_of` names them."""
+    """The update that reverts edits. `left`: the actions, arrows and notes, as `owner_of` names
+    them, that were not fully reverted, since others have changed or used them."""
 
     update: bytes
     left: tuple[str, ...]
@@ -71,20 +71,20 @@ def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, ow
 def reverting(
     state: bytes, changes: Sequence[LoggedChange], latest: Mapping[Place, int]
 ) -> RevertedEdits:
-    """Take back the changes of one person in a session, given in order of time. `latest`: the last change
-    of each key that anybody has changed since it began.
+    """Revert the changes of one person in a session, given in order of time. `latest`: the last
+    change by anybody of each key, since the session began.
 
-    A field that somebody has set since stays as it is; one that somebody else set in between becomes what
-    they made of it. What was made in that session goes only if nobody has changed it or led an arrow to
-    it since; where it stands does not matter.
+    A field that was set since stays; one that another person set during the session gets that
+    person's value. A thing made in the session is removed only if nobody has changed it or
+    connected an arrow to it since; its position does not matter.
     """
     session = _EditSession(changes, places_of(state), latest)
     return RevertedEdits(_setting(state, session.targets()), session.left())
 
 
 def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
-    """The update that makes an action, arrow or note what it was. `then`: the changes that gave each key
-    of the graph its value. An action that is not there any more comes back with its arrows."""
+    """Return the update that restores an action, arrow or note. `then`: the changes that made up
+    the graph at that time. A removed action comes back with its arrows."""
     now = places_of(state)
     owners = {owner}
     if ("actions", owner) not in now:
@@ -100,7 +100,7 @@ def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
 
 
 class _EditSession:
-    """The changes of one person by key, compared with the document now."""
+    """The changes of one person by key, compared with the present document."""
 
     def __init__(
         self,
@@ -150,7 +150,7 @@ class _EditSession:
         return place in self._last and self._is_untouched(place)
 
     def _is_untouched(self, place: Place) -> bool:
-        """Tell whether nobody has set a key since this person did."""
+        """Return whether a key still has the value that this person gave it last."""
         mine = self._last[place]
         return self._latest[place] == mine.seq and self._now.get(place) == unpacked(mine.after)
 
@@ -160,7 +160,7 @@ class _EditSession:
         return bool(proofs) and all(self._first.get(place, b"") is None for place in proofs)
 
     def _is_in_use(self, owner: str) -> bool:
-        """Tell whether others have changed a thing, or connected an arrow to it that stays."""
+        """Return whether others have changed a thing, or connected an arrow to it that stays."""
         own = [place for place in self._places[owner] if not is_place_of_card(place)]
         if any(place in self._latest and not self._is_mine(place) for place in own):
             return True
