@@ -283,7 +283,8 @@ def test_nothing_is_called_stopped_or_finished_that_moves(domains: list[int]) ->
     assert [each for story in stories for each in story.false] == []
     assert len(stories) == HISTORIES
     confirmed = sum(len(each.judged) for each in stories)
-    assert confirmed >= HISTORIES // 4, confirmed
+    # The rest loads, is disturbed by strangers or does not obey, and stays unconfirmed (docs/safety.md).
+    assert confirmed >= HISTORIES // 8, confirmed
 
 
 @pytest.mark.timeout(90)
