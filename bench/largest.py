@@ -1,7 +1,9 @@
 """Measure how long others' edits wait while the largest graph allowed is imported, and while each of its routes is called.
 
 An editor in a process of its own; somebody edits a small graph, 100 times a second, whether or not the edits
-before are acknowledged. `python largest.py` prints the tables; `PROBE_DATABASE` names a Postgres database.
+before are acknowledged. Seconds in which nothing else happens alternate with calls, so that both see the same machine.
+`python largest.py` prints the tables, `python largest.py WORD ...` the rows with one of these words in them;
+`PROBE_DATABASE` names a Postgres database, `PROBE_FOLDER` a folder whose graphs are kept for the next run.
 """
 
 import asyncio
@@ -13,8 +15,9 @@ import tempfile
 import time
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import httpx
 import uvloop
@@ -22,13 +25,15 @@ from load import edits_of
 from table import Table, show
 from yjs_socket import Person, Plan
 
+T = TypeVar("T")
+
 ROOT: Final = Path(__file__).resolve().parent.parent
 TOKEN: Final = "largest-graph-bench-token-0123456789"
 BEARER: Final = {"authorization": f"Bearer {TOKEN}"}
 EVERY_S: Final = 0.01  # between two edits
-LEAST_S: Final = 3.0  # for which a route is watched
-CALLS: Final = 3
-SETTLED_S: Final = 120.0  # after an import, at most
+LEAST_S: Final = 4.0  # for which a route is watched, and for which nothing else happens
+CALLS: Final = 4
+BESIDE_S: Final = 1.5  # without anything, before each call
 
 
 def largest(actions: int, arrows: int, seed: int = 1) -> bytes:
@@ -94,15 +99,27 @@ class Prober(Person):
             self.edit(before + b"%019d" % time.monotonic_ns() + after)
             self._pending.append((self.sent, due))
 
-    async def during(self, work: Callable[[], Awaitable[str]]) -> tuple[list[float], str]:
+    async def during(self, work: Awaitable[T]) -> tuple[list[float], T]:
         """The delays of the edits that were made while `work` went on, and what that returned."""
         self.delays = []
         begun = time.monotonic()
-        said = await work()
+        said = await work
         ended = time.monotonic()
         while self._pending and self._pending[0][1] <= ended:  # noqa: ASYNC110 - nobody tells
             await asyncio.sleep(0.01)
-        return sorted(delay for due, delay in self.delays if begun <= due <= ended), said
+        return [delay for due, delay in self.delays if begun <= due <= ended], said
+
+    async def compared(self, what: str, call: Callable[[], Awaitable[float]]) -> list[str]:
+        """One row: the delays while something is called again and again, and those between the calls."""
+        beside: list[float] = []
+        meanwhile: list[float] = []
+        times: list[float] = []
+        while len(times) < CALLS or sum(times) < LEAST_S:
+            beside += (await self.during(asyncio.sleep(BESIDE_S)))[0]
+            delays, took = await self.during(call())
+            meanwhile += delays
+            times.append(took)
+        return _row(what, meanwhile, beside, times)
 
 
 async def called(url: str, route: str, body: bytes | None = None, method: str = "") -> float:
@@ -130,32 +147,20 @@ async def called(url: str, route: str, body: bytes | None = None, method: str = 
     return float(took)
 
 
-async def _watched(url: str, route: str, body: bytes | None, method: str = "") -> str:
-    """Call a route some times."""
-    begun, times = time.monotonic(), []
-    while len(times) < CALLS or time.monotonic() - begun < LEAST_S:
-        times.append(await called(url, route, body, method))
-    return f"{sorted(times)[len(times) // 2]:.2f} s"
-
-
-async def _opened(plan: Plan, graph: str) -> str:
-    """Open the room of a graph, as a page does, some times."""
-    begun, times = time.monotonic(), []
-    while len(times) < CALLS or time.monotonic() - begun < LEAST_S:
-        # In another process: to take the document in would delay the edits of this one.
-        code = (
-            "import asyncio,sys,json\n"
-            f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
-            "from largest import join\n"
-            "print(asyncio.run(join(json.loads(sys.argv[1]), sys.argv[2])))"
-        )
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-c", code, json.dumps(plan), graph, stdout=asyncio.subprocess.PIPE
-        )
-        out, _ = await process.communicate()
-        times.append(float(out))
-        await asyncio.sleep(6.5)  # until the room is left alone, so that it is loaded again
-    return f"{sorted(times)[len(times) // 2]:.2f} s"
+async def _opened(plan: Plan, graph: str) -> float:
+    """Open the room of a graph, as a page does, and leave it; the seconds until the document was there."""
+    # In another process: to take the document in would delay the edits of this one.
+    code = (
+        "import asyncio,sys,json\n"
+        f"sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "from largest import join\n"
+        "print(asyncio.run(join(json.loads(sys.argv[1]), sys.argv[2])))"
+    )
+    process = await asyncio.create_subprocess_exec(
+        sys.executable, "-c", code, json.dumps(plan), graph, stdout=asyncio.subprocess.PIPE
+    )
+    out, _ = await process.communicate()
+    return float(out)
 
 
 async def join(plan: list[Any], graph: str) -> float:
@@ -172,13 +177,23 @@ async def join(plan: list[Any], graph: str) -> float:
     return took
 
 
-def _row(what: str, delays: list[float], idle: float, said: str) -> list[str]:
-    at = [delays[min(len(delays) - 1, int(len(delays) * share))] * 1e3 for share in (0.5, 0.99, 1)]
-    figures = [f"{each:.1f} ms" for each in at]
-    return [what, said, str(len(delays)), *figures, f"{at[1] - idle:+.1f} ms"]
+def _row(what: str, delays: list[float], beside: list[float], times: list[float]) -> list[str]:
+    idle, (middle, late, longest) = _ms_at(beside, 0.99)[0], _ms_at(delays, 0.5, 0.99, 1)
+    figures = [f"{each:.1f} ms" for each in (idle, middle, late, longest)]
+    took = f"{sorted(times)[len(times) // 2]:.2f} s"
+    load = f"{os.getloadavg()[0]:.1f}"
+    row = [what, took, str(len(delays)), *figures, f"{late - idle:+.1f} ms", load]
+    sys.stderr.write(f"{row}\n")
+    return row
 
 
-def routes_of(graph: str, first: str, seq: int) -> list[tuple[str, str, bytes | None]]:
+def _ms_at(delays: list[float], *shares: float) -> list[float]:
+    """The delays in ms that these shares of all delays do not exceed."""
+    delays = sorted(delays)
+    return [delays[min(len(delays) - 1, int(len(delays) * share))] * 1e3 for share in shares]
+
+
+def routes_of(graph: str, first: str, seq: int, draft: str) -> list[tuple[str, str, bytes | None]]:
     """The routes that take a graph, and which may take long with a large one: method, path, body."""
     g = f"/api/graphs/{graph}"
     extraction = json.dumps({"actions": [first], "name": "Part"}).encode()
@@ -202,7 +217,12 @@ def routes_of(graph: str, first: str, seq: int) -> list[tuple[str, str, bytes | 
         ("POST", f"{g}/extraction", extraction),
         ("POST", f"{g}/rehearsal", json.dumps({"script": {"behaviours": {}}}).encode()),
         ("GET", f"{g}/packages", None),
+        ("GET", f"{g}/packages.zip", None),
         ("GET", f"{g}/drafts", None),
+        ("POST", f"{g}/drafts", json.dumps({"name": f"another {time.time()}"}).encode()),
+        ("GET", f"/api/drafts/{draft}", None),
+        ("POST", f"/api/drafts/{draft}/preview", b"{}"),
+        ("POST", f"{g}/versions", json.dumps({"note": "one"}).encode()),
         ("GET", "/api/actions", None),
         ("GET", "/api/actions/graphs", None),
         ("PATCH", g, json.dumps({"name": "Largest"}).encode()),
@@ -242,8 +262,9 @@ async def measured(actions: int, arrows: int) -> list[list[str]]:
     """One row for each thing that was done with a graph of this size."""
     only = sys.argv[1:] if __name__ == "__main__" else []
     with tempfile.TemporaryDirectory() as name:
+        folder = Path(os.environ.get("PROBE_FOLDER", name))
         async with (
-            _editor(Path(name)) as (url, port, pid),
+            _editor(folder) as (url, port, pid),
             httpx.AsyncClient(base_url=url, headers=BEARER, trust_env=False, timeout=120) as http,
         ):
             small = (await http.post("/api/graphs", json={"name": "small"})).json()["id"]
@@ -264,57 +285,67 @@ async def measured(actions: int, arrows: int) -> list[list[str]]:
                 prober.ending = True
 
 
+async def _largest_there(http: httpx.AsyncClient) -> str:
+    """Return the id of the graph that was imported; an empty text where it was not."""
+    graphs = (await http.get("/api/graphs")).json()
+    return next((graph["id"] for graph in graphs if graph["name"] == "Largest"), "")
+
+
 async def _rows(
     prober: Prober, http: httpx.AsyncClient, url: str, plan: Plan, file: bytes, only: list[str]
 ) -> list[list[str]]:
-    async def nothing() -> str:
-        await asyncio.sleep(2 * LEAST_S)
-        return ""
-
-    delays, _ = await prober.during(nothing)
-    idle = delays[int(len(delays) * 0.99)] * 1e3
-    rows = [_row("nothing", delays, idle, "")]
-
-    async def bring() -> str:
-        return f"{await called(url, '/api/graphs', file):.2f} s"
-
-    delays, said = await prober.during(bring)
-    rows.append(_row(f"import of {len(file) / 1e6:.1f} MB", delays, idle, said))
-    sys.stderr.write(f"{rows[-1]}\n")
-    (graph,) = [g["id"] for g in (await http.get("/api/graphs")).json() if g["name"] == "Largest"]
-
-    async def settle() -> str:
-        begun = time.monotonic()
-        await asyncio.sleep(float(os.environ.get("PROBE_AFTER", "60")))
-        return f"{time.monotonic() - begun:.0f} s"
-
-    delays, said = await prober.during(settle)
-    rows.append(_row("after it", delays, idle, said))
-    sys.stderr.write(f"{rows[-1]}\n")
-    await http.patch(f"/api/graphs/{graph}", json={"description": "edited"})
-    await asyncio.sleep(7)
+    rows = []
+    graph = await _largest_there(http)
+    if not graph:
+        beside, _ = await prober.during(asyncio.sleep(LEAST_S))
+        delays, took = await prober.during(called(url, "/api/graphs", file))
+        rows = [_row(f"import of {len(file) / 1e6:.1f} MB", delays, beside, [took])]
+        after = float(os.environ.get("PROBE_AFTER", "30"))
+        delays, _ = await prober.during(asyncio.sleep(after))
+        rows.append(_row("after it", delays, beside, [after]))
+        graph = await _largest_there(http)
+        await http.patch(f"/api/graphs/{graph}", json={"description": "edited"})
+        await asyncio.sleep(7)
     seq = (await http.get(f"/api/graphs/{graph}")).json()["seq"]
     document = (await http.get(f"/api/graphs/{graph}/document?at={seq}")).json()
     first = next(key for key in document["actions"] if "|" not in key)
     del document
-    for method, path, body in routes_of(graph, first, seq):
-        shown = f"{method} {path.replace(graph, '{id}').replace(first, '{key}')}"
-        if only and not any(word in shown for word in only):
-            continue
-        delays, said = await prober.during(lambda: _watched(url, path, body, method))  # noqa: B023
-        rows.append(_row(shown, delays, idle, said))
-        sys.stderr.write(f"{rows[-1]}\n")
-    if not only or "open" in only:
-        delays, said = await prober.during(lambda: _opened(plan, graph))
-        rows.append(_row("opening it in a page", delays, idle, said))
-        sys.stderr.write(f"{rows[-1]}\n")
+    g = f"/api/graphs/{graph}"
+    draft = (await http.post(f"{g}/drafts", json={"name": f"draft {time.time()}"})).json()["id"]
+    await http.patch(f"/api/graphs/{draft}", json={"description": "of the draft"})
+    for method, path, body in routes_of(graph, first, seq, draft):
+        shown = f"{method} {path}"
+        for found, word in ((graph, "{id}"), (first, "{key}"), (draft, "{draft}")):
+            shown = shown.replace(found, word)
+        if not only or any(word in shown for word in only):
+            rows.append(await prober.compared(shown, partial(called, url, path, body, method)))
+
+    async def edited() -> float:
+        """Edit the graph, and read it at once: nothing is remembered of it as it is then."""
+        name = {"description": f"at {time.monotonic()}"}
+        patched = await called(url, g, json.dumps(name).encode(), "PATCH")
+        return patched + await called(url, f"{g}/umrf")
+
+    async def opened() -> float:
+        took = await _opened(plan, graph)
+        await asyncio.sleep(6.5)  # until the room is left alone, so that it is loaded again
+        return took
+
+    for shown, call in (("edit, then GET umrf", edited), ("open in a page", opened)):
+        if not only or any(word in shown for word in only):
+            rows.append(await prober.compared(shown, call))
     return rows
+
+
+_COLUMNS: Final = (
+    "meanwhile", "took", "edits", "idle p99", "p50", "p99", "longest", "p99 over idle", "load",
+)  # fmt: skip
 
 
 def tables() -> Iterator[Table]:
     """The delays with the largest graph."""
     rows = uvloop.run(measured(5_000, 20_000))
-    yield Table(["meanwhile", "took", "edits", "p50", "p99", "longest", "p99 over idle"], rows)
+    yield Table([*_COLUMNS], rows)
 
 
 if __name__ == "__main__":

@@ -1,15 +1,22 @@
 """What is special about the journal on SQLite."""
 
+import asyncio
 import os
 import shutil
 import sqlite3
+import threading
+from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from action_assistant.errors import CannotStart, Unavailable
+from action_assistant.journal import sqlite
 from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.sqlite import Sqlite
+from journal.crashes import Disk, Driver
 
 DRAFT = Draft("thing.happened.v1", "ada", b"x")
 
@@ -100,3 +107,65 @@ async def test_a_closed_journal_is_one_file(tmp_path: Path) -> None:
     copy = await opened(tmp_path / "copy.db")
     assert await copy.newest("a") == 1
     await copy.close()
+
+
+async def until(is_so: Callable[[], bool]) -> None:
+    async with asyncio.timeout(30):
+        while not is_so():  # noqa: ASYNC110 - a thread does it
+            await asyncio.sleep(0.01)
+
+
+class _FileWrites(Disk):
+    """A disk that notes which threads write to the database file itself, beside its log."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.by: Counter[str] = Counter()
+        self.log_size = 0
+
+    def note(self, what: str, file: str, offset: int = 0, data: bytes = b"") -> None:
+        if file.endswith("-wal"):
+            self.log_size = max(self.log_size, offset + len(data))
+        elif what in {"write", "sync"}:
+            self.by[threading.current_thread().name] += 1
+
+
+async def test_no_commit_copies_the_log_into_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sqlite, "_SOONEST_S", 0.01)
+    monkeypatch.setattr(sqlite, "_LATEST_S", 0.01)
+    disk = _FileWrites()
+    path = tmp_path / "editor.db"
+    journal = await Journal.on(Sqlite(path, driver=Driver(disk)), branch="editor", fold=nothing)
+    body, copies = bytes(5_000_000), "editor.db checkpoints"
+    disk.by.clear()
+    for n in range(1, 5):  # SQLite would copy its log after each of them
+        await journal.append("a", [Draft("big.v1", "ada", body)])
+        await journal.derive(lambda connection: connection.exec_driver_sql("SELECT 1"))
+        await until(lambda: path.stat().st_size > n * len(body))  # noqa: B023
+    assert set(disk.by) == {copies}
+    assert disk.log_size < 15_000_000  # it begins anew when all of it was copied
+    await journal.close()
+
+
+async def test_the_log_that_a_long_reader_keeps_is_copied_once_it_has_gone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sqlite, "_SOONEST_S", 0.01)
+    monkeypatch.setattr(sqlite, "_LATEST_S", 0.01)
+    path = tmp_path / "editor.db"
+    journal = await opened(path)
+    await journal.append("a", [DRAFT])
+    reader = sqlite3.connect(path, isolation_level=None)
+    reader.execute("BEGIN")
+    assert reader.execute("SELECT count(*) FROM event").fetchone() == (1,)
+    for _ in range(10):
+        await journal.append("a", [Draft("big.v1", "ada", bytes(100_000))])
+    await asyncio.sleep(0.1)
+    assert path.stat().st_size < 1_000_000
+    reader.execute("ROLLBACK")
+    reader.close()
+    await journal.append("a", [DRAFT])
+    await until(lambda: path.stat().st_size > 1_000_000)
+    await journal.close()

@@ -1,9 +1,12 @@
 """A journal in one SQLite file: WAL, every commit on the disk before anyone hears of it."""
 
 import asyncio
+import logging
 import os
 import shutil
 import sqlite3
+import threading
+import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
@@ -32,11 +35,18 @@ from action_assistant.journal.migrate import recognize, upgrade_to
 from action_assistant.journal.removal import taken_out
 from action_assistant.private_files import opener
 
+log: Final = logging.getLogger(__name__)
+
 T = TypeVar("T")
 
 _READERS: Final = 3  # threads, each with a connection
 _WAIT: Final = 5.0  # seconds for a lock that only a foreign process could hold
 _PRAGMAS: Final = ("journal_mode=WAL", "synchronous=FULL", "foreign_keys=ON")
+_PAGES: Final = 1000  # of the write-ahead log that a checkpoint is to copy at once
+_MOST_PAGES: Final = 16_384  # in the log, beyond which commits copy it themselves
+_SOONEST_S: Final = 0.5  # between two checkpoints
+_LATEST_S: Final = 10.0
+_ROUNDS: Final = 3  # of one checkpoint, as long as commits go on meanwhile
 _PAGE: Final = 500
 _INSERT: Final = "INSERT INTO event (stream, seq, kind, author, at, body, position, chain) VALUES "
 #: Ends of streams follow their events by themselves. So what is usually stored is one statement, which is
@@ -59,6 +69,7 @@ class SqliteSession:
     """The connection that writes to a SQLite file."""
 
     def __init__(self, path: Path, driver: Any) -> None:
+        self._checkpoints = Checkpoints(path, driver)
         self._engine = create_engine(
             f"sqlite:///{path}",
             module=driver,
@@ -75,6 +86,7 @@ class SqliteSession:
             # After a failed fsync the log file may hold what the disk does not: begin a new one.
             if raw.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[0]:
                 raise sqlite3.OperationalError("somebody reads the database without end")
+            raw.execute(f"PRAGMA wal_autocheckpoint={_MOST_PAGES}")
             raw.execute(_ENDS)
         except BaseException:
             self.close()
@@ -95,6 +107,8 @@ class SqliteSession:
     def say(self, command: str) -> None:
         """Execute a command without a result."""
         self._raw.execute(command)
+        if command == "COMMIT":
+            self._checkpoints.committed()
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
         """Write events; the ends of their streams follow."""
@@ -110,14 +124,78 @@ class SqliteSession:
             self._raw.execute(_insert_of(len(some)), list(chain(*some)))
         if alone:
             self._raw.execute("COMMIT")
+        if not self._raw.in_transaction:
+            self._checkpoints.committed()
 
     def close(self) -> None:
         """Close the connection; an uncommitted transaction is rolled back."""
+        self._checkpoints.close()
         try:
             self.connection.close()
         except (sqlite3.Error, DatabaseError):
             self.connection.invalidate()  # a broken file may refuse even the roll-back
         self._engine.dispose()
+
+
+class Checkpoints:
+    """Copies the write-ahead log of a SQLite file into the file, on a thread with a connection of its own.
+
+    A commit that does it itself, as SQLite has it, waits for two more syncs of the disk and for all pages since the
+    last time. A passive checkpoint holds up no commit. What a commit promises does not depend on it: its pages are
+    in the log, which was synced.
+    """
+
+    def __init__(self, path: Path, driver: Any) -> None:
+        self._path = path
+        self._driver = driver
+        self._due = threading.Event()  # something was committed since the last checkpoint
+        self._closed = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def committed(self) -> None:
+        """Note that something was committed. Returns at once."""
+        if self._due.is_set():
+            return
+        self._due.set()
+        if self._thread is None:
+            name = f"{self._path.name} checkpoints"
+            self._thread = threading.Thread(target=self._run, name=name, daemon=True)
+            self._thread.start()
+
+    def close(self) -> None:
+        """Finish the checkpoint that is under way, and make no more."""
+        self._closed.set()
+        self._due.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        engine = _reading(self._path, self._driver)
+        pause, ended = _SOONEST_S, time.monotonic()
+        try:
+            while self._due.wait() and not self._closed.wait(pause):
+                self._due.clear()
+                pages = self._copied(engine)
+                rate = pages / (time.monotonic() - ended)
+                pause = min(max(_PAGES / max(rate, 1.0), _SOONEST_S), _LATEST_S)
+                ended = time.monotonic()
+        finally:
+            engine.dispose()
+
+    def _copied(self, engine: Engine) -> int:
+        """Copy the log, again where commits came meanwhile: once all of it is there the next commit begins it anew.
+        Return the number of pages in it."""
+        pages = 0
+        try:
+            with engine.connect() as connection:
+                for _ in range(_ROUNDS):
+                    done = connection.exec_driver_sql("PRAGMA wal_checkpoint(PASSIVE)").one()
+                    pages = max(pages, done[1])
+                    if done[1] == done[2]:
+                        break
+        except Sqlite.faults as error:  # the log keeps everything, and a later checkpoint copies it
+            log.warning("%s: its log is not copied: %s", self._path, cause_of(error))
+        return pages
 
 
 @lru_cache(_ROWS)
