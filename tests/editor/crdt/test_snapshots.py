@@ -2,6 +2,7 @@
 
 import hashlib
 import sqlite3
+import zlib
 from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
@@ -166,4 +167,53 @@ async def test_who_waits_for_something_is_still_its_author_after_a_snapshot(
         with pytest.raises(BadInput, match="somebody else"):
             await room.submit(first, "eve")
     await rooms.close()
+    await journal.close()
+
+
+async def test_the_snapshot_of_a_large_document_is_stored_packed(tmp_path: Path) -> None:
+    path = tmp_path / "editor.db"
+    journal = await Journal.open(f"sqlite:///{path}", branch="editor", fold=nothing)
+    doc: Doc[Any] = Doc()
+    notes = doc.get("notes", type=Map)
+    with doc.transaction():
+        for n in range(16_000):
+            notes[f"note {n}"] = f"The value of note {n} is written out here, to be long enough."
+    rooms = Rooms(journal, linger=60, window=0)
+    async with rooms.enter("graph/g") as room:
+        await room.submit(doc.get_update(), "ada")
+    await rooms.close()
+    snapshot = await journal.snapshot("graph/g")
+    assert snapshot is not None
+    assert snapshot.seq == 1
+    assert len(doc.get_update()) > 1 << 20
+    assert len(snapshot.state) < len(doc.get_update()) // 3
+    packed = await load(journal, "graph/g")
+    await journal.keep_snapshot(
+        "graph/g", 1, zlib.decompress(snapshot.state)
+    )  # of an older version
+    plain = await load(journal, "graph/g")
+    await journal.close()
+    for found in (packed, plain):
+        assert (found.seq, found.kept) == (1, 1)
+        assert found.replica.doc.get_state() == doc.get_state()
+        assert found.replica.doc.get("notes", type=Map).to_py() == notes.to_py()
+        assert found.replica.owners == {doc.client_id: "ada"}
+
+
+async def test_a_packed_snapshot_that_is_damaged_makes_no_difference(tmp_path: Path) -> None:
+    journal = await Journal.open(
+        f"sqlite:///{tmp_path / 'editor.db'}", branch="editor", fold=nothing
+    )
+    doc: Doc[Any] = Doc()
+    doc.get("notes", type=Map)["a"] = "b"
+    rooms = Rooms(journal, linger=60, window=0)
+    async with rooms.enter("graph/g") as room:
+        await room.submit(doc.get_update(), "ada")
+    await rooms.close()
+    whole = zlib.compress(b"what is no snapshot", level=1)
+    for state in (whole, whole[:-1], whole[:5] + bytes(9)):
+        await journal.keep_snapshot("graph/g", 1, state)
+        found = await load(journal, "graph/g")
+        assert (found.seq, found.kept) == (1, 0)
+        assert found.replica.doc.get("notes", type=Map).to_py() == {"a": "b"}
     await journal.close()

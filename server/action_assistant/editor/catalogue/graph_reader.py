@@ -4,6 +4,7 @@ from collections.abc import Callable
 from typing import Any, Final, TypeVar
 
 from action_assistant.editor.crdt.loading import stored
+from action_assistant.editor.crdt.messages import NOTHING_NEW
 from action_assistant.editor.crdt.replica import ReplicaState
 from action_assistant.editor.documents.contents import GraphAtSeq
 from action_assistant.editor.log.graph_events import graph_stream
@@ -74,7 +75,8 @@ class GraphReader:
         found = await stored(
             self._journal, graph_stream(graph), seq, learn=False, run_in_worker=self._run_in_worker
         )
-        sight = GraphAtSeq(graph, found.seq, ReplicaState.state_of(found.document))
+        kept = await ReplicaState.read_aside(found.document)
+        sight = GraphAtSeq(graph, found.seq, NOTHING_NEW if kept is None else kept.state)
         return self._moments.put((graph, seq), sight)
 
     async def moment(self, graph: str, seq: int | None) -> GraphAtSeq:

@@ -246,7 +246,7 @@ async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None
     between. Return an empty replica for empty bytes, None if the bytes are no snapshot."""
     if not document:
         return Replica()
-    kept = ReplicaState.read(document)
+    kept = await ReplicaState.read_aside(document)
     if kept is None:
         return None
     replica = Replica()
@@ -287,7 +287,7 @@ async def stored(
         found = await _followed(
             journal, stream, snapshot, upto, learn=learn, run_in_worker=run_in_worker
         )
-        if ReplicaState.is_form_of(found.document):
+        if await ReplicaState.read_aside(found.document) is not None:
             return found
     return await _followed(journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker)
 
@@ -326,7 +326,7 @@ async def _folded(
     before its hash was checked; a worker may begin earlier, and its result is thrown away if a
     hash does not match: the events before that one are then folded again. Return None if `fold`
     returns None."""
-    if run_in_worker is run_here or len(document) + events.size <= _SMALL:
+    if run_in_worker is run_here or _is_small(document, events):
         return _fold(document, events.part(0, await tail.sound()), learn)
     folding = asyncio.ensure_future(_folded_aside(document, events, learn, run_in_worker))
     folding.add_done_callback(_heard)
@@ -338,9 +338,14 @@ async def _folded(
     finally:
         folding.cancel()
     some = events.part(0, good)
-    if not good or len(document) + some.size <= _SMALL:
+    if not good or _is_small(document, some):
         return _fold(document, some, learn)
     return await _folded_aside(document, some, learn, run_in_worker)
+
+
+def _is_small(document: bytes, events: EventColumns) -> bool:
+    """Tell whether a snapshot and events are folded within milliseconds. A packed snapshot is large."""
+    return not ReplicaState.is_packed(document) and len(document) + events.size <= _SMALL
 
 
 def _heard(folding: "asyncio.Future[Folded | None]") -> None:

@@ -3,6 +3,7 @@
 import asyncio
 import logging
 import time
+import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from enum import Enum
@@ -39,6 +40,10 @@ log: Final = logging.getLogger(__name__)
 WAITING_BYTES: Final = 4 << 20  # of one author, for something that may never come
 WAITING_UPDATES: Final = 256
 _KEPT_BYTES: Final = 256 * 1024
+_LARGE: Final = 1 << 20  # bytes, from which on it is stored packed
+_ZLIB: Final = (
+    b"\x78"  # the first byte of a packed snapshot; one that is not packed begins with an array
+)
 
 
 class UpdateEffect(Enum):
@@ -457,11 +462,6 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
         return replica
 
     @classmethod
-    def is_form_of(cls, kept: bytes) -> bool:
-        """Tell whether these bytes are a snapshot of ours."""
-        return cls.read(kept) is not None
-
-    @classmethod
     def state_of(cls, kept: bytes) -> bytes:
         """Return the document of a snapshot as one update; an empty update if the bytes are no
         snapshot."""
@@ -470,8 +470,27 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @classmethod
     def read(cls, kept: bytes) -> "ReplicaState | None":
-        """Decode a snapshot; return None if the bytes are no snapshot."""
+        """Decode a snapshot, packed or not; return None if the bytes are no snapshot."""
         try:
-            return msgspec.msgpack.decode(kept, type=cls)
-        except (msgspec.DecodeError, UnicodeDecodeError):
+            plain = zlib.decompress(kept) if cls.is_packed(kept) else kept
+            return msgspec.msgpack.decode(plain, type=cls)
+        except (zlib.error, msgspec.DecodeError, UnicodeDecodeError):
             return None
+
+    @staticmethod
+    async def packed_aside(kept: bytes) -> bytes:
+        """Compress a large snapshot to about a tenth: all edits wait for as long as the writer stores it. A thread
+        does it, since compressing needs no interpreter lock."""
+        if len(kept) < _LARGE:
+            return kept
+        return await asyncio.to_thread(zlib.compress, kept, 1)
+
+    @staticmethod
+    def is_packed(kept: bytes) -> bool:
+        """Tell whether these bytes are those of a packed snapshot."""
+        return kept[:1] == _ZLIB
+
+    @classmethod
+    async def read_aside(cls, kept: bytes) -> "ReplicaState | None":
+        """Decode a snapshot as `read` does, a packed one on a thread, so that the event loop goes on."""
+        return await asyncio.to_thread(cls.read, kept) if cls.is_packed(kept) else cls.read(kept)

@@ -71,7 +71,8 @@ class RoomSnapshots:
     async def _store(self, seq: int, state: bytes) -> None:
         begin_room_task(self._stream)
         try:
-            await self._journal.keep_snapshot(self._stream, seq, state)
+            packed = await ReplicaState.packed_aside(state)
+            await self._journal.keep_snapshot(self._stream, seq, packed)
         except Refused as error:
             log.warning("%s: no snapshot: %s", self._stream, error.detail)
 
