@@ -1,5 +1,6 @@
 """The OpenAPI of both processes: whole, and the one that the page's types come from."""
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,14 @@ def operations(found: dict[str, dict[str, Any]]) -> Iterator[tuple[str, str, dic
 def test_the_page_has_its_types_from_these_documents(tmp_path: Path) -> None:
     kept = {path.name: path.read_text() for path in KEPT.glob("*.openapi.json")}
     assert kept == texts(tmp_path), "`make types` renews them"
+
+
+def test_every_operation_has_an_id_of_its_own(found: dict[str, dict[str, Any]]) -> None:
+    for name, document in found.items():
+        ids = [operation["operationId"] for _, _, operation in operations({name: document})]
+        assert len(ids) == len(set(ids))
+        # Litestar makes up ids that begin with a capital letter.
+        assert [each for each in ids if not re.fullmatch("[a-z]+([A-Z][a-z]*)*", each)] == []
 
 
 def test_every_route_says_what_it_takes(found: dict[str, dict[str, Any]]) -> None:

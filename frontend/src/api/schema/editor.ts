@@ -1712,3 +1712,1412 @@ export interface EditorApi {
         column?: number;
     };
 }
+
+export interface EditorPaths {
+    "/api/session": {
+        get: EditorOperations["getSession"];
+        post: EditorOperations["signIn"];
+        delete: EditorOperations["signOut"];
+    };
+    "/api/session/invitation": {
+        post: EditorOperations["lookAtInvitation"];
+    };
+    "/api/invitations": {
+        get: EditorOperations["listInvitations"];
+        post: EditorOperations["invite"];
+    };
+    "/api/invitations/{invitation}/revoke": {
+        post: EditorOperations["revokeInvitation"];
+    };
+    "/api/invitations/{invitation}/qr": {
+        get: EditorOperations["getInvitationCode"];
+    };
+    "/api/sessions": {
+        get: EditorOperations["listSessions"];
+    };
+    "/api/sessions/{session}/end": {
+        post: EditorOperations["endSession"];
+    };
+    "/api/config": {
+        get: EditorOperations["getConfig"];
+    };
+    "/api/people": {
+        get: EditorOperations["listPeople"];
+    };
+    "/api/examples": {
+        get: EditorOperations["listExamples"];
+    };
+    "/api/events": {
+        get: EditorOperations["followEvents"];
+    };
+    "/api/graphs": {
+        get: EditorOperations["listGraphs"];
+        post: EditorOperations["createGraph"];
+    };
+    "/api/graphs/{graph_id}": {
+        get: EditorOperations["getGraph"];
+        delete: EditorOperations["deleteGraph"];
+        patch: EditorOperations["describeGraph"];
+    };
+    "/api/graphs/{graph_id}/recover": {
+        post: EditorOperations["recoverGraph"];
+    };
+    "/api/graphs/{graph_id}/umrf": {
+        get: EditorOperations["getUmrf"];
+        put: EditorOperations["putUmrf"];
+    };
+    "/api/graphs/{graph_id}/problems": {
+        get: EditorOperations["getProblems"];
+    };
+    "/api/graphs/{graph_id}/rewriting": {
+        post: EditorOperations["getRewriting"];
+    };
+    "/api/graphs/{graph_id}/history": {
+        get: EditorOperations["getHistory"];
+    };
+    "/api/graphs/{graph_id}/document": {
+        get: EditorOperations["getDocument"];
+    };
+    "/api/graphs/{graph_id}/changes": {
+        get: EditorOperations["getChanges"];
+    };
+    "/api/graphs/{graph_id}/diff": {
+        get: EditorOperations["getDifference"];
+    };
+    "/api/graphs/{graph_id}/blame": {
+        get: EditorOperations["getBlame"];
+    };
+    "/api/graphs/{graph_id}/blame/values": {
+        get: EditorOperations["getValues"];
+    };
+    "/api/graphs/{graph_id}/since": {
+        post: EditorOperations["getSince"];
+    };
+    "/api/graphs/{graph_id}/restore": {
+        post: EditorOperations["restoreGraph"];
+    };
+    "/api/graphs/{graph_id}/revert": {
+        post: EditorOperations["revertGraph"];
+    };
+    "/api/graphs/{graph_id}/versions": {
+        get: EditorOperations["listVersions"];
+        post: EditorOperations["publishVersion"];
+    };
+    "/api/graphs/{graph_id}/subgraphs": {
+        get: EditorOperations["getSubgraphs"];
+        post: EditorOperations["makeSubGraph"];
+    };
+    "/api/graphs/{graph_id}/subgraphs.zip": {
+        get: EditorOperations["downloadSubgraphs"];
+    };
+    "/api/versions/{version_id}": {
+        get: EditorOperations["getVersion"];
+    };
+    "/api/graphs/{graph_id}/flat": {
+        get: EditorOperations["getFlatGraph"];
+        post: EditorOperations["makeFlatGraph"];
+    };
+    "/api/graphs/{graph_id}/extraction": {
+        post: EditorOperations["lookAtExtraction"];
+    };
+    "/api/graphs/{graph_id}/unpacking": {
+        post: EditorOperations["lookAtUnpacking"];
+    };
+    "/api/graphs/{graph_id}/uses": {
+        post: EditorOperations["callUses"];
+    };
+    "/api/graphs/{graph_id}/drafts": {
+        get: EditorOperations["listDrafts"];
+        post: EditorOperations["makeDraft"];
+    };
+    "/api/drafts/{draft_id}": {
+        get: EditorOperations["getDraft"];
+    };
+    "/api/drafts/{draft_id}/proposal": {
+        post: EditorOperations["proposeDraft"];
+        delete: EditorOperations["withdrawProposal"];
+    };
+    "/api/drafts/{draft_id}/answers": {
+        post: EditorOperations["answerProposal"];
+    };
+    "/api/drafts/{draft_id}/preview": {
+        post: EditorOperations["previewMerge"];
+    };
+    "/api/drafts/{draft_id}/merge": {
+        post: EditorOperations["mergeDraft"];
+    };
+    "/api/pieces": {
+        post: EditorOperations["readPieces"];
+    };
+    "/api/graphs/{graph_id}/rehearsal": {
+        post: EditorOperations["rehearse"];
+    };
+    "/api/graphs/{graph_id}/packages": {
+        get: EditorOperations["listPackages"];
+    };
+    "/api/graphs/{graph_id}/packages/{package}": {
+        get: EditorOperations["getPackage"];
+    };
+    "/api/graphs/{graph_id}/packages.zip": {
+        get: EditorOperations["downloadPackages"];
+    };
+    "/api/actions": {
+        get: EditorOperations["listActions"];
+        post: EditorOperations["createAction"];
+    };
+    "/api/actions/graphs": {
+        get: EditorOperations["listGraphsAsActions"];
+    };
+    "/api/actions/deleted": {
+        get: EditorOperations["listDeletedActions"];
+    };
+    "/api/actions/{action_id}/umrf": {
+        get: EditorOperations["getActionUmrf"];
+        put: EditorOperations["replaceAction"];
+        post: EditorOperations["compareWithFile"];
+    };
+    "/api/actions/{action_id}/uses": {
+        get: EditorOperations["listUses"];
+        post: EditorOperations["updateUses"];
+    };
+    "/api/actions/{action_id}/take": {
+        post: EditorOperations["takeOver"];
+    };
+    "/api/actions/{action_id}/build": {
+        get: EditorOperations["getBuild"];
+        put: EditorOperations["putBuild"];
+    };
+    "/api/doctor": {
+        get: EditorOperations["examine"];
+    };
+    "/api/doctor/last": {
+        get: EditorOperations["getLastExamination"];
+    };
+    "/healthz": {
+        get: EditorOperations["getHealth"];
+    };
+    "/readyz": {
+        get: EditorOperations["getReadiness"];
+    };
+    "/metrics": {
+        get: EditorOperations["getMetrics"];
+    };
+    "/api/status": {
+        get: EditorOperations["getStatus"];
+    };
+    "/api/server": {
+        get: EditorOperations["proveServer"];
+    };
+}
+
+interface EditorOperations {
+    getSession: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["SignedIn"];
+                };
+            };
+        };
+    };
+    signIn: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["SignIn"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["SignedIn"];
+                };
+            };
+        };
+    };
+    signOut: {
+        responses: {
+            204: {
+            };
+        };
+    };
+    lookAtInvitation: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["InvitationQuestion"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Invited"];
+                };
+            };
+        };
+    };
+    listInvitations: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Sharing"];
+                };
+            };
+        };
+    };
+    invite: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Inviting"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["Invitation"];
+                };
+            };
+        };
+    };
+    revokeInvitation: {
+        parameters: {
+            path: {
+                invitation: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Invitation"];
+                };
+            };
+        };
+    };
+    getInvitationCode: {
+        parameters: {
+            query: {
+                origin: string;
+            };
+            path: {
+                invitation: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "image/svg+xml": string;
+                };
+            };
+        };
+    };
+    listSessions: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["OpenSession"][];
+                };
+            };
+        };
+    };
+    endSession: {
+        parameters: {
+            path: {
+                session: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    getConfig: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Config"];
+                };
+            };
+        };
+    };
+    listPeople: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Participant"][];
+                };
+            };
+        };
+    };
+    listExamples: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Example"][];
+                };
+            };
+        };
+    };
+    followEvents: {
+        parameters: {
+            query?: {
+                after?: number | null;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "text/event-stream": EditorApi["StoredEvent"];
+                };
+            };
+        };
+    };
+    listGraphs: {
+        parameters: {
+            query?: {
+                deleted?: boolean;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"][];
+                };
+            };
+        };
+    };
+    createGraph: {
+        parameters: {
+            query?: {
+                preview?: boolean;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": {
+                    [key: string]: unknown;
+                };
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Preview"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": EditorApi["MadeGraph"];
+                };
+            };
+        };
+    };
+    getGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"];
+                };
+            };
+        };
+    };
+    deleteGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    describeGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Describing"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"];
+                };
+            };
+        };
+    };
+    recoverGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"];
+                };
+            };
+        };
+    };
+    getUmrf: {
+        parameters: {
+            query?: {
+                at?: number | null;
+                identities?: boolean;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": {
+                        [key: string]: unknown;
+                    };
+                };
+            };
+        };
+    };
+    putUmrf: {
+        parameters: {
+            query: {
+                seq: number;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": {
+                    [key: string]: unknown;
+                };
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["MergedGraph"];
+                };
+            };
+        };
+    };
+    getProblems: {
+        parameters: {
+            query?: {
+                seq?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Problems"];
+                };
+            };
+        };
+    };
+    getRewriting: {
+        parameters: {
+            query: {
+                seq: number;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": {
+                    [key: string]: unknown;
+                };
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["TextEdit"];
+                };
+            };
+        };
+    };
+    getHistory: {
+        parameters: {
+            query?: {
+                limit?: number;
+                before?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["HistoryEntry"][];
+                };
+            };
+        };
+    };
+    getDocument: {
+        parameters: {
+            query: {
+                at: number;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["PastDocument"];
+                };
+            };
+        };
+    };
+    getChanges: {
+        parameters: {
+            query: {
+                after: number;
+                upto: number;
+                limit?: number;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["DocumentStep"][];
+                };
+            };
+        };
+    };
+    getDifference: {
+        parameters: {
+            query: {
+                from: number;
+                to?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Difference"];
+                };
+            };
+        };
+    };
+    getBlame: {
+        parameters: {
+            query: {
+                of: string;
+                at?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["FieldBlame"][];
+                };
+            };
+        };
+    };
+    getValues: {
+        parameters: {
+            query: {
+                of: string;
+                field: string;
+                at?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["FieldValue"][];
+                };
+            };
+        };
+    };
+    getSince: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["AskingSince"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["SinceWhen"];
+                };
+            };
+        };
+    };
+    restoreGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Restoring"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"];
+                };
+            };
+        };
+    };
+    revertGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["EditsOfOne"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GoneBack"];
+                };
+            };
+        };
+    };
+    listVersions: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["VersionView"][];
+                };
+            };
+        };
+    };
+    publishVersion: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody?: {
+            content: {
+                "application/json": EditorApi["Publishing"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["VersionView"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": EditorApi["VersionView"];
+                };
+            };
+        };
+    };
+    getSubgraphs: {
+        parameters: {
+            query?: {
+                at?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["InsideView"];
+                };
+            };
+        };
+    };
+    makeSubGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Extracting"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["MadeSubGraph"];
+                };
+            };
+        };
+    };
+    downloadSubgraphs: {
+        parameters: {
+            query?: {
+                at?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/zip": string;
+                };
+            };
+        };
+    };
+    getVersion: {
+        parameters: {
+            path: {
+                version_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["VersionView"];
+                };
+            };
+        };
+    };
+    getFlatGraph: {
+        parameters: {
+            query?: {
+                at?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["FlatGraph"];
+                };
+            };
+        };
+    };
+    makeFlatGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["FlatCopy"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["GraphView"];
+                };
+            };
+        };
+    };
+    lookAtExtraction: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Extracting"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ExtractionLook"];
+                };
+            };
+        };
+    };
+    lookAtUnpacking: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["UnpackingAction"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["UnpackingLook"];
+                };
+            };
+        };
+    };
+    callUses: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["CallingUses"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["CalledUses"];
+                };
+            };
+        };
+    };
+    listDrafts: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["DraftView"][];
+                };
+            };
+        };
+    };
+    makeDraft: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody?: {
+            content: {
+                "application/json": EditorApi["NewDraft"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["DraftView"];
+                };
+            };
+        };
+    };
+    getDraft: {
+        parameters: {
+            path: {
+                draft_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["DraftView"];
+                };
+            };
+        };
+    };
+    proposeDraft: {
+        parameters: {
+            path: {
+                draft_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Proposing"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["DraftView"];
+                };
+            };
+        };
+    };
+    withdrawProposal: {
+        parameters: {
+            path: {
+                draft_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["DraftView"];
+                };
+            };
+        };
+    };
+    answerProposal: {
+        parameters: {
+            path: {
+                draft_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Answering"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["DraftView"];
+                };
+            };
+        };
+    };
+    previewMerge: {
+        parameters: {
+            path: {
+                draft_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["AskedMerge"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["MergePreview"];
+                };
+            };
+        };
+    };
+    mergeDraft: {
+        parameters: {
+            path: {
+                draft_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["WantedMerge"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["MergedDraft"];
+                };
+            };
+        };
+    };
+    readPieces: {
+        requestBody: {
+            content: {
+                "application/json": {
+                    [key: string]: unknown;
+                };
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Pieces"];
+                };
+            };
+        };
+    };
+    rehearse: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Rehearsing"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Rehearsal"];
+                };
+            };
+        };
+    };
+    listPackages: {
+        parameters: {
+            query?: {
+                at?: number | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["PackageList"];
+                };
+            };
+        };
+    };
+    getPackage: {
+        parameters: {
+            query?: {
+                at?: number | null;
+            };
+            path: {
+                graph_id: string;
+                package: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["PackageContents"];
+                };
+            };
+        };
+    };
+    downloadPackages: {
+        parameters: {
+            query?: {
+                at?: number | null;
+                package?: string[] | null;
+            };
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/zip": string;
+                };
+            };
+        };
+    };
+    listActions: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["LibraryAction"][];
+                };
+            };
+        };
+    };
+    createAction: {
+        parameters: {
+            query?: {
+                preview?: boolean;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": {
+                    [key: string]: unknown;
+                };
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Preview"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": EditorApi["MadeGraph"];
+                };
+            };
+        };
+    };
+    listGraphsAsActions: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphAsAction"][];
+                };
+            };
+        };
+    };
+    listDeletedActions: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"][];
+                };
+            };
+        };
+    };
+    getActionUmrf: {
+        parameters: {
+            query?: {
+                at?: number | null;
+            };
+            path: {
+                action_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": {
+                        [key: string]: unknown;
+                    };
+                };
+            };
+        };
+    };
+    replaceAction: {
+        parameters: {
+            query?: {
+                seq?: number | null;
+            };
+            path: {
+                action_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": {
+                    [key: string]: unknown;
+                };
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"];
+                };
+            };
+        };
+    };
+    compareWithFile: {
+        parameters: {
+            path: {
+                action_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": {
+                    [key: string]: unknown;
+                };
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Difference"];
+                };
+            };
+        };
+    };
+    listUses: {
+        parameters: {
+            query?: {
+                inputs?: string[] | null;
+                outputs?: string[] | null;
+            };
+            path: {
+                action_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ActionUses"];
+                };
+            };
+        };
+    };
+    updateUses: {
+        parameters: {
+            path: {
+                action_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["UpdatingUses"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["UpdatedGraph"][];
+                };
+            };
+        };
+    };
+    takeOver: {
+        parameters: {
+            path: {
+                action_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["TakingOver"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"];
+                };
+            };
+        };
+    };
+    getBuild: {
+        parameters: {
+            path: {
+                action_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["LastBuild"];
+                };
+            };
+        };
+    };
+    putBuild: {
+        parameters: {
+            path: {
+                action_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["BuildReport"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["LastBuild"];
+                };
+            };
+        };
+    };
+    examine: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Diagnostic"][];
+                };
+            };
+        };
+    };
+    getLastExamination: {
+        parameters: {
+            query?: {
+                look?: boolean;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["LastExamination"];
+                };
+            };
+        };
+    };
+    getHealth: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Health"];
+                };
+            };
+        };
+    };
+    getReadiness: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Readiness"];
+                };
+            };
+        };
+    };
+    getMetrics: {
+        responses: {
+            200: {
+                content: {
+                    "text/plain": string;
+                };
+            };
+        };
+    };
+    getStatus: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ProcessStatus"];
+                };
+            };
+        };
+    };
+    proveServer: {
+        parameters: {
+            query: {
+                challenge: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ServerProof"];
+                };
+            };
+        };
+    };
+}

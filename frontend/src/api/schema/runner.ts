@@ -1684,3 +1684,993 @@ export interface RunnerApi {
         kept?: string;
     };
 }
+
+export interface RunnerPaths {
+    "/api/runs": {
+        get: RunnerOperations["listRuns"];
+        post: RunnerOperations["startRun"];
+    };
+    "/api/starts/{request_id}": {
+        get: RunnerOperations["getStart"];
+    };
+    "/api/stop": {
+        post: RunnerOperations["stopAll"];
+    };
+    "/api/runs/{run}/stop": {
+        post: RunnerOperations["stopRun"];
+    };
+    "/api/runs/{run}/pause": {
+        post: RunnerOperations["pauseRun"];
+    };
+    "/api/runs/{run}/resume": {
+        post: RunnerOperations["resumeRun"];
+    };
+    "/api/runs/{run}/modify": {
+        post: RunnerOperations["modifyRun"];
+    };
+    "/api/runs/{run}/at_rest": {
+        post: RunnerOperations["confirmRest"];
+    };
+    "/api/labels": {
+        get: RunnerOperations["listLabels"];
+    };
+    "/api/runs/{run}": {
+        get: RunnerOperations["getRun"];
+    };
+    "/api/runs/{run}/events": {
+        get: RunnerOperations["followRun"];
+    };
+    "/api/robots": {
+        get: RunnerOperations["listRobots"];
+        post: RunnerOperations["registerRobot"];
+    };
+    "/api/reach": {
+        get: RunnerOperations["getReach"];
+    };
+    "/api/candidates": {
+        get: RunnerOperations["findEngines"];
+    };
+    "/api/candidates/now": {
+        get: RunnerOperations["getFoundEngines"];
+    };
+    "/api/robots/{name}": {
+        get: RunnerOperations["getRobot"];
+        delete: RunnerOperations["forgetRobot"];
+        patch: RunnerOperations["changeRobot"];
+    };
+    "/api/robots/{name}/known": {
+        get: RunnerOperations["getRobotIndex"];
+    };
+    "/api/robots/{name}/known/{action}": {
+        get: RunnerOperations["getIndexedAction"];
+    };
+    "/api/robots/{name}/events": {
+        get: RunnerOperations["getRobotLog"];
+    };
+    "/api/robots/{name}/events/{seq}/umrf": {
+        get: RunnerOperations["getCommandedGraph"];
+    };
+    "/api/robots/{name}/umrf": {
+        get: RunnerOperations["getHeldGraph"];
+    };
+    "/api/robots/{name}/recordings": {
+        get: RunnerOperations["listRecordings"];
+    };
+    "/api/robots/{name}/recordings/{file}": {
+        get: RunnerOperations["downloadRecording"];
+    };
+    "/api/robots/{name}/stop": {
+        post: RunnerOperations["stopRobot"];
+    };
+    "/api/preflight": {
+        post: RunnerOperations["runPreflight"];
+    };
+    "/api/groups": {
+        post: RunnerOperations["startGroup"];
+    };
+    "/api/robots/{name}/index": {
+        post: RunnerOperations["writeIntoIndex"];
+    };
+    "/api/approvals": {
+        get: RunnerOperations["listApprovals"];
+        post: RunnerOperations["approve"];
+    };
+    "/api/expectations": {
+        get: RunnerOperations["listExpectations"];
+        post: RunnerOperations["addExpectation"];
+    };
+    "/api/expectations/{name}": {
+        delete: RunnerOperations["retireExpectation"];
+    };
+    "/api/expectations/check": {
+        post: RunnerOperations["checkExpectations"];
+    };
+    "/api/expectations/proposal": {
+        post: RunnerOperations["proposeCourse"];
+    };
+    "/api/runs/{run}/film": {
+        get: RunnerOperations["getReplay"];
+    };
+    "/api/runs/{run}/causes": {
+        get: RunnerOperations["listCauses"];
+    };
+    "/api/runs/{run}/umrf": {
+        get: RunnerOperations["getRunUmrf"];
+    };
+    "/api/runs/{run}/marks": {
+        get: RunnerOperations["getMarks"];
+        patch: RunnerOperations["setMarks"];
+    };
+    "/api/runs/{run}/script": {
+        get: RunnerOperations["getScript"];
+        post: RunnerOperations["makeScript"];
+    };
+    "/api/runs/{run}/export": {
+        get: RunnerOperations["exportRun"];
+    };
+    "/api/runs/{run}/raw": {
+        get: RunnerOperations["getRawMessages"];
+    };
+    "/api/comparison": {
+        get: RunnerOperations["compareRuns"];
+    };
+    "/api/statistics": {
+        get: RunnerOperations["getStatistics"];
+    };
+    "/api/examples": {
+        post: RunnerOperations["importExamples"];
+    };
+    "/api/archive": {
+        post: RunnerOperations["archiveRuns"];
+    };
+    "/api/revocations": {
+        post: RunnerOperations["revokeSessions"];
+    };
+    "/api/session": {
+        delete: RunnerOperations["signOut"];
+    };
+    "/healthz": {
+        get: RunnerOperations["getHealth"];
+    };
+    "/readyz": {
+        get: RunnerOperations["getReadiness"];
+    };
+    "/metrics": {
+        get: RunnerOperations["getMetrics"];
+    };
+    "/api/status": {
+        get: RunnerOperations["getStatus"];
+    };
+    "/api/server": {
+        get: RunnerOperations["proveServer"];
+    };
+}
+
+interface RunnerOperations {
+    listRuns: {
+        parameters: {
+            query?: {
+                graph?: string | null;
+                robot?: string | null;
+                state?: string | null;
+                failed?: boolean | null;
+                version?: string | null;
+                person?: string | null;
+                text?: string | null;
+                label?: string | null;
+                pinned?: boolean | null;
+                since?: string | null;
+                until?: string | null;
+                before?: string | null;
+                limit?: number;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Listed"][];
+                };
+            };
+        };
+    };
+    startRun: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["StartRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    getStart: {
+        parameters: {
+            path: {
+                request_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["StartShown"];
+                };
+            };
+        };
+    };
+    stopAll: {
+        requestBody?: {
+            content: {
+                "application/json": RunnerApi["StopBody"];
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["Stopping"];
+                };
+            };
+        };
+    };
+    stopRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody?: {
+            content: {
+                "application/json": RunnerApi["StopBody"];
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["Stopping"];
+                };
+            };
+        };
+    };
+    pauseRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    resumeRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    modifyRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ModifyRequest"];
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    confirmRest: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["RestRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    listLabels: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": string[];
+                };
+            };
+        };
+    };
+    getRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunWhole"];
+                };
+            };
+        };
+    };
+    followRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "text/event-stream": RunnerApi["HistoryEvent"];
+                };
+            };
+            204: {
+            };
+        };
+    };
+    listRobots: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"][];
+                };
+            };
+        };
+    };
+    registerRobot: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["Registration"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    getReach: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ReachStatus"];
+                };
+            };
+        };
+    };
+    findEngines: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Candidate"][];
+                };
+            };
+        };
+    };
+    getFoundEngines: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Sighting"];
+                };
+            };
+        };
+    };
+    getRobot: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    forgetRobot: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    changeRobot: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["RobotChange"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    getRobotIndex: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RobotKnowledge"];
+                };
+            };
+        };
+    };
+    getIndexedAction: {
+        parameters: {
+            path: {
+                name: string;
+                action: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": {
+                        [key: string]: unknown;
+                    };
+                };
+            };
+        };
+    };
+    getRobotLog: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RobotLogLine"][];
+                };
+            };
+        };
+    };
+    getCommandedGraph: {
+        parameters: {
+            path: {
+                name: string;
+                seq: number;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": {
+                        [key: string]: unknown;
+                    };
+                };
+            };
+        };
+    };
+    getHeldGraph: {
+        parameters: {
+            query: {
+                graph: string;
+            };
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": {
+                        [key: string]: unknown;
+                    };
+                };
+            };
+        };
+    };
+    listRecordings: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Recording"][];
+                };
+            };
+        };
+    };
+    downloadRecording: {
+        parameters: {
+            path: {
+                name: string;
+                file: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/gzip": string;
+                };
+            };
+        };
+    };
+    stopRobot: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["RobotStopped"];
+                };
+            };
+        };
+    };
+    runPreflight: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["GroupRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Preflight"][];
+                };
+            };
+        };
+    };
+    startGroup: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["GroupRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["GroupShown"];
+                };
+            };
+            201: {
+                content: {
+                    "application/json": RunnerApi["GroupShown"];
+                };
+            };
+        };
+    };
+    writeIntoIndex: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["IndexWriteRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["IndexWriteAnswer"];
+                };
+            };
+        };
+    };
+    listApprovals: {
+        parameters: {
+            query: {
+                digest: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Approval"][];
+                };
+            };
+        };
+    };
+    approve: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ApprovalRequest"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["Approval"];
+                };
+            };
+        };
+    };
+    listExpectations: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Expectation"][];
+                };
+            };
+        };
+    };
+    addExpectation: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["Expect"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["Expectation"];
+                };
+            };
+        };
+    };
+    retireExpectation: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    checkExpectations: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["CheckRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["CheckedCourses"];
+                };
+            };
+        };
+    };
+    proposeCourse: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ProposalRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ArrowProposal"];
+                };
+            };
+        };
+    };
+    getReplay: {
+        parameters: {
+            query?: {
+                after?: number;
+            };
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunReplay"];
+                };
+            };
+        };
+    };
+    listCauses: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["CauseShown"][];
+                };
+            };
+        };
+    };
+    getRunUmrf: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": {
+                        [key: string]: unknown;
+                    };
+                };
+            };
+        };
+    };
+    getMarks: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunMarks"];
+                };
+            };
+        };
+    };
+    setMarks: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["Marks"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunMarks"];
+                };
+            };
+        };
+    };
+    getScript: {
+        parameters: {
+            query?: {
+                action?: string | null;
+                fault?: "error" | "false" | "hang" | "init_error" | null;
+            };
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Recorded"];
+                };
+            };
+        };
+    };
+    makeScript: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ScriptRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Recorded"];
+                };
+            };
+        };
+    };
+    exportRun: {
+        parameters: {
+            query: {
+                format: "jsonl" | "csv" | "mcap";
+            };
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/octet-stream": string;
+                };
+            };
+        };
+    };
+    getRawMessages: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RawMessages"];
+                };
+            };
+        };
+    };
+    compareRuns: {
+        parameters: {
+            query: {
+                a: string;
+                b: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunComparison"];
+                };
+            };
+        };
+    };
+    getStatistics: {
+        parameters: {
+            query: {
+                graph: string;
+                robot?: string | null;
+                last?: number;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Statistics"];
+                };
+            };
+        };
+    };
+    importExamples: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": string[];
+                };
+            };
+        };
+    };
+    archiveRuns: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ArchiveRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["SweepResult"];
+                };
+            };
+        };
+    };
+    revokeSessions: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["Revocation"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    signOut: {
+        responses: {
+            204: {
+            };
+        };
+    };
+    getHealth: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Health"];
+                };
+            };
+        };
+    };
+    getReadiness: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Readiness"];
+                };
+            };
+        };
+    };
+    getMetrics: {
+        responses: {
+            200: {
+                content: {
+                    "text/plain": string;
+                };
+            };
+        };
+    };
+    getStatus: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ProcessStatus"];
+                };
+            };
+        };
+    };
+    proveServer: {
+        parameters: {
+            query: {
+                challenge: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ServerProof"];
+                };
+            };
+        };
+    };
+}

@@ -31,7 +31,11 @@ class Approval(msgspec.Struct, frozen=True, kw_only=True):
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     """Return the routes to read and to give approvals."""
 
-    @get("/api/approvals", summary="The approvals of a graph, by its digest")
+    @get(
+        "/api/approvals",
+        summary="The approvals of a graph, by its digest",
+        operation_id="listApprovals",
+    )
     async def approvals(
         digest: Annotated[str, Parameter(min_length=64, max_length=64)],
     ) -> list[Approval]:
@@ -41,6 +45,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/approvals",
         summary="Say yes to exactly one graph, so that somebody else may start it on robots that "
         "demand a second person",
+        operation_id="approve",
         guards=[Needs("operate")],
     )
     async def approve(data: ApprovalRequest, request: Request[Any, Any, Any]) -> Approval:

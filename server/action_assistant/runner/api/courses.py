@@ -41,7 +41,11 @@ def routes(services: CourseServices) -> list[ControllerRouterHandler]:
 
 
 def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
-    @get("/api/expectations", summary="Courses that graphs are expected to take")
+    @get(
+        "/api/expectations",
+        summary="Courses that graphs are expected to take",
+        operation_id="listExpectations",
+    )
     async def listed() -> Response[list[Expectation]]:
         return json_of(
             await services.worker_queries.text(ReviewService.expectations), list[Expectation]
@@ -50,6 +54,7 @@ def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/expectations",
         summary="Save the course of a run, or of a dry-run, as an expected course",
+        operation_id="addExpectation",
         opt=reads(Expect) | COUNTED,
         guards=[Needs("edit")],
         request_max_body_size=GRAPH_BODY,
@@ -60,7 +65,10 @@ def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
             return await services.review_service.expect(wanted, author_of(request))
 
     @delete(
-        "/api/expectations/{name:str}", summary="Remove an expected course", guards=[Needs("edit")]
+        "/api/expectations/{name:str}",
+        summary="Remove an expected course",
+        operation_id="retireExpectation",
+        guards=[Needs("edit")],
     )
     async def retire(name: str, request: _Asking) -> None:
         await services.review_service.retire(name, author_of(request))
@@ -71,6 +79,7 @@ def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
 def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/expectations/check",
+        operation_id="checkExpectations",
         status_code=200,
         summary="The expected courses of a graph against it as it is now, and what they cover",
         opt=reads(CheckRequest) | COUNTED,
@@ -90,6 +99,7 @@ def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/expectations/proposal",
+        operation_id="proposeCourse",
         status_code=200,
         summary="What actions would have to do for an arrow to be taken, if anything makes it so",
         opt=reads(ProposalRequest) | COUNTED,

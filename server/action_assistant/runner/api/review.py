@@ -85,6 +85,7 @@ def routes(services: ReviewServices) -> list[ControllerRouterHandler]:
 def _archiving(services: ReviewServices) -> ControllerRouterHandler:
     @post(
         "/api/archive",
+        operation_id="archiveRuns",
         status_code=200,
         summary="Archive some old runs and raw messages; ask again while `more` is true",
         guards=[Needs("restore")],
@@ -96,13 +97,21 @@ def _archiving(services: ReviewServices) -> ControllerRouterHandler:
 
 
 def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
-    @get("/api/runs/{run:str}/film", summary="The changes of a run by each event, page by page")
+    @get(
+        "/api/runs/{run:str}/film",
+        summary="The changes of a run by each event, page by page",
+        operation_id="getReplay",
+    )
     async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[RunReplay]:
         return json_of(
             await services.worker_queries.text(ReviewService.replay, run, after), RunReplay
         )
 
-    @get("/api/runs/{run:str}/causes", summary="The proven causes of a run's end")
+    @get(
+        "/api/runs/{run:str}/causes",
+        summary="The proven causes of a run's end",
+        operation_id="listCauses",
+    )
     async def found_causes(run: str) -> Response[list[CauseShown]]:
         return json_of(
             await services.worker_queries.text(ReviewService.causes, run), list[CauseShown]
@@ -111,20 +120,34 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/runs/{run:str}/umrf",
         summary="The graph of a run as it was sent",
+        operation_id="getRunUmrf",
         responses={200: answer(UmrfGraph)},
     )
     async def umrf(run: str) -> Response[bytes]:
         return json_of(await services.worker_queries.value(ReviewService.umrf, run), bytes)
 
-    @get("/api/runs/{run:str}/marks", summary="The marks that people gave a run")
+    @get(
+        "/api/runs/{run:str}/marks",
+        summary="The marks that people gave a run",
+        operation_id="getMarks",
+    )
     async def marks(run: str) -> RunMarks:
         return await services.review_service.marks(run)
 
-    @patch("/api/runs/{run:str}/marks", summary="Pin, note or label a run", guards=[Needs("edit")])
+    @patch(
+        "/api/runs/{run:str}/marks",
+        summary="Pin, note or label a run",
+        operation_id="setMarks",
+        guards=[Needs("edit")],
+    )
     async def mark(run: str, data: annotations.Marks, request: _Asking) -> RunMarks:
         return await services.review_service.mark(run, data, author_of(request))
 
-    @get("/api/runs/{run:str}/script", summary="The course of a run, as a script for the simulator")
+    @get(
+        "/api/runs/{run:str}/script",
+        summary="The course of a run, as a script for the simulator",
+        operation_id="getScript",
+    )
     async def script(
         run: str, action: str | None = None, fault: expected_runs.Fault | None = None
     ) -> Response[expected_runs.Recorded]:
@@ -133,6 +156,7 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/runs/{run:str}/script",
+        operation_id="makeScript",
         status_code=200,
         summary="The course of a run, as a script for another version of its graph",
         opt=reads(ScriptRequest) | COUNTED,
@@ -151,6 +175,7 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/runs/{run:str}/export",
         summary="A run as a file: jsonl, csv or mcap",
+        operation_id="exportRun",
         responses={200: answer(FileBytes, media="application/octet-stream")},
     )
     async def export(
@@ -164,7 +189,11 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
         content = await services.worker_queries.value(ReviewService.export, run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
-    @get("/api/runs/{run:str}/raw", summary="The places of the raw messages from the time of a run")
+    @get(
+        "/api/runs/{run:str}/raw",
+        summary="The places of the raw messages from the time of a run",
+        operation_id="getRawMessages",
+    )
     async def raw(run: str) -> Response[RawMessages]:
         found = await services.control.find(run)
         recordings = services.control.robots.recordings
@@ -186,13 +215,21 @@ async def _lines(queries: WorkerQueries, run: str, seq: int, page: bytes) -> Asy
 
 
 def _many_runs(services: ReviewServices) -> list[ControllerRouterHandler]:
-    @get("/api/comparison", summary="Two runs side by side, and where they part")
+    @get(
+        "/api/comparison",
+        summary="Two runs side by side, and where they part",
+        operation_id="compareRuns",
+    )
     async def comparison(a: str, b: str) -> Response[RunComparison]:
         return json_of(
             await services.worker_queries.text(ReviewService.compare, a, b), RunComparison
         )
 
-    @get("/api/statistics", summary="The newest runs of a graph together")
+    @get(
+        "/api/statistics",
+        summary="The newest runs of a graph together",
+        operation_id="getStatistics",
+    )
     async def statistics(
         graph: str,
         robot: str | None = None,
@@ -206,6 +243,7 @@ def _many_runs(services: ReviewServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/examples",
         summary="Take in recorded runs that failed, as examples; each is there once",
+        operation_id="importExamples",
         status_code=200,
         guards=[Needs("edit")],
     )

@@ -152,12 +152,14 @@ def routes(services: RobotServices) -> list[ControllerRouterHandler]:
 
 
 def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
-    @get("/api/robots", summary="Engines that runs can go to")
+    @get("/api/robots", summary="Engines that runs can go to", operation_id="listRobots")
     async def robots() -> list[Robot]:
         return list(services.control.robots.all())
 
     @get(
-        "/api/reach", summary="All engines, and whether robots can be reached over ROS 2 from here"
+        "/api/reach",
+        summary="All engines, and whether robots can be reached over ROS 2 from here",
+        operation_id="getReach",
     )
     async def reach() -> ReachStatus:
         robots = services.control.robots
@@ -166,6 +168,7 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/candidates",
         summary="Engines in sight that nobody registered yet, once discovery has had its seconds",
+        operation_id="findEngines",
     )
     async def candidates() -> list[Candidate]:
         return list(await services.control.robots.candidates())
@@ -173,16 +176,27 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/candidates/now",
         summary="Engines in sight now that nobody registered yet, and for how long others may still appear",
+        operation_id="getFoundEngines",
     )
     async def sighting() -> Sighting:
         return await services.control.robots.sighting()
 
-    @post("/api/robots", summary="Register a robot", guards=[Needs("register")])
+    @post(
+        "/api/robots",
+        summary="Register a robot",
+        operation_id="registerRobot",
+        guards=[Needs("register")],
+    )
     async def register(data: Registration, request: _Asking) -> Response[Robot]:
         robot = await services.control.register(data, author_of(request))
         return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
 
-    @patch("/api/robots/{name:str}", summary="Change a robot", guards=[Needs("register")])
+    @patch(
+        "/api/robots/{name:str}",
+        summary="Change a robot",
+        operation_id="changeRobot",
+        guards=[Needs("register")],
+    )
     async def change(name: str, data: RobotChange, request: _Asking) -> Robot:
         known = services.control.robots.registration(name)
         fields = {k: v for k, v in msgspec.structs.asdict(data).items() if v is not None}
@@ -193,7 +207,12 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
             raise BadInput(str(wrong)) from wrong
         return await services.control.register(registration, author_of(request))
 
-    @delete("/api/robots/{name:str}", summary="Forget a robot", guards=[Needs("register")])
+    @delete(
+        "/api/robots/{name:str}",
+        summary="Forget a robot",
+        operation_id="forgetRobot",
+        guards=[Needs("register")],
+    )
     async def remove(name: str, request: _Asking) -> None:
         await services.control.remove(name, author_of(request))
 
@@ -201,13 +220,17 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
 
 
 def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
-    @get("/api/robots/{name:str}", summary="One engine")
+    @get("/api/robots/{name:str}", summary="One engine", operation_id="getRobot")
     async def robot(name: str) -> Robot:
         if name == SIMULATOR:
             return next(services.control.robots.all())
         return services.control.robots.robot(name)
 
-    @get("/api/robots/{name:str}/known", summary="Actions and graphs that a robot has indexed")
+    @get(
+        "/api/robots/{name:str}/known",
+        summary="Actions and graphs that a robot has indexed",
+        operation_id="getRobotIndex",
+    )
     async def known(name: str) -> RobotKnowledge:
         index = await services.control.robots.index(name)
         actions = [_action(action, index.actions[action]) for action in sorted(index.actions)]
@@ -216,6 +239,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/robots/{name:str}/known/{action:str}",
         summary="An action that a robot has indexed, as its UMRF file",
+        operation_id="getIndexedAction",
         responses={200: answer(JsonObject)},
     )
     async def known_action(name: str, action: str) -> Response[bytes]:
@@ -226,7 +250,11 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         file = await services.run_in_worker(write_action, found)
         return Response(file.encode(), media_type="application/json")
 
-    @get("/api/robots/{name:str}/events", summary="The flight record of a robot, newest first")
+    @get(
+        "/api/robots/{name:str}/events",
+        summary="The flight record of a robot, newest first",
+        operation_id="getRobotLog",
+    )
     async def events(name: str) -> list[RobotLogLine]:
         services.control.robots.registration(name)
         found = await services.control.robots.robot_log.newest(name, _EVENTS)
@@ -235,6 +263,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/robots/{name:str}/events/{seq:int}/umrf",
         summary="The graph of a command, as UMRF",
+        operation_id="getCommandedGraph",
         responses={200: answer(UmrfGraph)},
     )
     async def commanded(name: str, seq: int) -> Response[bytes]:
@@ -244,6 +273,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/robots/{name:str}/umrf",
         summary="A graph that a robot holds, as UMRF",
+        operation_id="getHeldGraph",
         responses={200: answer(UmrfGraph)},
     )
     async def held(name: str, graph: str) -> Response[bytes]:
@@ -254,6 +284,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/robots/{name:str}/recordings",
         summary="Recordings of an engine's messages, by the hour",
+        operation_id="listRecordings",
     )
     async def recorded(name: str) -> list[Recording]:
         services.control.robots.registration(name)
@@ -263,6 +294,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/robots/{name:str}/recordings/{file:str}",
         summary="A recording of one hour, as JSON lines, gzipped",
+        operation_id="downloadRecording",
         responses={200: answer(FileBytes, media="application/gzip")},
     )
     async def recording(name: str, file: str) -> Response[bytes]:
@@ -274,6 +306,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/robots/{name:str}/stop",
+        operation_id="stopRobot",
         status_code=202,
         summary="Stop whatever a robot runs",
         guards=[Needs("stop")],
@@ -287,6 +320,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
 def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/preflight",
+        operation_id="runPreflight",
         status_code=200,
         summary="The pre-flight of a start, engine by engine",
         opt=reads(GroupRequest) | COUNTED,
@@ -300,6 +334,7 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/groups",
         summary="Start a version on several robots",
+        operation_id="startGroup",
         opt=reads(GroupRequest) | COUNTED,
         responses={200: answer(GroupShown, text="It had been started before")},
         guards=[Needs("operate")],
@@ -318,6 +353,7 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
 def _index(services: RobotServices) -> ControllerRouterHandler:
     @post(
         "/api/robots/{name:str}/index",
+        operation_id="writeIntoIndex",
         status_code=200,
         summary="Write graphs inside of a task into the folder that a robot indexes",
         opt=reads(IndexWriteRequest) | COUNTED,

@@ -69,6 +69,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/runs",
         summary="Start a version, at most once per request_id",
+        operation_id="startRun",
         opt=reads(StartRequest, Script=Script) | COUNTED,
         responses={200: answer(views.RunShown, text="It had been started before")},
         guards=[Needs("simulate")],
@@ -89,6 +90,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/starts/{request_id:str}",
         summary="The runs that a start has become, by its request_id",
+        operation_id="getStart",
     )
     async def started(request_id: str) -> views.StartShown:
         # Before the query: a start that is not under way any more is stored.
@@ -104,6 +106,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
 def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/stop",
+        operation_id="stopAll",
         status_code=202,
         summary="Stop everything",
         opt=reads(StopBody | None),
@@ -116,6 +119,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/runs/{run:str}/stop",
+        operation_id="stopRun",
         status_code=202,
         summary="Stop a run",
         opt=reads(StopBody | None),
@@ -127,6 +131,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/runs/{run:str}/pause",
+        operation_id="pauseRun",
         status_code=202,
         summary="Pause a run",
         guards=[Needs("simulate")],
@@ -137,6 +142,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/runs/{run:str}/resume",
+        operation_id="resumeRun",
         status_code=202,
         summary="Let a paused run go on",
         guards=[Needs("simulate")],
@@ -147,6 +153,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/runs/{run:str}/modify",
+        operation_id="modifyRun",
         status_code=202,
         summary="Change a running graph, where its engine makes that safe",
         opt=reads(ModifyRequest) | COUNTED,
@@ -160,6 +167,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/runs/{run:str}/at_rest",
+        operation_id="confirmRest",
         status_code=200,
         summary="Confirm that a run is at rest which no answer of its engine can prove so",
         opt=reads(RestRequest),
@@ -173,7 +181,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
-    @get("/api/runs", summary="Runs, newest first")
+    @get("/api/runs", summary="Runs, newest first", operation_id="listRuns")
     async def listed(
         graph: str | None = None,
         robot: str | None = None,
@@ -211,12 +219,14 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         found = await services.worker_queries.text(listing.listed, wanted, limit, open_runs)
         return json_of(found, list[views.Listed])
 
-    @get("/api/labels", summary="Labels of runs, the most used first")
+    @get("/api/labels", summary="Labels of runs, the most used first", operation_id="listLabels")
     async def every_label() -> list[str]:
         rows = await services.control.history.rows(queries.all_labels())
         return [row.label for row in rows]
 
-    @get("/api/runs/{run:str}", summary="A run, and the graph as it was sent")
+    @get(
+        "/api/runs/{run:str}", summary="A run, and the graph as it was sent", operation_id="getRun"
+    )
     async def one(run: str) -> Response[views.RunWhole]:
         opened = services.control.open.get(run)
         if opened is None:
@@ -238,6 +248,7 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/runs/{run:str}/events",
         summary="A run's events as they are stored (SSE)",
+        operation_id="followRun",
         responses={
             200: answer(listing.HistoryEvent, media="text/event-stream", text="An event each time"),
             204: ResponseSpec(None, description="All of them are known, and no more will come"),
