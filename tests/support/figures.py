@@ -152,7 +152,8 @@ def waits(root: Path) -> int:
 def fetches(root: Path) -> int:
     """Return how many requests of the page name the type of their answer by hand."""
     sources = page_files(root, ".ts", ".tsx")
-    return sum(len(re.findall(r"fetchJson<", path.read_text())) for path in sources)
+    by_hand = re.compile(r"fetchJson<|\.json\(\)\)? as ")
+    return sum(len(by_hand.findall(path.read_text())) for path in sources)
 
 
 def share(found: list[Docstring], of: list[Docstring]) -> str:

@@ -1,7 +1,7 @@
 /** State of both processes, and findings of `doctor`: for owners. */
 
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { fetchJson } from "../api/http";
+import { editor, runnerAt } from "../api/client";
 import type { EditorApi } from "../api/schema/editor";
 import { tick } from "../clock/server-clock";
 
@@ -16,8 +16,7 @@ const EACH_MS = 5_000;
 export function useStatus(name: string, at: string | undefined) {
   return useQuery({
     queryKey: ["status", name, at],
-    queryFn: ({ signal }) =>
-      fetchJson<ProcessStatus>(`${at}/api/status`, { signal, timeoutMs: 6_000 }),
+    queryFn: ({ signal }) => runnerAt(at).get("/api/status", { signal, timeoutMs: 6_000 }), // the editor has it too
     enabled: at !== undefined,
     refetchInterval: EACH_MS,
     retry: false,
@@ -29,9 +28,8 @@ export type LastExamination = EditorApi["LastExamination"];
 const LAST = ["doctor", "last"];
 
 async function examined(look: boolean, signal?: AbortSignal) {
-  const path = `/api/doctor/last${look ? "?look=true" : ""}`;
-  const options = { ...(signal && { signal }), timeoutMs: 10_000 };
-  return { last: await fetchJson<LastExamination>(path, options), heardAt: tick() };
+  const request = { query: { look: look || undefined }, signal, timeoutMs: 10_000 };
+  return { last: await editor.get("/api/doctor/last", request), heardAt: tick() };
 }
 
 /**

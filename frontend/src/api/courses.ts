@@ -1,7 +1,8 @@
 /** Expected courses of a graph, what they cover, and tests that would cover more. */
 import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-query";
+import { runnerAt } from "./client";
 import type { Script } from "./dry-runs";
-import { fetchJson, fetchText } from "./http";
+import { fetchText } from "./http";
 import { fetchInside } from "./inside";
 import { useLive } from "./page-link";
 import type { Inside } from "./runs";
@@ -30,9 +31,8 @@ function checkCourses(
   signal: AbortSignal,
   inside: Inside = {},
 ): Promise<CheckedCourses> {
-  const url = `${runner}/api/expectations/check`;
   const body = { graph, umrf, ...(inside.subgraphs && { subgraphs: inside.subgraphs }) };
-  return fetchJson(url, { method: "POST", body, signal, timeoutMs: LONG });
+  return runnerAt(runner).post("/api/expectations/check", { body, signal, timeoutMs: LONG });
 }
 
 /** Query the results for a text that is no moment of the graph yet; `of` is its cache key. */
@@ -77,8 +77,7 @@ export async function proposeCourse(
   const umrf = await identifiedText(graph, seq);
   const { subgraphs } = await fetchInside(graph, seq);
   const body = { umrf, arrow, ...(subgraphs && { subgraphs }) };
-  const url = `${runner}/api/expectations/proposal`;
-  return fetchJson(url, { method: "POST", body, timeoutMs: LONG });
+  return runnerAt(runner).post("/api/expectations/proposal", { body, timeoutMs: LONG });
 }
 
 /** Keeps what a moment does under a script as what is expected of it from now on. */
@@ -91,14 +90,13 @@ export async function expectDryRun(
   const umrf = await identifiedText(graph, seq);
   const { subgraphs } = await fetchInside(graph, seq);
   const body = { name, graph, umrf, script, ...(subgraphs && { subgraphs }) };
-  await fetchJson(`${runner}/api/expectations`, { method: "POST", body, timeoutMs: LONG });
+  await runnerAt(runner).post("/api/expectations", { body, timeoutMs: LONG });
 }
 
 export function expectRun(runner: string, run: string, name: string): Promise<unknown> {
-  return fetchJson(`${runner}/api/expectations`, { method: "POST", body: { run, name } });
+  return runnerAt(runner).post("/api/expectations", { body: { run, name } });
 }
 
 export function dropCourse(runner: string, name: string): Promise<unknown> {
-  const url = `${runner}/api/expectations/${encodeURIComponent(name)}`;
-  return fetchJson(url, { method: "DELETE" });
+  return runnerAt(runner).delete("/api/expectations/{name}", { path: { name } });
 }

@@ -1,7 +1,6 @@
 /** Drafts: what there is, what a merge would do, and doing it. */
 import { type QueryClient, useQuery } from "@tanstack/react-query";
-import type { GraphSummary } from "./graphs";
-import { fetchJson } from "./http";
+import { editor } from "./client";
 import type { EditorApi } from "./schema/editor";
 
 export type GraphDraft = EditorApi["DraftView"];
@@ -14,17 +13,15 @@ export type DraftChoices = Readonly<Record<string, DraftSide>>;
 
 const PERIOD = 8_000; // ms; what others do to the other side is no news of this room
 
-const below = (id: string) => `/api/drafts/${encodeURIComponent(id)}`;
-const under = (graph: string) => `/api/graphs/${encodeURIComponent(graph)}/drafts`;
+const ofDraft = (id: string) => ({ draft_id: id });
 
 /** Query the origin of a draft; null for a graph that is no draft. */
 export function useDraftOf(id: string) {
   return useQuery({
     queryKey: ["drafts", "of", id],
     queryFn: async ({ signal }) => {
-      const found = await fetchJson<GraphSummary>(`/api/graphs/${encodeURIComponent(id)}`, {
-        signal,
-      });
+      const path = { graph_id: id };
+      const found = await editor.get("/api/graphs/{graph_id}", { path, signal });
       return found.draft_of ?? null;
     },
     staleTime: Number.POSITIVE_INFINITY,
@@ -35,7 +32,7 @@ export function useDraftOf(id: string) {
 export function useDraft(id: string, seq: number) {
   return useQuery({
     queryKey: ["drafts", "one", id, seq],
-    queryFn: ({ signal }) => fetchJson<GraphDraft>(below(id), { signal }),
+    queryFn: ({ signal }) => editor.get("/api/drafts/{draft_id}", { path: ofDraft(id), signal }),
     placeholderData: (before) => before,
     refetchInterval: PERIOD,
   });
@@ -45,7 +42,8 @@ export function useDraft(id: string, seq: number) {
 export function useDrafts(graph: string) {
   return useQuery({
     queryKey: ["drafts", "all", graph],
-    queryFn: ({ signal }) => fetchJson<GraphDraft[]>(under(graph), { signal }),
+    queryFn: ({ signal }) =>
+      editor.get("/api/graphs/{graph_id}/drafts", { path: { graph_id: graph }, signal }),
     refetchInterval: PERIOD,
   });
 }
@@ -55,8 +53,8 @@ export function useMergePreview(id: string, into: DraftSide, choices: DraftChoic
   return useQuery({
     queryKey: ["drafts", "merge", id, into, choices],
     queryFn: ({ signal }) =>
-      fetchJson<MergePreview>(`${below(id)}/preview`, {
-        method: "POST",
+      editor.post("/api/drafts/{draft_id}/preview", {
+        path: ofDraft(id),
         body: { into, choices },
         signal,
       }),
@@ -66,7 +64,7 @@ export function useMergePreview(id: string, into: DraftSide, choices: DraftChoic
 }
 
 export function makeDraft(graph: string, body: EditorApi["NewDraft"]): Promise<GraphDraft> {
-  return fetchJson(under(graph), { method: "POST", body });
+  return editor.post("/api/graphs/{graph_id}/drafts", { path: { graph_id: graph }, body });
 }
 
 /** One edit of the side that is merged into; refused where either was changed since. */
@@ -74,19 +72,19 @@ export function mergeDraft(
   id: string,
   body: EditorApi["WantedMerge"],
 ): Promise<EditorApi["MergedDraft"]> {
-  return fetchJson(`${below(id)}/merge`, { method: "POST", body });
+  return editor.post("/api/drafts/{draft_id}/merge", { path: ofDraft(id), body });
 }
 
 export function proposeDraft(id: string, note: string): Promise<GraphDraft> {
-  return fetchJson(`${below(id)}/proposal`, { method: "POST", body: { note } });
+  return editor.post("/api/drafts/{draft_id}/proposal", { path: ofDraft(id), body: { note } });
 }
 
 export function withdrawProposal(id: string): Promise<GraphDraft> {
-  return fetchJson(`${below(id)}/proposal`, { method: "DELETE" });
+  return editor.delete("/api/drafts/{draft_id}/proposal", { path: ofDraft(id) });
 }
 
 export function answerProposal(id: string, body: EditorApi["Answering"]): Promise<GraphDraft> {
-  return fetchJson(`${below(id)}/answers`, { method: "POST", body });
+  return editor.post("/api/drafts/{draft_id}/answers", { path: ofDraft(id), body });
 }
 
 export function refreshDrafts(client: QueryClient): Promise<void> {

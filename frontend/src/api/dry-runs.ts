@@ -1,9 +1,9 @@
 /** Dry-runs: what a graph would do by the engine's rules. Nothing is recorded. */
 import { keepPreviousData, useQuery } from "@tanstack/react-query";
-import { fetchJson } from "./http";
+import { editor } from "./client";
 import type { EditorApi } from "./schema/editor";
 
-export type DryRunResult = EditorApi["Rehearsal"];
+type DryRunResult = EditorApi["Rehearsal"];
 /** One line of a trace, as `simulate --trace` prints it. */
 export type TraceEvent = DryRunResult["trace"][number];
 export type Behaviour = EditorApi["Behaviour"];
@@ -18,9 +18,9 @@ export function useDryRunResult(graph: string, wanted: DryRunRequest | null) {
   return useQuery({
     queryKey: ["rehearsal", graph, wanted],
     queryFn: ({ signal }) =>
-      fetchJson<DryRunResult>(`/api/graphs/${encodeURIComponent(graph)}/rehearsal`, {
-        method: "POST",
-        body: wanted,
+      editor.post("/api/graphs/{graph_id}/rehearsal", {
+        path: { graph_id: graph },
+        body: wanted ?? {},
         signal,
       }),
     enabled: wanted !== null && wanted.seq > 0,

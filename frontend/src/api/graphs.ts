@@ -1,7 +1,8 @@
 /** Graphs, versions and problems as the editor answers them. */
 import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
-import { fetchAnswer, fetchJson, fetchText } from "./http";
+import { editor } from "./client";
+import { fetchAnswer, fetchText } from "./http";
 import type { EditorApi } from "./schema/editor";
 
 /** `people`: who is in it now. */
@@ -16,6 +17,8 @@ export type Problems = EditorApi["Problems"];
 /** Differences between two moments of a document. */
 export type GraphDifference = EditorApi["Difference"];
 
+const inGraph = (id: string) => ({ graph_id: id });
+
 export const queryKeys = {
   graphs: ["graphs"] as const,
   deleted: ["deleted graphs"] as const,
@@ -29,7 +32,7 @@ export const queryKeys = {
 export function useGraphs() {
   return useQuery({
     queryKey: queryKeys.graphs,
-    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/graphs", { signal }),
+    queryFn: ({ signal }) => editor.get("/api/graphs", { signal }),
     refetchInterval: 8_000,
   });
 }
@@ -39,7 +42,7 @@ export function useDeletedGraphs(wanted: boolean) {
   return useQuery({
     enabled: wanted,
     queryKey: queryKeys.deleted,
-    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/graphs?deleted=true", { signal }),
+    queryFn: ({ signal }) => editor.get("/api/graphs", { query: { deleted: true }, signal }),
   });
 }
 
@@ -50,7 +53,7 @@ export function useVersions(graph: string, wanted: string | null = null) {
     enabled: graph !== "",
     queryKey: queryKeys.versions(graph),
     queryFn: ({ signal }) =>
-      fetchJson<Version[]>(`/api/graphs/${encodeURIComponent(graph)}/versions`, { signal }),
+      editor.get("/api/graphs/{graph_id}/versions", { path: inGraph(graph), signal }),
   });
   const missing =
     wanted !== null && versions.data?.every((version) => version.id !== wanted) === true;
@@ -65,7 +68,9 @@ export function useProblems(graph: string, seq: number) {
   return useQuery({
     queryKey: queryKeys.problems(graph, seq),
     queryFn: ({ signal }) =>
-      fetchJson<Problems>(`/api/graphs/${encodeURIComponent(graph)}/problems?seq=${seq}`, {
+      editor.get("/api/graphs/{graph_id}/problems", {
+        path: inGraph(graph),
+        query: { seq },
         signal,
       }),
     enabled: seq > 0,
@@ -76,7 +81,7 @@ export function useProblems(graph: string, seq: number) {
 }
 
 export function createGraph(name: string): Promise<GraphSummary> {
-  return fetchJson("/api/graphs", { method: "POST", body: { name } });
+  return editor.post("/api/graphs", { body: { name }, status: 201 });
 }
 
 /**
@@ -87,12 +92,12 @@ export type Preview = EditorApi["Preview"];
 
 /** Imports a file's text as it is. */
 export function importGraph(text: string): Promise<GraphSummary> {
-  return fetchJson("/api/graphs", { method: "POST", body: text });
+  return editor.post("/api/graphs", { body: text, status: 201 });
 }
 
 /** An edit of the graph's own document: whoever has it open sees it. */
 export function renameGraph(id: string, name: string): Promise<GraphSummary> {
-  return fetchJson(`/api/graphs/${encodeURIComponent(id)}`, { method: "PATCH", body: { name } });
+  return editor.patch("/api/graphs/{graph_id}", { path: inGraph(id), body: { name } });
 }
 
 /** Copy a graph under another name; edits of one do not touch the other. */
@@ -107,12 +112,12 @@ export async function duplicateGraph(id: string, name: string): Promise<GraphSum
 }
 
 export function deleteGraph(id: string): Promise<void> {
-  return fetchJson(`/api/graphs/${encodeURIComponent(id)}`, { method: "DELETE" });
+  return editor.delete("/api/graphs/{graph_id}", { path: inGraph(id) });
 }
 
 /** Brings a deleted graph back. */
 export function recoverGraph(id: string): Promise<unknown> {
-  return fetchJson(`/api/graphs/${encodeURIComponent(id)}/recover`, { method: "POST" });
+  return editor.post("/api/graphs/{graph_id}/recover", { path: inGraph(id) });
 }
 
 export function graphText(id: string): Promise<string> {
@@ -153,7 +158,7 @@ export function refreshLibrary(client: QueryClient): Promise<void> {
 const below = (graph: string) => `/api/graphs/${encodeURIComponent(graph)}`;
 
 export function publishNamed(graph: string, body: EditorApi["Publishing"]): Promise<Version> {
-  return fetchJson(`${below(graph)}/versions`, { method: "POST", body });
+  return editor.post("/api/graphs/{graph_id}/versions", { path: inGraph(graph), body });
 }
 
 /** A graph as it was after a change, as another one; edits of one do not touch the other. */
@@ -172,11 +177,11 @@ export type PinnedGraph = EditorApi["PinnedGraph"];
 
 /** One version with all that it has by value. */
 export function fetchVersion(id: string, signal: AbortSignal): Promise<Version> {
-  return fetchJson(`/api/versions/${encodeURIComponent(id)}`, { signal });
+  return editor.get("/api/versions/{version_id}", { path: { version_id: id }, signal });
 }
 
 export function previewGraph(text: string): Promise<Preview> {
-  return fetchJson("/api/graphs?preview=true", { method: "POST", body: text });
+  return editor.post("/api/graphs", { query: { preview: true }, body: text, status: 200 });
 }
 
 /** The text that a route answers, and which moment of the graph it is of. */
@@ -200,12 +205,12 @@ export type TextChanges = EditorApi["TextEdit"];
  * stored.
  */
 export function textChangesOf(id: string, seq: number, text: string): Promise<TextChanges> {
-  const route = `/api/graphs/${encodeURIComponent(id)}/rewriting?seq=${seq}`;
-  return fetchJson(route, { method: "POST", body: text });
+  const request = { path: inGraph(id), query: { seq }, body: text };
+  return editor.post("/api/graphs/{graph_id}/rewriting", request);
 }
 
 export type UmrfKeys = EditorApi["Pieces"];
 
 export function readUmrfKeys(text: string): Promise<UmrfKeys> {
-  return fetchJson("/api/pieces", { method: "POST", body: text });
+  return editor.post("/api/pieces", { body: text });
 }

@@ -2,21 +2,22 @@
  * Requests about the history of a document: entries, differences, earlier moments, restoring them.
  */
 import { type QueryClient, useQuery } from "@tanstack/react-query";
-import type { GraphDifference, GraphSummary, Version } from "./graphs";
-import { fetchJson } from "./http";
+import { editor, runnerAt } from "./client";
+import type { GraphSummary } from "./graphs";
 import { recordedScriptOf } from "./review";
 import type { Run } from "./runs";
 import type { EditorApi } from "./schema/editor";
 
 export type HistoryEntry = EditorApi["HistoryEntry"];
 
-const below = (id: string) => `/api/graphs/${encodeURIComponent(id)}`;
+const inGraph = (id: string) => ({ graph_id: id });
 
 /** Newest first. `seq`: the moment on screen, with which it is read again. */
 export function useHistory(id: string, seq: number) {
   return useQuery({
     queryKey: ["history", id, seq],
-    queryFn: ({ signal }) => fetchJson<HistoryEntry[]>(`${below(id)}/history`, { signal }),
+    queryFn: ({ signal }) =>
+      editor.get("/api/graphs/{graph_id}/history", { path: inGraph(id), signal }),
     placeholderData: (before) => before,
   });
 }
@@ -28,8 +29,8 @@ export function fetchHistory(
   before: number | null,
   signal: AbortSignal,
 ): Promise<HistoryEntry[]> {
-  const from = before === null ? "" : `&before=${before}`;
-  return fetchJson(`${below(id)}/history?limit=${limit}${from}`, { signal });
+  const query = { limit, before: before ?? undefined };
+  return editor.get("/api/graphs/{graph_id}/history", { path: inGraph(id), query, signal });
 }
 
 /** The root maps of the document as they were after a change. */
@@ -38,7 +39,11 @@ export function fetchDocument(
   at: number,
   signal: AbortSignal,
 ): Promise<EditorApi["PastDocument"]> {
-  return fetchJson(`${below(id)}/document?at=${at}`, { signal });
+  return editor.get("/api/graphs/{graph_id}/document", {
+    path: inGraph(id),
+    query: { at },
+    signal,
+  });
 }
 
 /** The steps from one moment to another, key by key, in order of time. */
@@ -48,7 +53,8 @@ export function fetchChanges(
   upto: number,
   signal: AbortSignal,
 ): Promise<EditorApi["DocumentStep"][]> {
-  return fetchJson(`${below(id)}/changes?after=${after}&upto=${upto}`, { signal });
+  const query = { after, upto };
+  return editor.get("/api/graphs/{graph_id}/changes", { path: inGraph(id), query, signal });
 }
 
 /** Query the differences from change `from` to change `to`; null as `from` disables the query. */
@@ -56,8 +62,10 @@ export function useDifference(id: string, from: number | null, to: number) {
   return useQuery({
     enabled: from !== null,
     queryKey: ["history", id, "difference", from, to],
-    queryFn: ({ signal }) =>
-      fetchJson<GraphDifference>(`${below(id)}/diff?from=${from}&to=${to}`, { signal }),
+    queryFn: ({ signal }) => {
+      const query = { from: from ?? 0, to };
+      return editor.get("/api/graphs/{graph_id}/diff", { path: inGraph(id), query, signal });
+    },
     staleTime: Number.POSITIVE_INFINITY,
   });
 }
@@ -70,29 +78,29 @@ export type FieldValue = EditorApi["FieldValue"];
  * moment; without `at`, now, and each time anew.
  */
 export function useBlame(id: string, of: string, at?: number) {
-  const query = new URLSearchParams({ of, ...(at === undefined ? {} : { at: `${at}` }) });
   return useQuery({
     enabled: at !== 0,
     queryKey: ["history", id, "blame", of, at ?? "now"],
-    queryFn: ({ signal }) => fetchJson<FieldBlame[]>(`${below(id)}/blame?${query}`, { signal }),
+    queryFn: ({ signal }) =>
+      editor.get("/api/graphs/{graph_id}/blame", { path: inGraph(id), query: { of, at }, signal }),
     retry: false,
   });
 }
 
 /** All values that a field has had until then, newest first. */
 export function useFieldValues(id: string, of: string, field: string, at: number) {
-  const query = new URLSearchParams({ of, field, at: String(at) });
+  const query = { of, field, at };
   return useQuery({
     queryKey: ["history", id, "values", of, field, at],
     queryFn: ({ signal }) =>
-      fetchJson<FieldValue[]>(`${below(id)}/blame/values?${query}`, { signal }),
+      editor.get("/api/graphs/{graph_id}/blame/values", { path: inGraph(id), query, signal }),
   });
 }
 
 /** Makes it what it was after an earlier change, or one thing of it, by its key: an edit, which everybody sees. */
 export function restoreMoment(id: string, seq: number, of?: string): Promise<GraphSummary> {
   const body = of === undefined ? { seq } : { seq, of };
-  return fetchJson(`${below(id)}/restore`, { method: "POST", body });
+  return editor.post("/api/graphs/{graph_id}/restore", { path: inGraph(id), body });
 }
 
 /** Takes back what one person did, where nobody has changed it since. */
@@ -100,7 +108,7 @@ export function revertEdits(
   id: string,
   body: EditorApi["EditsOfOne"],
 ): Promise<EditorApi["GoneBack"]> {
-  return fetchJson(`${below(id)}/revert`, { method: "POST", body });
+  return editor.post("/api/graphs/{graph_id}/revert", { path: inGraph(id), body });
 }
 
 /** Reads again what is on screen. An edit of ours is shown before what it was is written down: what is being read
@@ -142,11 +150,10 @@ export function lastGoodRun<R extends Ended>(
 }
 
 async function asked(runner: string, run: Run, graph: string): Promise<SinceAnswer> {
-  const below = `/api/graphs/${encodeURIComponent(graph)}`;
-  const query = new URLSearchParams({ limit: "1000", graph });
+  const path = inGraph(graph);
   const [runs, versions] = await Promise.all([
-    fetchJson<Run[]>(`${runner}/api/runs?${query}`),
-    fetchJson<Version[]>(`${below}/versions`),
+    runnerAt(runner).get("/api/runs", { query: { limit: 1000, graph } }),
+    editor.get("/api/graphs/{graph_id}/versions", { path }),
   ]);
   const seqOf = (of: Run) => versions.find(({ id }) => id === of.version)?.seq;
   const good = lastGoodRun(runs, run.number);
@@ -156,7 +163,7 @@ async function asked(runner: string, run: Run, graph: string): Promise<SinceAnsw
   }
   const { behaviours } = await recordedScriptOf(runner, run.id);
   const body = { good: from, bad: to, script: { behaviours } };
-  return { good, found: await fetchJson(`${below}/since`, { method: "POST", body }) };
+  return { good, found: await editor.post("/api/graphs/{graph_id}/since", { path, body }) };
 }
 
 /** Asked once it is wanted; a run that is over is never asked about again. */

@@ -44,7 +44,7 @@ export interface RequestOptions {
   method?: "GET" | "POST" | "PUT" | "PATCH" | "DELETE";
   /** An object is sent as JSON, a string as it is (also JSON). */
   body?: unknown;
-  signal?: AbortSignal;
+  signal?: AbortSignal | undefined;
   /** Milliseconds until an answer must be there. */
   timeoutMs?: number;
   /** Goes on when the page is closed meanwhile; only for small bodies. */
@@ -134,13 +134,6 @@ export async function fetchAnswer(url: string, request: RequestOptions = {}): Pr
   const response = await send(url, request);
   if (!response.ok) throw new Refusal(await problemOf(response));
   return response;
-}
-
-/** Return the JSON that a route answers. Throws `Refusal` or `Unreachable`. */
-export async function fetchJson<T>(url: string, request: RequestOptions = {}): Promise<T> {
-  const response = await fetchAnswer(url, request);
-  if (response.status === 204) return undefined as T;
-  return (await response.json()) as T;
 }
 
 /** Return the text that a route answers, unparsed, so that `5` and `5.0` stay different. */

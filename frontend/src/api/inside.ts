@@ -1,12 +1,14 @@
 /** The graphs inside of a graph, by value: what goes along with starts, looks and expected courses. */
 import { useQuery } from "@tanstack/react-query";
+import { editor } from "./client";
 import type { GraphSummary } from "./graphs";
-import { fetchJson } from "./http";
 import type { Inside } from "./runs";
 import type { EditorApi } from "./schema/editor";
 
+const inGraph = (graph: string) => ({ graph_id: graph });
+
 interface Pinned {
-  subgraphs?: readonly object[] | null | undefined;
+  subgraphs?: Inside["subgraphs"] | null | undefined;
   tree_digest?: string | null | undefined;
 }
 
@@ -22,20 +24,18 @@ export async function fetchInside(
   seq: number,
   signal?: AbortSignal,
 ): Promise<Inside> {
-  const route = `/api/graphs/${encodeURIComponent(graph)}/subgraphs?at=${seq}`;
-  return insideOf(await fetchJson<EditorApi["InsideView"]>(route, { ...(signal && { signal }) }));
+  const request = { path: inGraph(graph), query: { at: seq }, signal };
+  return insideOf(await editor.get("/api/graphs/{graph_id}/subgraphs", request));
 }
 
 /** Gives the actions that stand for a graph in these others its new name. Answers where there were some. */
 export function callUses(
   graph: string,
-  uses: EditorApi["CallingUses"],
+  body: EditorApi["CallingUses"],
 ): Promise<EditorApi["CalledUses"]> {
-  const route = `/api/graphs/${encodeURIComponent(graph)}/uses`;
-  return fetchJson(route, { method: "POST", body: uses, timeoutMs: 60_000 });
+  const request = { path: inGraph(graph), body, timeoutMs: 60_000 };
+  return editor.post("/api/graphs/{graph_id}/uses", request);
 }
-
-const flatRoute = (graph: string): string => `/api/graphs/${encodeURIComponent(graph)}/flat`;
 
 /** A graph and those inside of it as one graph that does the same, or why there is none. */
 export type FlatGraph = EditorApi["FlatGraph"];
@@ -46,25 +46,23 @@ export type FlatteningReason = EditorApi["FlatteningReason"];
 export function useFlatGraph(graph: string) {
   return useQuery({
     queryKey: ["graphs", graph, "flat"],
-    queryFn: ({ signal }) => fetchJson<FlatGraph>(flatRoute(graph), { signal }),
+    queryFn: ({ signal }) =>
+      editor.get("/api/graphs/{graph_id}/flat", { path: inGraph(graph), signal }),
     staleTime: 0,
     gcTime: 0,
   });
 }
 
 export function makeFlatGraph(graph: string, body: EditorApi["FlatCopy"]): Promise<GraphSummary> {
-  return fetchJson(flatRoute(graph), { method: "POST", body });
+  return editor.post("/api/graphs/{graph_id}/flat", { path: inGraph(graph), body });
 }
-
-const routeOf = (graph: string, route: string): string =>
-  `/api/graphs/${encodeURIComponent(graph)}/${route}`;
 
 /** The sub-graph that chosen actions would become, or the reason why they cannot. */
 export type ExtractionLook = EditorApi["ExtractionLook"];
 type ExtractionWish = EditorApi["Extracting"];
 
 export function lookAtExtraction(graph: string, body: ExtractionWish): Promise<ExtractionLook> {
-  return fetchJson(routeOf(graph, "extraction"), { method: "POST", body });
+  return editor.post("/api/graphs/{graph_id}/extraction", { path: inGraph(graph), body });
 }
 
 /** A new graph of them; the graph around it is changed by who asks. */
@@ -72,7 +70,7 @@ export function makeSubGraph(
   graph: string,
   body: ExtractionWish,
 ): Promise<EditorApi["MadeSubGraph"]> {
-  return fetchJson(routeOf(graph, "subgraphs"), { method: "POST", body });
+  return editor.post("/api/graphs/{graph_id}/subgraphs", { path: inGraph(graph), body });
 }
 
 /** The graph after an action is replaced by the actions of its sub-graph. */
@@ -82,5 +80,5 @@ export function lookAtUnpacking(
   graph: string,
   body: EditorApi["UnpackingAction"],
 ): Promise<UnpackingLook> {
-  return fetchJson(routeOf(graph, "unpacking"), { method: "POST", body });
+  return editor.post("/api/graphs/{graph_id}/unpacking", { path: inGraph(graph), body });
 }

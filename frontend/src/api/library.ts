@@ -1,7 +1,7 @@
 /** The library of actions, each a document of its own, as the editor answers it. */
 import { keepPreviousData, type QueryClient, useQuery } from "@tanstack/react-query";
+import { editor } from "./client";
 import { type GraphDifference, type GraphSummary, type Preview, queryKeys } from "./graphs";
-import { fetchJson } from "./http";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
 
@@ -19,11 +19,11 @@ export type ActionUse = EditorApi["ActionUse"];
 export type ActionUses = EditorApi["ActionUses"];
 export type UpdatedUse = EditorApi["UpdatedGraph"];
 
-const below = (id: string) => `/api/actions/${encodeURIComponent(id)}`;
+const ofAction = (id: string) => ({ action_id: id });
 
 /** Every action of the library, and what else graphs use, by name. */
 export function fetchLibrary(signal?: AbortSignal): Promise<LibraryAction[]> {
-  return fetchJson("/api/actions", { ...(signal && { signal }) });
+  return editor.get("/api/actions", { signal });
 }
 
 export function useLibrary() {
@@ -40,7 +40,7 @@ export type GraphAsAction = EditorApi["GraphAsAction"];
 export function useGraphsAsActions() {
   return useQuery({
     queryKey: [...queryKeys.actions, "graphs"],
-    queryFn: ({ signal }) => fetchJson<GraphAsAction[]>("/api/actions/graphs", { signal }),
+    queryFn: ({ signal }) => editor.get("/api/actions/graphs", { signal }),
     refetchInterval: 30_000,
   });
 }
@@ -51,7 +51,8 @@ export type ActionBuild = EditorApi["ActionBuilt"];
 export function useLastBuild(id: string) {
   return useQuery({
     queryKey: ["build", id],
-    queryFn: ({ signal }) => fetchJson<EditorApi["LastBuild"]>(`${below(id)}/build`, { signal }),
+    queryFn: ({ signal }) =>
+      editor.get("/api/actions/{action_id}/build", { path: ofAction(id), signal }),
     refetchInterval: 15_000,
   });
 }
@@ -61,57 +62,57 @@ export function useDeletedActions(wanted: boolean) {
   return useQuery({
     enabled: wanted,
     queryKey: [...queryKeys.actions, "deleted"],
-    queryFn: ({ signal }) => fetchJson<GraphSummary[]>("/api/actions/deleted", { signal }),
+    queryFn: ({ signal }) => editor.get("/api/actions/deleted", { signal }),
   });
 }
 
 /** `fromGraphs`: with what graphs know of it, instead of empty. */
 export function createAction(name: string, fromGraphs = false): Promise<GraphSummary> {
   const body = fromGraphs ? { name, from_graphs: true } : { name };
-  return fetchJson("/api/actions", { method: "POST", body });
+  return editor.post("/api/actions", { body, status: 201 });
 }
 
 export function previewAction(text: string): Promise<Preview> {
-  return fetchJson("/api/actions?preview=true", { method: "POST", body: text });
+  return editor.post("/api/actions", { query: { preview: true }, body: text, status: 200 });
 }
 
 /** Takes in the file of one action as it is. */
 export function importAction(text: string): Promise<GraphSummary> {
-  return fetchJson("/api/actions", { method: "POST", body: text });
+  return editor.post("/api/actions", { body: text, status: 201 });
 }
 
 /** Makes an action that the library has what its file says; with `seq` only while that is its last change. */
 export function replaceAction(id: string, text: string, seq?: number): Promise<GraphSummary> {
-  const query = seq === undefined ? "" : `?seq=${seq}`;
-  return fetchJson(`${below(id)}/umrf${query}`, { method: "PUT", body: text });
+  const request = { path: ofAction(id), query: { seq }, body: text };
+  return editor.put("/api/actions/{action_id}/umrf", request);
 }
 
 /** Return the changes that a file would make to an action. */
 export function compareWithFile(id: string, text: string): Promise<GraphDifference> {
-  return fetchJson(`${below(id)}/umrf`, { method: "POST", body: text });
+  return editor.post("/api/actions/{action_id}/umrf", { path: ofAction(id), body: text });
 }
 
 /** Return the address from which the browser downloads the file of an action. */
 export function actionDownload(id: string): string {
-  return serverPath(`${below(id)}/umrf`);
+  return serverPath(`/api/actions/${encodeURIComponent(id)}/umrf`);
 }
 
-function renamesQuery({ inputs, outputs }: Renames): string {
+function renamesQuery({ inputs, outputs }: Renames): URLSearchParams {
   const query = new URLSearchParams();
   const pair = ([from, to]: readonly [string, string]) =>
     `${encodeURIComponent(from)}:${encodeURIComponent(to)}`;
   for (const each of inputs) query.append("inputs", pair(each));
   for (const each of outputs) query.append("outputs", pair(each));
-  const text = query.toString();
-  return text === "" ? "" : `?${text}`;
+  return query;
 }
 
 /** Query what updating each graph to the parameters of the document would change. */
 export function useActionUses(id: string, renames: Renames) {
   const query = renamesQuery(renames);
   return useQuery({
-    queryKey: ["uses", id, query],
-    queryFn: ({ signal }) => fetchJson<ActionUses>(`${below(id)}/uses${query}`, { signal }),
+    queryKey: ["uses", id, query.toString()],
+    queryFn: ({ signal }) =>
+      editor.get("/api/actions/{action_id}/uses", { path: ofAction(id), query, signal }),
     placeholderData: keepPreviousData,
     staleTime: 0,
     gcTime: 0,
@@ -130,10 +131,11 @@ interface Updating {
 }
 
 export function updateUses(id: string, body: Updating): Promise<UpdatedUse[]> {
-  return fetchJson(`${below(id)}/uses`, { method: "POST", body, timeoutMs: 60_000 });
+  const request = { path: ofAction(id), body, timeoutMs: 60_000 };
+  return editor.post("/api/actions/{action_id}/uses", request);
 }
 
 /** The document takes over the parameters that a graph's use of it has. */
 export function takeFromGraph(id: string, graph: string): Promise<GraphSummary> {
-  return fetchJson(`${below(id)}/take`, { method: "POST", body: { graph } });
+  return editor.post("/api/actions/{action_id}/take", { path: ofAction(id), body: { graph } });
 }

@@ -1,21 +1,21 @@
 /** C++ packages of a graph's actions, as the editor answers them. */
 import { keepPreviousData, useQuery } from "@tanstack/react-query";
-import { fetchJson } from "./http";
+import { editor } from "./client";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
 
 export type PackageList = EditorApi["PackageList"];
 export type PackageOutline = EditorApi["PackageOutline"];
 export type PackageRefusal = EditorApi["PackageRefusal"];
-type PackageContents = EditorApi["PackageContents"];
 
-const below = (graph: string) => `/api/graphs/${encodeURIComponent(graph)}/packages`;
+const listPackages = (graph: string, signal: AbortSignal) =>
+  editor.get("/api/graphs/{graph_id}/packages", { path: { graph_id: graph }, signal });
 
 /** The packages that the graph has now, and why some actions have none. */
 export function usePackages(graph: string) {
   return useQuery({
     queryKey: ["packages", graph],
-    queryFn: ({ signal }) => fetchJson<PackageList>(below(graph), { signal }),
+    queryFn: ({ signal }) => listPackages(graph, signal),
     // Once opened it stays the packages of one moment, and what is downloaded is what was seen.
     staleTime: 0,
     gcTime: 0,
@@ -29,7 +29,7 @@ export function usePackagesAt(graph: string, seq: number) {
   return useQuery({
     enabled: seq > 0,
     queryKey: ["packages", graph, "now", seq],
-    queryFn: ({ signal }) => fetchJson<PackageList>(below(graph), { signal }),
+    queryFn: ({ signal }) => listPackages(graph, signal),
     placeholderData: keepPreviousData,
     staleTime: Number.POSITIVE_INFINITY,
     gcTime: 60_000,
@@ -41,7 +41,9 @@ export function usePackage(graph: string, seq: number, name: string) {
   return useQuery({
     queryKey: ["packages", graph, seq, name],
     queryFn: ({ signal }) =>
-      fetchJson<PackageContents>(`${below(graph)}/${encodeURIComponent(name)}?at=${seq}`, {
+      editor.get("/api/graphs/{graph_id}/packages/{package}", {
+        path: { graph_id: graph, package: name },
+        query: { at: seq },
         signal,
       }),
     staleTime: Number.POSITIVE_INFINITY,
@@ -51,5 +53,5 @@ export function usePackage(graph: string, seq: number, name: string) {
 /** Return the address from which the browser downloads one package, or all of them. */
 export function packageDownload(graph: string, seq: number, name?: string): string {
   const one = name === undefined ? "" : `&package=${encodeURIComponent(name)}`;
-  return serverPath(`${below(graph)}.zip?at=${seq}${one}`);
+  return serverPath(`/api/graphs/${encodeURIComponent(graph)}/packages.zip?at=${seq}${one}`);
 }

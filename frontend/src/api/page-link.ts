@@ -5,9 +5,9 @@
 
 import { useMemo, useSyncExternalStore } from "react";
 import { tick } from "../clock/server-clock";
-import { errorText, fetchJson } from "./http";
+import { editor } from "./client";
+import { errorText } from "./http";
 import { LiveSocket, type LiveState } from "./live-socket";
-import type { EditorApi } from "./schema/editor";
 
 export interface PageLinkState {
   live: LiveSocket | null;
@@ -73,7 +73,7 @@ class PageLink {
     this.#asking = true;
     for (let wait = 500; this.#state.signedIn; wait = Math.min(AGAIN, 2 * wait)) {
       try {
-        const { runner_url } = await fetchJson<EditorApi["Config"]>("/api/config");
+        const { runner_url } = await editor.get("/api/config", {});
         if (this.#state.signedIn) this.#open(runner_url);
         else this.#set({ runner: runner_url });
         break;

@@ -1,7 +1,7 @@
 /** In which colour people are shown: the server gives each one that nobody else has who is here. */
 import { useQuery } from "@tanstack/react-query";
 import { createContext, use, useCallback, useEffect } from "react";
-import { fetchJson } from "./http";
+import { editor } from "./client";
 import type { EditorApi } from "./schema/editor";
 import { may, type Permission, type Person } from "./session";
 
@@ -43,7 +43,7 @@ const NO_IDS: readonly string[] = [];
 export function useKnownPeople(ids: readonly string[]): readonly KnownPerson[] {
   const { data = NOBODY, refetch } = useQuery({
     queryKey: ["people"],
-    queryFn: ({ signal }) => fetchJson<KnownPerson[]>("/api/people", { signal }),
+    queryFn: ({ signal }) => editor.get("/api/people", { signal }),
     staleTime: 60_000,
   });
   const unknown = ids.filter((id) => !data.some((person) => person.id === id)).join(" ");

@@ -1,6 +1,6 @@
 /** The replay of a run: what every event of it changed, a page at a time. */
 import { useQuery } from "@tanstack/react-query";
-import { fetchJson } from "./http";
+import { runnerAt } from "./client";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
@@ -22,7 +22,9 @@ export function useReplayData(
   return useQuery({
     queryKey: ["runs", "film", run, after],
     queryFn: ({ signal }) =>
-      fetchJson<Replay>(`${runner}/api/runs/${encodeURIComponent(run)}/film?after=${after}`, {
+      runnerAt(runner).get("/api/runs/{run}/film", {
+        path: { run },
+        query: { after },
         signal,
         timeoutMs: 60_000,
       }),

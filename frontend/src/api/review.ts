@@ -1,6 +1,7 @@
 /** Requests about past runs: marks, comparisons, statistics, files. */
 import { useQuery } from "@tanstack/react-query";
-import { fetchAnswer, fetchJson, type RequestOptions } from "./http";
+import { runnerAt } from "./client";
+import { fetchAnswer, type RequestOptions } from "./http";
 import { getRun } from "./run-stop";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
@@ -85,14 +86,15 @@ export function listRuns(
   const query = queryOf(filter);
   query.set("limit", String(limit));
   if (before !== null) query.set("before", before);
-  return fetchJson(`${runner}/api/runs?${query}`, signal ? { signal } : {});
+  return runnerAt(runner).get("/api/runs", { query, signal });
 }
 
 /** Asked again when the run changes its state. */
 export function useCauses(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "causes", run.id, run.state, run.alarms.length],
-    queryFn: ({ signal }) => fetchJson<Cause[]>(`${runner}${path(run.id)}/causes`, { signal }),
+    queryFn: ({ signal }) =>
+      runnerAt(runner).get("/api/runs/{run}/causes", { path: { run: run.id }, signal }),
     enabled: runner !== undefined && needsExplanation(run),
   });
 }
@@ -105,29 +107,27 @@ export function needsExplanation(run: Run): boolean {
 
 /** Takes in the recorded runs that the product brings along; their ids. */
 export function importExamples(runner: string): Promise<string[]> {
-  return fetchJson(`${runner}/api/examples`, { method: "POST", body: {} });
+  return runnerAt(runner).post("/api/examples", {});
 }
 
 export function useMarks(runner: string | undefined, run: string) {
   return useQuery({
     queryKey: ["runs", "marks", run],
-    queryFn: ({ signal }) => fetchJson<RunMarks>(`${runner}${path(run)}/marks`, { signal }),
+    queryFn: ({ signal }) =>
+      runnerAt(runner).get("/api/runs/{run}/marks", { path: { run }, signal }),
     enabled: runner !== undefined,
   });
 }
 
 export function setMarks(runner: string, run: string, marks: Partial<RunMarks>): Promise<RunMarks> {
-  return fetchJson(`${runner}${path(run)}/marks`, {
-    method: "PATCH",
-    body: marks,
-    keepalive: true,
-  });
+  const request = { path: { run }, body: marks, keepalive: true };
+  return runnerAt(runner).patch("/api/runs/{run}/marks", request);
 }
 
 export function useLabels(runner: string | undefined) {
   return useQuery({
     queryKey: ["runs", "labels"],
-    queryFn: ({ signal }) => fetchJson<string[]>(`${runner}/api/labels`, { signal }),
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/labels", { signal }),
     enabled: runner !== undefined,
   });
 }
@@ -135,10 +135,7 @@ export function useLabels(runner: string | undefined) {
 export function useComparison(runner: string | undefined, a: string, b: string) {
   return useQuery({
     queryKey: ["runs", "comparison", a, b],
-    queryFn: ({ signal }) =>
-      fetchJson<Comparison>(`${runner}/api/comparison?${new URLSearchParams({ a, b })}`, {
-        signal,
-      }),
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/comparison", { query: { a, b }, signal }),
     enabled: runner !== undefined && a !== "" && b !== "",
   });
 }
@@ -146,10 +143,7 @@ export function useComparison(runner: string | undefined, a: string, b: string) 
 export function useStatistics(runner: string | undefined, graph: string) {
   return useQuery({
     queryKey: ["runs", "statistics", graph],
-    queryFn: ({ signal }) =>
-      fetchJson<Statistics>(`${runner}/api/statistics?${new URLSearchParams({ graph })}`, {
-        signal,
-      }),
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/statistics", { query: { graph }, signal }),
     enabled: runner !== undefined && graph !== "",
   });
 }
@@ -165,8 +159,7 @@ export function recordedScriptOf(
   run: string,
   fault?: { action: string; fault: InjectedFault },
 ): Promise<RunnerApi["Recorded"]> {
-  const query = fault ? `?${new URLSearchParams({ ...fault })}` : "";
-  return fetchJson(`${runner}${path(run)}/script${query}`);
+  return runnerAt(runner).get("/api/runs/{run}/script", { path: { run }, query: { ...fault } });
 }
 
 /** Return such a script for another version of the graph; `umrf` is JSON text. */
@@ -176,7 +169,8 @@ export function recordedScriptFor(
   umrf: string,
   fault?: { action: string; fault: InjectedFault },
 ): Promise<RunnerApi["Recorded"]> {
-  return fetchJson(`${runner}${path(run)}/script`, { method: "POST", body: { ...fault, umrf } });
+  const body = { ...fault, umrf };
+  return runnerAt(runner).post("/api/runs/{run}/script", { path: { run }, body });
 }
 
 /** Runs that one request has started together with this one. */
@@ -185,8 +179,8 @@ export function useRunsOfSameStart(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "mates", run.id],
     queryFn: async ({ signal }) => {
-      const query = new URLSearchParams({ since: around(-10_000), until: around(10_000) });
-      const near = await fetchJson<ListedRun[]>(`${runner}/api/runs?${query}`, { signal });
+      const query = { since: around(-10_000), until: around(10_000) };
+      const near = await runnerAt(runner).get("/api/runs", { query, signal });
       const ids = near.filter((each) => each.group === run.group && each.id !== run.id);
       return Promise.all(ids.map((each) => getRun(runner ?? "", each.id, signal)));
     },
@@ -201,7 +195,7 @@ export function useRaw(runner: string | undefined, run: Run) {
   return useQuery({
     queryKey: ["runs", "raw", run.id],
     queryFn: ({ signal }) =>
-      fetchJson<RunnerApi["RawMessages"]>(`${runner}/api/runs/${run.id}/raw`, { signal }),
+      runnerAt(runner).get("/api/runs/{run}/raw", { path: { run: run.id }, signal }),
     enabled: runner !== undefined && !run.simulated,
   });
 }

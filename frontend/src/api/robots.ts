@@ -1,6 +1,7 @@
 /** Robots as the runner tells them, and what it looks at before a start. */
 import { useQueries, useQuery } from "@tanstack/react-query";
-import { fetchJson, fetchText } from "./http";
+import { runnerAt } from "./client";
+import { fetchText } from "./http";
 import type { RunnerApi } from "./schema/runner";
 
 export const SIMULATOR = "simulator";
@@ -24,14 +25,13 @@ export type PreflightItem = RunnerApi["Item"];
  * that cannot be overridden. */
 export type Preflight = RunnerApi["Preflight"];
 
-const path = (runner: string | undefined, name: string) =>
-  `${runner ?? ""}/api/robots/${encodeURIComponent(name)}`;
+const path = (runner: string, name: string) => `${runner}/api/robots/${encodeURIComponent(name)}`;
 
 /** Query whether the runner can reach robots over ROS 2, and the reason if not. */
 export function useRosReach(runner: string | undefined) {
   return useQuery({
     queryKey: ["robots", "reach"],
-    queryFn: ({ signal }) => fetchJson<RunnerApi["ReachStatus"]>(`${runner}/api/reach`, { signal }),
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/reach", { signal }),
     enabled: runner !== undefined,
   });
 }
@@ -40,17 +40,20 @@ export function useRosReach(runner: string | undefined) {
 export function useFoundEngines(runner: string | undefined, on: boolean) {
   return useQuery({
     queryKey: ["robots", "candidates"],
-    queryFn: ({ signal }) =>
-      fetchJson<RunnerApi["Sighting"]>(`${runner}/api/candidates/now`, { signal }),
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/candidates/now", { signal }),
     enabled: on && runner !== undefined,
     refetchInterval: ({ state }) => ((state.data?.left_s ?? 0) > 0 ? 500 : 5_000),
   });
 }
 
+function indexedByRobot(runner: string | undefined, name: string, signal: AbortSignal) {
+  return runnerAt(runner).get("/api/robots/{name}/known", { path: { name }, signal });
+}
+
 export function useIndexedByRobot(runner: string | undefined, robot: string, on: boolean) {
   return useQuery({
     queryKey: ["robots", "known", robot],
-    queryFn: ({ signal }) => fetchJson<IndexedByRobot>(`${path(runner, robot)}/known`, { signal }),
+    queryFn: ({ signal }) => indexedByRobot(runner, robot, signal),
     enabled: on && runner !== undefined,
     refetchInterval: 10_000,
   });
@@ -64,8 +67,7 @@ export function useIndexedByRobots(
   return useQueries({
     queries: robots.map((robot) => ({
       queryKey: ["robots", "known", robot],
-      queryFn: ({ signal }: { signal: AbortSignal }) =>
-        fetchJson<IndexedByRobot>(`${path(runner, robot)}/known`, { signal }),
+      queryFn: ({ signal }: { signal: AbortSignal }) => indexedByRobot(runner, robot, signal),
       enabled: runner !== undefined,
       refetchInterval: 30_000,
     })),
@@ -82,28 +84,29 @@ export function indexedAction(runner: string, robot: string, action: string): Pr
 export function useRobotLog(runner: string | undefined, robot: string, on: boolean) {
   return useQuery({
     queryKey: ["robots", "flight", robot],
-    queryFn: ({ signal }) => fetchJson<RobotLogLine[]>(`${path(runner, robot)}/events`, { signal }),
+    queryFn: ({ signal }) =>
+      runnerAt(runner).get("/api/robots/{name}/events", { path: { name: robot }, signal }),
     enabled: on && runner !== undefined,
     refetchInterval: 3_000,
   });
 }
 
 export function registerRobot(runner: string, robot: Registration): Promise<Robot> {
-  return fetchJson(`${runner}/api/robots`, { method: "POST", body: robot });
+  return runnerAt(runner).post("/api/robots", { body: robot });
 }
 
 export function changeRobot(runner: string, robot: Registration): Promise<Robot> {
   const { name, ...body } = robot;
-  return fetchJson(path(runner, name), { method: "PATCH", body });
+  return runnerAt(runner).patch("/api/robots/{name}", { path: { name }, body });
 }
 
 export function forgetRobot(runner: string, name: string): Promise<unknown> {
-  return fetchJson(path(runner, name), { method: "DELETE" });
+  return runnerAt(runner).delete("/api/robots/{name}", { path: { name } });
 }
 
 /** Stops whatever a robot runs, whoever started it. */
 export function stopRobot(runner: string, name: string): Promise<unknown> {
-  return fetchJson(`${path(runner, name)}/stop`, { method: "POST", body: {}, timeoutMs: 6_000 });
+  return runnerAt(runner).post("/api/robots/{name}/stop", { path: { name }, timeoutMs: 6_000 });
 }
 
 /** A graph that a robot holds, as text to import. */

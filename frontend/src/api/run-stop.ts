@@ -2,7 +2,8 @@
  * The part of runs that Stop needs: whether one goes on, its newest state, and the request. STOP
  * loads this and no list.
  */
-import { fetchJson } from "./http";
+import { runnerAt } from "./client";
+import { fetchAnswer } from "./http";
 import type { RunnerApi } from "./schema/runner";
 
 /** A run as far as it is told: lists leave out its actions, and what is live its graph. */
@@ -34,15 +35,16 @@ export function needsRestConfirmation(run: Run): boolean {
 }
 
 /** Asks to stop one run, or all of them. */
-export function postStop(runner: string, run: string | "all", stop: string): Promise<unknown> {
+export async function postStop(
+  runner: string,
+  run: string | "all",
+  stop: string,
+): Promise<unknown> {
   const path = run === "all" ? "/api/stop" : `/api/runs/${encodeURIComponent(run)}/stop`;
-  return fetchJson(`${runner}${path}`, {
-    method: "POST",
-    body: { stop_id: stop },
-    timeoutMs: 3_000,
-  });
+  const request = { method: "POST", body: { stop_id: stop }, timeoutMs: 3_000 } as const;
+  return (await fetchAnswer(`${runner}${path}`, request)).json();
 }
 
 export function getRun(runner: string, id: string, signal?: AbortSignal): Promise<Run> {
-  return fetchJson(`${runner}/api/runs/${encodeURIComponent(id)}`, signal ? { signal } : {});
+  return runnerAt(runner).get("/api/runs/{run}", { path: { run: id }, signal });
 }

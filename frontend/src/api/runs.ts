@@ -2,7 +2,7 @@
 
 import { useQuery } from "@tanstack/react-query";
 import { isolated } from "../words/isolated";
-import { fetchJson } from "./http";
+import { runnerAt } from "./client";
 import { getRun, type Run } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
 
@@ -46,13 +46,12 @@ export function currentAlarm(run: Run): Run["alarms"][number] | undefined {
 
 /** Says that somebody has seen the run at rest, and how. */
 export function confirmRest(runner: string, run: string, how: string): Promise<Run> {
-  const path = `/api/runs/${encodeURIComponent(run)}/at_rest`;
-  return fetchJson(`${runner}${path}`, { method: "POST", body: { how } });
+  return runnerAt(runner).post("/api/runs/{run}/at_rest", { path: { run }, body: { how } });
 }
 
 /** The graphs inside, by value. Nothing where there are none: then nobody needs to know of them. */
 export interface Inside {
-  subgraphs?: readonly object[];
+  subgraphs?: RunnerApi["SentSubgraph"][];
   tree_digest?: string;
 }
 
@@ -79,13 +78,12 @@ export type Started = Pick<RunnerApi["GroupShown"], "runs" | "failed">;
 
 /** Starts a version by value. The same `request` never starts twice. */
 export async function startRun(order: StartOrder): Promise<Started> {
-  const [engine, ...others] = order.engines;
-  const alone = others.length === 0;
+  const [engine = "", ...others] = order.engines;
+  const runner = runnerAt(order.runner);
   const body = {
     version: order.version,
     digest: order.digest,
     graph: order.graph,
-    ...(alone ? { engine } : { engines: order.engines }),
     request_id: order.request,
     ...(order.override === undefined ? {} : { override: order.override }),
     ...(order.script === undefined ? {} : { script: order.script }),
@@ -93,11 +91,10 @@ export async function startRun(order: StartOrder): Promise<Started> {
     umrf: order.umrf,
     ...order.inside,
   };
-  if (!alone) return fetchJson(`${order.runner}/api/groups`, { method: "POST", body });
-  const run = await fetchJson<RunnerApi["RunShown"]>(`${order.runner}/api/runs`, {
-    method: "POST",
-    body,
-  });
+  if (others.length > 0) {
+    return runner.post("/api/groups", { body: { ...body, engines: order.engines } });
+  }
+  const run = await runner.post("/api/runs", { body: { ...body, engine } });
   return { runs: [run], failed: {} };
 }
 
@@ -110,16 +107,13 @@ export function findStart(
   patience: number,
   signal?: AbortSignal,
 ): Promise<StartFound> {
-  const path = `${runner}/api/starts/${encodeURIComponent(request)}`;
-  return fetchJson(path, { timeoutMs: patience, ...(signal ? { signal } : {}) });
+  const path = { request_id: request };
+  return runnerAt(runner).get("/api/starts/{request_id}", { path, timeoutMs: patience, signal });
 }
 
 /** Pauses a run, or lets it go on. */
 export function pauseOrResume(runner: string, run: string, way: "pause" | "resume"): Promise<Run> {
-  return fetchJson(`${runner}/api/runs/${encodeURIComponent(run)}/${way}`, {
-    method: "POST",
-    body: {},
-  });
+  return runnerAt(runner).post(`/api/runs/{run}/${way}`, { path: { run } });
 }
 
 /** Gives a run another version of its graph, by value. Its engine pauses it for that. */
@@ -129,17 +123,14 @@ export function modifyRun(
   version: { id: string; digest: string; umrf: string },
 ): Promise<Run> {
   const body = { version: version.id, digest: version.digest, umrf: version.umrf };
-  return fetchJson(`${runner}/api/runs/${encodeURIComponent(run)}/modify`, {
-    method: "POST",
-    body,
-  });
+  return runnerAt(runner).post("/api/runs/{run}/modify", { path: { run }, body });
 }
 
 export function useRuns(runner: string | undefined, graph?: string) {
-  const filter = graph === undefined ? "" : `&graph=${encodeURIComponent(graph)}`;
   return useQuery({
     queryKey: ["runs", "list", graph ?? ""],
-    queryFn: ({ signal }) => fetchJson<Run[]>(`${runner}/api/runs?limit=200${filter}`, { signal }),
+    queryFn: ({ signal }) =>
+      runnerAt(runner).get("/api/runs", { query: { limit: 200, graph }, signal }),
     enabled: runner !== undefined,
   });
 }
@@ -149,8 +140,8 @@ export function useLastRun(runner: string | undefined, graph: string) {
   return useQuery({
     queryKey: ["runs", "last", graph],
     queryFn: async ({ signal }) => {
-      const path = `${runner}/api/runs?limit=1&graph=${encodeURIComponent(graph)}`;
-      const [newest] = await fetchJson<Run[]>(path, { signal });
+      const query = { limit: 1, graph };
+      const [newest] = await runnerAt(runner).get("/api/runs", { query, signal });
       return newest ? getRun(runner ?? "", newest.id, signal) : null;
     },
     enabled: runner !== undefined,

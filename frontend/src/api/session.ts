@@ -1,5 +1,6 @@
 /** Session of this browser: trades the token of the link for a cookie. */
-import { errorText, fetchJson, Refusal } from "./http";
+import { editor, runnerAt } from "./client";
+import { errorText, Refusal } from "./http";
 import type { EditorApi } from "./schema/editor";
 
 export type Person = EditorApi["Person"];
@@ -65,24 +66,23 @@ export function rememberPerson(person: Person | null): void {
   else localStorage.setItem(PERSON_KEY, JSON.stringify(person));
 }
 
-type SessionAnswer = EditorApi["SignedIn"];
 /** Role that an invitation gives, and who made it. */
 export type InvitationPreview = EditorApi["Invited"];
 
 /** Throws `Refusal` when the link is none of this server, or was revoked. */
 export function readInvitation(invitation: string): Promise<InvitationPreview> {
-  return fetchJson("/api/session/invitation", { method: "POST", body: { invitation } });
+  return editor.post("/api/session/invitation", { body: { invitation } });
 }
 
 /** Trades a key for a session. Throws `Refusal` when it does not fit. */
 export async function openSession(key: Credential, name = rememberedName()): Promise<Person> {
   const body = { [key.kind]: key.text, ...(name !== "" && { name }) };
-  return (await fetchJson<SessionAnswer>("/api/session", { method: "POST", body })).person;
+  return (await editor.post("/api/session", { body })).person;
 }
 
 /** Return the person of the cookie. Throws a `Refusal` with status 401 without one. */
 export async function currentPerson(timeoutMs = 20_000): Promise<Person> {
-  return (await fetchJson<SessionAnswer>("/api/session", { timeoutMs })).person;
+  return (await editor.get("/api/session", { timeoutMs })).person;
 }
 
 const FAREWELL_KEY = "aa.farewell";
@@ -104,7 +104,7 @@ export async function signOut(runner: string | undefined): Promise<void> {
 /** End the session on one server; a session that has ended already is no error. */
 async function endSession(who: string, place: string): Promise<void> {
   try {
-    await fetchJson(`${place}/api/session`, { method: "DELETE" });
+    await runnerAt(place).delete("/api/session", {});
   } catch (error) {
     if (error instanceof Refusal && error.details.status === 401) return;
     throw new Error(`${who} could not end this session: ${errorText(error)} ${OWN_FOLDER}`);
@@ -127,7 +127,7 @@ export function takeFarewell(): string {
 
 /** Continue the session under another name. */
 export async function renamePerson(name: string): Promise<Person> {
-  const answer = await fetchJson<SessionAnswer>("/api/session", { method: "POST", body: { name } });
+  const answer = await editor.post("/api/session", { body: { name } });
   rememberName(name);
   return answer.person;
 }

@@ -1,9 +1,9 @@
 /** Links that let people in, as owners see them. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { errorText, fetchJson } from "./http";
+import { editor, runnerAt } from "./client";
+import { errorText } from "./http";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
-import type { Role } from "./session";
 
 export type Guest = EditorApi["Guest"];
 /** `path` follows the origin of the page, and is absent once the link is revoked. `unrecorded`: nobody
@@ -21,7 +21,7 @@ const LOOK = 4_000; // ms: who came in is seen soon
 export function useSharing() {
   return useQuery({
     queryKey: KEY,
-    queryFn: ({ signal }) => fetchJson<Sharing>("/api/invitations", { signal }),
+    queryFn: ({ signal }) => editor.get("/api/invitations", { signal }),
     refetchInterval: LOOK,
   });
 }
@@ -29,8 +29,7 @@ export function useSharing() {
 export function useInvite() {
   const client = useQueryClient();
   return useMutation({
-    mutationFn: (wanted: { role: Role; label: string }) =>
-      fetchJson<Invitation>("/api/invitations", { method: "POST", body: wanted }),
+    mutationFn: (body: EditorApi["Inviting"]) => editor.post("/api/invitations", { body }),
     onSettled: () => client.invalidateQueries({ queryKey: KEY }),
   });
 }
@@ -40,10 +39,12 @@ export function useRevoke(runner: string | undefined) {
   const client = useQueryClient();
   return useMutation({
     mutationFn: async (invitation: string) => {
-      const path = `/api/invitations/${encodeURIComponent(invitation)}/revoke`;
-      const told = [fetchJson<unknown>(path, { method: "POST" })];
+      const path = { invitation };
+      const told: Promise<unknown>[] = [
+        editor.post("/api/invitations/{invitation}/revoke", { path }),
+      ];
       if (runner !== undefined) {
-        told.push(fetchJson(`${runner}/api/revocations`, { method: "POST", body: { invitation } }));
+        told.push(runnerAt(runner).post("/api/revocations", { body: { invitation } }));
       }
       // Each puts them out by itself, whatever the other says.
       const outcomes = await Promise.allSettled(told);

@@ -1,5 +1,5 @@
 /** Before a start: what is looked at, and who has said yes. */
-import { fetchJson } from "./http";
+import { runnerAt } from "./client";
 import type { Preflight } from "./robots";
 import type { Inside } from "./runs";
 import type { RunnerApi } from "./schema/runner";
@@ -12,11 +12,11 @@ export function fetchApprovals(
   digest: string,
   signal: AbortSignal,
 ): Promise<Approval[]> {
-  return fetchJson(`${runner}/api/approvals?digest=${encodeURIComponent(digest)}`, { signal });
+  return runnerAt(runner).get("/api/approvals", { query: { digest }, signal });
 }
 
 export function approve(runner: string, body: RunnerApi["ApprovalRequest"]): Promise<Approval> {
-  return fetchJson(`${runner}/api/approvals`, { method: "POST", body });
+  return runnerAt(runner).post("/api/approvals", { body });
 }
 
 /** Check what prevents a start, for each engine. Nothing is sent to a robot but a get. */
@@ -28,7 +28,7 @@ export function runPreflight(
   signal: AbortSignal,
 ): Promise<Preflight[]> {
   const body = { engines, ...(behaviours ? { behaviours } : {}), ...what };
-  return fetchJson(`${runner}/api/preflight`, { method: "POST", body, signal });
+  return runnerAt(runner).post("/api/preflight", { body, signal });
 }
 
 /** State of the index folder as the runner sees it, and the files that could be written there. */
@@ -38,8 +38,8 @@ export type IndexFolderLook = RunnerApi["IndexFolderState"];
 export function writeIntoIndex(
   runner: string,
   robot: string,
-  body: { digest: string; replace: string[] } & Inside,
+  body: RunnerApi["IndexWriteRequest"],
 ): Promise<RunnerApi["IndexWriteAnswer"]> {
-  const route = `${runner}/api/robots/${encodeURIComponent(robot)}/index`;
-  return fetchJson(route, { method: "POST", body, timeoutMs: 30_000 });
+  const request = { path: { name: robot }, body, timeoutMs: 30_000 };
+  return runnerAt(runner).post("/api/robots/{name}/index", request);
 }

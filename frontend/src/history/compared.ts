@@ -2,11 +2,10 @@
 
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
+import { runnerAt } from "../api/client";
 import { type Version, versionName } from "../api/graphs";
 import type { HistoryEntry } from "../api/history";
-import { fetchJson } from "../api/http";
 import { useLive } from "../api/page-link";
-import { umrfUrl } from "../api/review";
 import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
 import type { PastPlace } from "../edit-actions/editor-context";
@@ -138,7 +137,8 @@ function useRunGraph(run: string | null, other: Graph | null) {
   const found = useQuery({
     enabled: run !== null && runner !== undefined,
     queryKey: ["runs", "umrf", run],
-    queryFn: ({ signal }) => fetchJson<unknown>(umrfUrl(runner ?? "", run ?? ""), { signal }),
+    queryFn: ({ signal }) =>
+      runnerAt(runner).get("/api/runs/{run}/umrf", { path: { run: run ?? "" }, signal }),
     staleTime: Number.POSITIVE_INFINITY,
   });
   const { data } = found;

@@ -2,8 +2,9 @@
 
 import { keepPreviousData, useQueries } from "@tanstack/react-query";
 import { useMemo } from "react";
+import { editor } from "../api/client";
 import { queryKeys, useGraphs } from "../api/graphs";
-import { errorText, fetchJson } from "../api/http";
+import { errorText } from "../api/http";
 import { fromUmrf } from "../canvas/from-umrf";
 import type { Action, Graph, Key } from "../graph/model";
 import { Watched } from "../ui/watched";
@@ -119,10 +120,11 @@ export function useLevelGraphs(ids: readonly string[]): ReadonlyMap<string, Grap
     queries: ids.map((id) => {
       // The list of graphs tells of every change; without it each graph is loaded once.
       const seq = graphs?.find((graph) => graph.id === id)?.seq ?? 0;
-      const path = `/api/graphs/${encodeURIComponent(id)}/umrf?identities=true`;
+      const wanted = { path: { graph_id: id }, query: { identities: true } };
       return {
         queryKey: [...queryKeys.graph(id), "umrf", seq],
-        queryFn: ({ signal }: { signal: AbortSignal }) => fetchJson<unknown>(path, { signal }),
+        queryFn: ({ signal }: { signal: AbortSignal }) =>
+          editor.get("/api/graphs/{graph_id}/umrf", { ...wanted, signal }),
         placeholderData: keepPreviousData,
         select: read,
       };

@@ -2,8 +2,7 @@
 
 import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { queryKeys, type Version } from "../api/graphs";
-import { fetchJson } from "../api/http";
+import { fetchVersion, queryKeys } from "../api/graphs";
 import { useLive } from "../api/page-link";
 import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
@@ -63,8 +62,7 @@ export function useRunningGraph(run: Run | null): { seq: number; graph: Graph } 
   const goes = run !== null && run.ended_at === null;
   const version = useQuery({
     queryKey: queryKeys.version(run?.version ?? ""),
-    queryFn: ({ signal }) =>
-      fetchJson<Version>(`/api/versions/${encodeURIComponent(run?.version ?? "")}`, { signal }),
+    queryFn: ({ signal }) => fetchVersion(run?.version ?? "", signal),
     enabled: goes && run.version !== null,
     staleTime: Number.POSITIVE_INFINITY,
   }).data;

@@ -8,7 +8,8 @@
  * Works without React.
  */
 
-import { fetchJson, Refusal } from "../api/http";
+import { editor } from "../api/client";
+import { Refusal } from "../api/http";
 import { currentPerson } from "../api/session";
 import {
   browserStore,
@@ -394,7 +395,7 @@ function admissionCheck(
     try {
       const here = await currentPerson();
       if (here.id !== person) return "other-person";
-      if (again) await fetchJson(`/api/graphs/${encodeURIComponent(graph)}`);
+      if (again) await editor.get("/api/graphs/{graph_id}", { path: { graph_id: graph } });
       return null;
     } catch (error) {
       if (!(error instanceof Refusal)) throw error;

@@ -231,9 +231,11 @@ function IndexWriting({ item, look, robot, graph, seq, onLookAgain }: IndexWriti
   const { folder } = item;
   const write = useMutation({
     mutationFn: async () => {
-      const inside = await fetchInside(graph, seq);
+      const { subgraphs, ...pinned } = await fetchInside(graph, seq);
+      if (!subgraphs) throw new Error("The graph has no sub-graphs any more.");
       const replace = (folder?.writable ?? []).flatMap((each) => (each.replaces ? each.graph : []));
-      return writeIntoIndex(runner ?? "", robot, { digest: look.digest, replace, ...inside });
+      const { digest } = look;
+      return writeIntoIndex(runner ?? "", robot, { digest, replace, subgraphs, ...pinned });
     },
     onSuccess: onLookAgain,
     onError: onLookAgain,

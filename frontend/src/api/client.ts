@@ -1,0 +1,102 @@
+/** Requests to the routes of both processes, typed by their OpenAPI, from `make types`. */
+import { fetchAnswer, type RequestOptions } from "./http";
+import type { EditorPaths } from "./schema/editor";
+import type { RunnerPaths } from "./schema/runner";
+
+type Method = "get" | "post" | "put" | "patch" | "delete";
+
+/** The paths of a process that have a method. */
+type PathOf<Paths, M extends Method> = {
+  [P in keyof Paths]: Paths[P] extends { [method in M]: unknown } ? P : never;
+}[keyof Paths];
+
+type Operation<Paths, M extends Method, P> = P extends keyof Paths
+  ? Paths[P] extends { [method in M]: infer O }
+    ? O
+    : never
+  : never;
+
+/** A parameter without a value is left out. */
+type Query<T> = { readonly [K in keyof T]: T[K] | undefined } | URLSearchParams;
+
+type Frozen<T> = T extends object ? { readonly [K in keyof T]: Frozen<T[K]> } : T;
+
+/** A UMRF file may also be text, which is sent as it is: its numbers stay as they are written. */
+type Body<T> = string extends keyof T ? T | string : Frozen<T>;
+
+interface Json<T> {
+  content: { "application/json": T };
+}
+
+/** The path parameters, the query and the body that an operation takes. */
+type Input<O> = (O extends { parameters: { path: infer T } } ? { readonly path: T } : unknown) &
+  (O extends { parameters: { query: infer T } }
+    ? { readonly query: Query<T> }
+    : O extends { parameters: { query?: infer T } }
+      ? { readonly query?: Query<T> }
+      : unknown) &
+  (O extends { requestBody: Json<infer T> }
+    ? { readonly body: Body<T> }
+    : O extends { requestBody?: Json<infer T> }
+      ? { readonly body?: Body<T> }
+      : unknown);
+
+type Answers<O> = O extends { responses: infer R }
+  ? { [S in keyof R]: R[S] extends Json<infer T> ? T : undefined }
+  : never;
+
+type Options = Omit<RequestOptions, "method" | "body">;
+
+/** Sends a request and returns the JSON of the answer. Throws `Refusal` or `Unreachable`. */
+type Send<Paths, M extends Method> = <
+  P extends PathOf<Paths, M>,
+  S extends keyof Answers<Operation<Paths, M, P>>,
+>(
+  path: P,
+  /** `status`: the one of the wanted answer, where the answers of an operation differ in type. */
+  request: Input<Operation<Paths, M, P>> & Options & { readonly status?: S },
+) => Promise<Answers<Operation<Paths, M, P>>[S]>;
+
+type Client<Paths> = { readonly [M in Method]: Send<Paths, M> };
+
+interface Request extends Options {
+  readonly path?: Readonly<Record<string, string | number>>;
+  readonly query?: Readonly<Record<string, unknown>> | URLSearchParams;
+  readonly body?: unknown;
+  readonly status?: number;
+}
+
+function urlOf(route: string, { path = {}, query = {} }: Request): string {
+  const url = route.replace(/\{(\w+)\}/g, (_, name) => encodeURIComponent(path[name] ?? ""));
+  const given = Object.entries(query).filter(([, value]) => value != null);
+  const text = new URLSearchParams(query instanceof URLSearchParams ? query : given).toString();
+  return text === "" ? url : `${url}?${text}`;
+}
+
+function clientOf<Paths>(origin: string): Client<Paths> {
+  const send = (method: NonNullable<RequestOptions["method"]>) => {
+    return async (route: string, request: Request): Promise<unknown> => {
+      const { path, query, status, ...options } = request;
+      const response = await fetchAnswer(origin + urlOf(route, request), { method, ...options });
+      if (status !== undefined && response.status !== status) {
+        throw new Error(`The server answered ${response.status} instead of ${status}.`);
+      }
+      return response.status === 204 ? undefined : response.json();
+    };
+  };
+  const client: Record<Method, (route: string, request: Request) => Promise<unknown>> = {
+    get: send("GET"),
+    post: send("POST"),
+    put: send("PUT"),
+    patch: send("PATCH"),
+    delete: send("DELETE"),
+  };
+  return client as Client<Paths>;
+}
+
+export const editor = clientOf<EditorPaths>("");
+
+/** The client of the runner at this address; the page does not know it at first, and does not ask. */
+export function runnerAt(address: string | undefined): Client<RunnerPaths> {
+  return clientOf(address ?? "");
+}
