@@ -7,9 +7,11 @@ from contextlib import suppress
 from typing import Any
 
 import anyio
+import msgspec
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from pycrdt import Doc, Map
 from sqlalchemy import delete, select
 
 from action_assistant.editor.history import index_queries
@@ -254,3 +256,21 @@ def test_a_key_speaks_of_what_stands_before_its_first_bar(aid: str, rest: str) -
     assert owner_of("positions", aid) == aid
     assert owner_of("positions", "g/note") == "g/note"
     assert owner_of("meta", f"x/{rest}") == ""
+
+
+async def test_rows_are_stored_in_the_order_of_the_indexes(journal: Journal, rooms: Rooms) -> None:
+    doc: Doc[Any] = Doc()
+    with doc.transaction():
+        for root in ("actions", "relations"):
+            fields = doc.get(root, type=Map)
+            for n in random.Random(1).sample(range(1000), 300):
+                fields[f"key{n:04}"] = "value"
+    async with rooms.enter(graph_stream(GRAPH)) as room:
+        await room.submit(doc.get_update(), "ada")
+    found = await ChangeIndex(journal).value(index_queries.growth, GRAPH, 200)
+    assert found is not None
+    rows = [row for each in found.slices for row in msgspec.msgpack.decode(each)]
+    place = [index_queries.COLUMNS.index(name) for name in ("seq", "root", "key")]
+    stored = [tuple(row[n] for n in place) for row in rows]
+    assert len(stored) == 600
+    assert stored == sorted(stored)

@@ -56,7 +56,9 @@ def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth |
     found = observed(document, events)
     if found is None:
         return IndexGrowth(seq, 0, b"", (), leftovers=leftovers, unreadable=True)
-    rows = [(graph, owner_of(each.root, each.key), *each) for each in found.changes]
+    # In the order of the table's indexes: rows in any order touch as many pages as there are rows.
+    changes = sorted(found.changes, key=lambda each: (each.seq, each.root, each.key))
+    rows = [(graph, owner_of(each.root, each.key), *each) for each in changes]
     slices = tuple(
         msgspec.msgpack.encode(rows[start : start + slice_rows])
         for start in range(0, len(rows), slice_rows)

@@ -150,7 +150,7 @@ class Lane:
             raise Unavailable("Whoever asked for this has gone.")
         if failed is not None:
             raise failed
-        kind, value = pickle.loads(reply[1:])
+        kind, value = pickle.loads(memoryview(reply)[1:])
         if kind == "raised":
             raise value
         outcome: T = value
