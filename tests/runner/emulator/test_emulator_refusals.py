@@ -21,6 +21,7 @@ from action_assistant.runner.emulator.messages import (
     Modify,
     Start,
     Stop,
+    graph_plan_of,
     index_of,
 )
 from action_assistant.umrf.semantics import script_from
@@ -255,3 +256,10 @@ def test_a_refused_change_is_told_with_where_it_came_from() -> None:
         "origin [in modifyGraph]: Cannot modify graph 'g': Action 'Work_0' cannot be deleted, because "
         "it is in an active state (PAUSED)\n   fwd [in modifyGraph]: forwarding\n"
     )
+
+
+def test_attributes_of_an_action_come_back_also_where_its_number_is_cut() -> None:
+    mark = {"action_assistant": {"run": "r1"}}
+    sent = json.loads(chain("g", "Work_1", gui_attributes=mark))
+    sent["actions"][0]["instance_id"] = 1.5
+    assert graph_plan_of(json.dumps(sent)).attributes == {"Work_1": mark}

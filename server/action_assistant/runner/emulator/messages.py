@@ -183,7 +183,7 @@ def graph_plan_of(text: str) -> GraphPlan:
     if refusals := checks.refused_by_parser(reading):
         raise Refusal(f"origin [in fromUmrfGraphJsonStr]: {refusals[0].message}\n")
     attributes = {
-        f"{each.get('name')}_{each.get('instance_id', 0)}": each["gui_attributes"]
+        f"{each.get('name')}_{int(each.get('instance_id', 0))}": each["gui_attributes"]
         for each in tree.get("actions", ())
         if isinstance(each, dict) and "gui_attributes" in each
     }
