@@ -9,11 +9,11 @@ import sys
 
 
 def _stay_out_of_the_working_folder() -> None:
-    """Import nothing from the folder that somebody happens to be in, here and in whatever we start.
+    """Keep Python from importing modules of the working folder, here and in all processes that we
+    start.
 
-    `python -m` and an empty entry of PYTHONPATH put it before everything else, Python's own modules
-    too, so this comes before any of these. Started as `python -P -m` even they are safe: nothing of
-    ours can come before Python's search for ourselves.
+    `python -m` and an empty entry of PYTHONPATH put that folder before Python's own modules, so
+    this runs before any import of ours. `python -P -m` is safe from the start.
     """
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
@@ -31,8 +31,8 @@ _stay_out_of_the_working_folder()
 
 
 def main() -> int:
-    """Run one command; the exit code. What PYTHONPATH offers is put away before anything of ours is
-    imported, and comes back for the runner only, as far as it belongs to ROS 2."""
+    """Run one command and return its exit code. PYTHONPATH is removed before anything of ours is
+    imported; the runner gets back the parts that belong to ROS 2."""
     from action_assistant import ros_workspace
 
     ros_workspace.hide()

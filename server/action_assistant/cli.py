@@ -22,9 +22,9 @@ from action_assistant.settings import (
 
 
 class CommandEntry(NamedTuple):
-    """One word of the command line. Its `module` names it in COMMANDS, with the function that gives
-    a parser its arguments and its handler. `described`: its own help begins with the same words.
-    `diagnoses`: it looks at settings itself. `posix`: it needs Linux or macOS."""
+    """One word of the command line. `module`: its module in COMMANDS, with the function that adds
+    its arguments and handler. `described`: its own help begins with the same words. `diagnoses`:
+    it checks settings by itself. `posix`: it needs Linux or macOS."""
 
     module: str
     help: str
@@ -142,12 +142,12 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     ),
 }
 
-#: As `secrets.token_urlsafe(9)` may write it.
+#: An id of a run by `secrets.token_urlsafe(9)` that begins with a dash.
 _DASHED_ID: Final = re.compile(r"-[A-Za-z0-9_][A-Za-z0-9_-]{10}")
 
 
 class _CommandParser(argparse.ArgumentParser):
-    """The parser of one command, complete once it is used."""
+    """The parser of one command, which gets its arguments when it is first used."""
 
     complete: Callable[[], None] | None = None
 
@@ -170,7 +170,7 @@ class _ShowVersion(argparse.Action):
 
 
 def parser() -> argparse.ArgumentParser:
-    """Every command with its help and an example."""
+    """Return the parser of all commands, with help and an example each."""
     top = argparse.ArgumentParser(
         prog="action-assistant",
         description="Design, run and review robot tasks (UMRF graphs) together, in the browser.",
@@ -198,8 +198,8 @@ def _complete(name: str, parser: argparse.ArgumentParser) -> None:
 
 
 def _with_ids_last(arguments: Sequence[str]) -> list[str]:
-    """Ids of runs that an earlier version started may begin with a dash. No
-    option of ours looks like it, and a Stop must not be refused as one that nobody knows."""
+    """Move ids of runs that begin with a dash behind `--`, so that argparse does not refuse a Stop
+    as an unknown option. Earlier versions made such ids."""
     ids = [each for each in arguments if _DASHED_ID.fullmatch(each)]
     if not ids or "--" in arguments:
         return [*arguments]
@@ -221,7 +221,7 @@ def _check(entry: CommandEntry, name: str) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; the exit code."""
+    """Run one command and return its exit code."""
     make_streams_printable()
     if arguments is None:
         hide_password()

@@ -46,7 +46,7 @@ class Refused(Exception):
 
 
 class BadInput(Refused):
-    """The bytes or values that were sent are not those that the route takes."""
+    """The bytes or values sent do not have the form that the route accepts."""
 
     title = "What was sent cannot be read"
 
@@ -140,7 +140,7 @@ class OutcomeUnknown(Refused):
 
 
 class CannotStart(Exception):
-    """The process cannot begin its work; the message says why in one sentence."""
+    """A process or command cannot begin its work; the message gives the reason in one sentence."""
 
 
 class AnothersDatabase(CannotStart):

@@ -15,7 +15,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.ros_workspace import Workspace
 
 VARIABLE: Final = "ACTION_ASSISTANT_RUNNER_PYTHON"
-#: What a sourced ROS 2 puts into the environment. The wheels of `make ros` must not see it.
+#: Variables that a sourced ROS 2 sets. The wheels of `make ros` must not see them.
 _SOURCED: Final = ("PYTHONPATH", "AMENT_PREFIX_PATH", "COLCON_PREFIX_PATH", "LD_LIBRARY_PATH")
 #: Says that this interpreter has been started anew for the wheels; meant for no other one.
 _ANEW: Final = "_ROS_WHEELS_BOOTSTRAP_COMPLETE"
@@ -24,15 +24,15 @@ Origin: TypeAlias = Literal["named", "this", "wheels"]
 
 
 class Interpreter(msgspec.Struct, frozen=True, kw_only=True):
-    """A Python and where it comes from: named in the environment, the one that runs already, or the
-    one that `make ros` made. `remark` is for people: what could be better."""
+    """A Python interpreter and its origin: named in the environment, the running one, or the one
+    that `make ros` made. `remark`: a sentence for people about what could be better."""
 
     path: Path
     origin: Origin
     remark: str = ""
 
     def environment(self, environ: Mapping[str, str]) -> dict[str, str]:
-        """The environment for its processes."""
+        """Return the environment variables for processes of this interpreter."""
         drop = {
             "this": (),
             "named": (_ANEW,),

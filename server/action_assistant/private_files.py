@@ -9,7 +9,7 @@ from typing import Final
 
 from action_assistant.errors import CannotStart
 
-#: What this program puts into a data folder.
+#: The names of files and folders that this program creates in a data folder.
 _OURS: Final = re.compile(
     r"(editor|runner)\.(database|db|mark).*|restore\.unfinished|token|\.token-.*|\.probe-.*|open\.html"
     r"|revoked|sessions|tls|archive|recordings|before-(restore-|move-|upgrade).*|\.(backup|restore|rehearsal|move)-.*"
@@ -95,12 +95,13 @@ def open_to_others(data: Path) -> list[Path]:
 
 
 def holds_nothing_else(data: Path) -> bool:
-    """A folder that somebody keeps other things in stays as they want it."""
+    """Return whether the data folder holds only our files. Otherwise its rights are left to its
+    owner."""
     return all(_OURS.fullmatch(entry.name) for entry in data.iterdir())
 
 
 def _ours_in(data: Path) -> Iterator[Path]:
-    """Files and folders, a folder before what is in it; no links, which lead elsewhere."""
+    """Yield our files and folders, each folder before its content; symbolic links are skipped."""
     for entry in sorted(data.iterdir()):
         if not _OURS.fullmatch(entry.name) or entry.is_symlink():
             continue

@@ -19,14 +19,14 @@ from typing import Final
 
 _INDEX: Final = Path("share", "ament_index", "resource_index", "packages")
 _PYTHON: Final = f"python{sys.version_info.major}.{sys.version_info.minor}"
-#: Where the packages of one Python lie below a prefix, as distributions and colcon have it.
+#: The folders with the packages of one Python below a prefix, in distributions and by colcon.
 _PACKAGES: Final = (
     f"lib/{_PYTHON}/site-packages",
     f"local/lib/{_PYTHON}/dist-packages",
     f"lib/{_PYTHON}/dist-packages",
     "lib/python3/dist-packages",
 )
-#: What rclpy and messages import that is no package of ROS, and a file that only one Python reads.
+#: Modules outside of ROS that rclpy and messages import, and files that only one Python version reads.
 _BESIDE: Final[Mapping[str, tuple[str, ...]]] = {
     "numpy": ("core/_multiarray_umath", "_core/_multiarray_umath"),
     "yaml": (),
@@ -37,9 +37,10 @@ _EXTENSION: Final = "_rclpy_pybind11"
 
 
 def hide() -> None:
-    """Take what PYTHONPATH put before our own packages out of this process and all that it starts.
+    """Remove from this process, and all that it starts, the folders that PYTHONPATH put before our
+    own packages.
 
-    Folders that are there anyway stay, after the others, and so does the one that holds this program.
+    Folders that Python searches anyway stay, after the others; so does the folder of this program.
     """
     named = os.environ.pop("PYTHONPATH", "")
     listed = {_real(each) for each in named.split(os.pathsep) if named}  # "" is where we are
@@ -52,15 +53,15 @@ def hide() -> None:
 
 
 def offer(environ: Mapping[str, str] = os.environ) -> None:
-    """Let this process import rclpy and messages of the workspace that is sourced, if there is one."""
+    """Let this process import rclpy and messages of the sourced workspace, if there is one."""
     workspace = Workspace.of(environ)
     if workspace.prefixes and workspace not in sys.meta_path:
         sys.meta_path.append(workspace)
 
 
 class Workspace:
-    """The prefixes of a sourced ROS 2, the nearest first; none where nothing is sourced. A finder of
-    modules by its methods alone: `importlib.abc` takes longer to import than all of this."""
+    """The prefixes of a sourced ROS 2, nearest first; empty if none is sourced. It finds modules by
+    duck typing, since importing `importlib.abc` takes longer than everything here."""
 
     def __init__(self, prefixes: tuple[Path, ...], system: tuple[Path, ...]) -> None:
         self.prefixes = prefixes
@@ -106,7 +107,7 @@ class Workspace:
         return None
 
     def rclpy(self) -> ModuleSpec | None:
-        """Its rclpy, if that was built for this Python."""
+        """Return the spec of the workspace's rclpy if it was built for this Python; else None."""
         found = self.find_spec("rclpy")
         return found if found is not None and rclpy_fits(found) else None
 
@@ -137,7 +138,7 @@ def rclpy_fits(rclpy: ModuleSpec) -> bool:
 
 
 def prefix_of(file: str) -> str:
-    """The prefix in which a module of a workspace lies, for people."""
+    """Return the prefix that holds a module of a workspace, for messages."""
     for each in Path(file).parents:
         if (each / _INDEX).is_dir():
             return str(each)

@@ -52,25 +52,25 @@ def printable(text: str) -> str:
 
 
 def told(text: str) -> str:
-    """Return sentences as a terminal shows them: no name turns their order.
+    """Return sentences for a terminal, in an order that no name in them reverses.
 
-    Words from right to left stand between marks (U+200E), not in isolates: a terminal that knows none
-    would show them as boxes.
+    Right-to-left words stand between marks (U+200E), not in isolates, which some terminals show as
+    boxes.
     """
     return printable(_ISOLATED.sub("\u200e\\1\u200e", sentence(text)))
 
 
 def one_line(text: str) -> str:
-    """Return the sentence, as `told` shows it, which cannot pretend to be another line."""
+    """Return the text as `told` does, in one line, so that it cannot imitate another line."""
     return told(text).replace("\n", "\\n")
 
 
 def sentence(text: str) -> str:
-    """Return the sentence in an order that no name in it turns.
+    """Return a sentence in an order that no name in it reverses.
 
-    A control of direction is shown as JSON writes it, since nobody knows where the name ends; words from
-    right to left become isolates (U+2068 to U+2069). Any other text stays as it is, and so does an
-    answer of this function.
+    A direction control is shown as JSON writes it, since nobody knows where the name ends;
+    right-to-left words become isolates (U+2068 to U+2069). Other text, and a result of this
+    function, stays unchanged.
     """
     return _TURNED.sub(_in_order, text) if _TURNING.search(text) else text
 
@@ -82,7 +82,8 @@ def _in_order(found: re.Match[str]) -> str:
 
 
 def hold_names(told: msgspec.Struct, *fields: str) -> None:
-    """Make sentences of these fields as `sentence` does: for `__post_init__` of what people are told."""
+    """Apply `sentence` to these fields of a struct; for the `__post_init__` of structs that people
+    read."""
     for field in fields:
         text = getattr(told, field)
         if text and _TURNING.search(text):
@@ -100,8 +101,8 @@ def redacted(text: str, secrets: tuple[str, ...] = ()) -> str:
 
 
 class PrintableStream:
-    """A standard stream, through which nothing steers a terminal. One of `sentences` has no JSON and no
-    files: no name turns them."""
+    """A standard stream that lets no output control the terminal. With `sentences` it also fixes
+    the order of right-to-left names; not for JSON and files."""
 
     def __init__(self, stream: TextIO, *, sentences: bool = False) -> None:
         self._stream = stream
@@ -125,7 +126,7 @@ def make_streams_printable() -> None:
 
 
 class PrintableLog(logging.Formatter):
-    """Writes each record as one line, and what belongs to it indented. `secrets` are never written."""
+    """Writes each record as one line, with its traceback indented. `secrets` are never written."""
 
     def __init__(self, *secrets: str) -> None:
         super().__init__("%(asctime)s %(levelname)s %(name)s: %(message)s")

@@ -50,7 +50,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "direct one fail",
 }
 INDEX_FOLDERS: Final = "ACTION_ASSISTANT_INDEX_FOLDERS"
-#: Where a secret may be that stands in a file, and which variable it is then.
+#: The variables that name a file with a secret, and the variable that the secret stands for.
 _FILES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
     "ACTION_ASSISTANT_DATABASE_FILE": "ACTION_ASSISTANT_DATABASE",
@@ -69,10 +69,10 @@ LOOPBACK: Final = frozenset({"127.0.0.1", "::1", "localhost"})
 
 
 class Reachability(msgspec.Struct, frozen=True):
-    """The way by which others reach this server.
+    """The ways by which others reach this server.
 
-    `public` is the address that a proxy shows, if there is one. The server believes `proxies` about
-    the address of a client.
+    `public`: the address at which a proxy serves it, if any. `proxies`: addresses whose forwarding
+    headers are trusted.
     """
 
     public: PublicUrl | None = None
@@ -97,8 +97,8 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
-    """For how many days runs and raw messages stay here before they go into archives below `folder`;
-    None for ever."""
+    """The number of days for which runs and raw messages stay before they are archived below
+    `folder`; None for ever."""
 
     folder: Path
     runs: float | None = None
@@ -129,7 +129,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
-    """Refuse names that nobody reads: a misspelt setting must not be ignored in silence."""
+    """Raise CannotStart for an unknown variable of ours: a misspelt setting must not be ignored."""
     unknown = sorted(
         name for name in environ if name.startswith("ACTION_ASSISTANT_") and name not in VARIABLES
     )
@@ -139,8 +139,8 @@ def check_environment(environ: Mapping[str, str] = os.environ) -> None:
 
 
 def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> None:
-    """Put the secrets of files that the environment names into it, for this process and what it starts.
-    Raises CannotStart: a secret that is named and not there is not done without."""
+    """Read the secrets from the files that variables name into the environment, for this process
+    and those that it starts. Raise CannotStart if a file cannot be read."""
     for name, secret in _FILES.items():
         path = environ.get(name, "")
         if not path:
@@ -185,8 +185,8 @@ def database(environ: Mapping[str, str] = os.environ) -> str | None:
 
 
 def hide_password() -> None:
-    """Start this program anew with what --database says in the environment, if a password is in it:
-    every user of a computer may read the arguments of every process."""
+    """Restart this program with the URL of --database in the environment, if it holds a password,
+    since every user may read the arguments of a process."""
     for at, word in enumerate(sys.orig_argv):
         name, sign, url = word.partition("=")
         taken = 1 if sign else 2
@@ -338,7 +338,8 @@ def reached(
 def check_host(
     host: str, hosts: tuple[str, ...], *, share: bool = False, public: PublicUrl | None = None
 ) -> None:
-    """Refuse to listen where strangers are unless somebody said so, or by which names."""
+    """Raise CannotStart for an address that strangers reach, unless sharing, host names or a public
+    address are set."""
     if host not in LOOPBACK and not hosts and not share and public is None:
         raise CannotStart(
             f"Listening on {host} would show this computer's graphs and robots to the network. "

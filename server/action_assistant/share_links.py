@@ -21,7 +21,7 @@ _PROOF: Final = 10_000  # bytes
 
 
 class ShareLink(msgspec.Struct, frozen=True):
-    """An invitation, as far as it is printed."""
+    """An invitation, with the fields that are printed."""
 
     role: str
     path: str | None = None
@@ -38,8 +38,8 @@ class Links(msgspec.Struct, frozen=True):
 def invitations_as_text(
     base: str, keys: Keys, trust: ssl.SSLContext | None = None, *, secret: bool = False
 ) -> str:
-    """The links of a running editor, made where a role has none yet; or why there are none. If they
-    are `secret`, only where they are to be found."""
+    """Return the links of a running editor as text, made for roles without one; or why there are
+    none. With `secret`, say only where they are found."""
     try:
         links = msgspec.json.decode(_ask(base, keys, trust, "GET"), type=Links)
         if not links.origins:
@@ -115,14 +115,14 @@ def may_of(role: str) -> str:
 
 
 def _drawn(link: str) -> str:
-    """A QR code of half blocks, light on dark terminals as on light ones."""
+    """Return a QR code of half blocks, readable on dark and light terminals."""
     out = io.StringIO()
     segno.make(link, error="l", micro=False).terminal(out, compact=True, border=2)
     return "".join(f"    {line}\n" for line in out.getvalue().splitlines())
 
 
 def _opener(trust: ssl.SSLContext | None) -> urllib.request.OpenerDirector:
-    """Straight to our own processes: no proxy of the environment is shown the token."""
+    """Return an opener for our own processes that uses no proxy, which would see the token."""
     return urllib.request.build_opener(
         urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=trust)
     )

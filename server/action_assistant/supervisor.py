@@ -37,7 +37,8 @@ _ENDING: Final = 8.0  # seconds that a process gets to end by itself
 
 
 class BackupPlan(msgspec.Struct, frozen=True):
-    """Backups into a folder, every so many seconds; `keep` and `after` as `backup` takes them."""
+    """Backups into a folder, every `every` seconds; `keep` and `after` as the command `backup`
+    takes them."""
 
     into: Path
     every: float
@@ -65,8 +66,8 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
 class EndSignal:
     """Remembers whether one of some signals was received.
 
-    Python runs a handler in the main thread at any moment, also while that thread holds a lock, for
-    example inside `threading.Event.wait`. A handler that took the same lock would deadlock. This
+    Python runs a handler in the main thread at any time, also while that thread holds a lock, for
+    example inside `threading.Event.wait`; a handler that took the same lock would deadlock. This
     handler takes no lock.
     """
 
@@ -132,7 +133,7 @@ class Child:
         if code is None:
             return None
         self._process = None
-        # It said itself that it cannot start. Once both have worked, neither ends the other: a runner
+        # The process has reported that it cannot start. Once both have worked, neither ends the other: a runner
         # stops robots while the editor's database is away.
         if code == 2 and self._starts == 1:
             return code
@@ -157,7 +158,8 @@ class Child:
 
 
 def serve(plan: ServePlan) -> int:
-    """Run until told to end; the exit code. Raises CannotStart when a port is taken."""
+    """Run all processes until told to end; return the exit code. Raise CannotStart if a port is
+    taken."""
     for port in (plan.port, plan.port + 1):
         for probe in bound(plan.host, port):
             probe.close()
@@ -191,7 +193,7 @@ def serve(plan: ServePlan) -> int:
 
 
 def _children(plan: ServePlan) -> list[Child]:
-    """The runner last: it is the last to end."""
+    """Return the processes; the runner is the last, since it ends last."""
     address = ["--data", str(plan.data), "--host", plan.host]
     address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
     database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
@@ -237,7 +239,8 @@ def _keeper(plan: ServePlan) -> Child | None:
 
 
 def _as_settings(reached: Reachability) -> dict[str, str]:
-    """For the environment of both: an argument might contain a word by which people find processes."""
+    """Return environment variables for both processes. They are not arguments, which might contain
+    a word by which people find processes."""
     return {
         "ACTION_ASSISTANT_PUBLIC_URL": f"{reached.public.page}/" if reached.public else "",
         "ACTION_ASSISTANT_TRUSTED_PROXIES": ",".join(str(each) for each in reached.proxies),
@@ -245,7 +248,8 @@ def _as_settings(reached: Reachability) -> dict[str, str]:
 
 
 def _certified(plan: ServePlan) -> ssl.SSLContext | None:
-    """With --tls, how to trust ourselves; the certificate is there before the processes are."""
+    """With --tls, issue the certificate before the processes start; return the TLS context that
+    trusts it, else None."""
     if not plan.tls:
         return None
     # Most do without, and it takes as long to load as much of the rest.
@@ -307,7 +311,7 @@ def _answer(
     children: list[Child],
     enough: EndSignal,
 ) -> bool:
-    """Waits until every process answers; False if it is told to end before."""
+    """Wait until every process answers; return False if told to end before."""
     deadline = time.monotonic() + _PATIENCE
     for child in children:
         while not is_ours(f"{origin}:{child.port}", keys, trust):

@@ -130,7 +130,7 @@ export function ProcessCard({ title, asked: { data, error } }: Props) {
 export interface StatusFact {
   readonly name: string;
   readonly value: ReactNode;
-  /** Somebody should look at it. */
+  /** True if a person should look at this fact. */
   readonly isBad?: boolean;
 }
 

@@ -184,7 +184,7 @@ export const sessionEnd = {
   },
   /** A server has answered that nobody is signed in. */
   notice: (): void => put(true),
-  /** Somebody is signed in. */
+  /** A person has signed in. */
   clear: (): void => put(false),
 };
 

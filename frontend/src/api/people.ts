@@ -1,4 +1,4 @@
-/** In which colour people are shown: the server gives each one that nobody else has who is here. */
+/** The colours of people: the server assigns one that nobody else here has. */
 import { useQuery } from "@tanstack/react-query";
 import { createContext, use, useCallback, useEffect } from "react";
 import { editor } from "./client";

@@ -39,7 +39,7 @@ export function rememberedName(): string {
 
 const PERSON_KEY = "aa.person";
 
-/** Whose pages this device may show while no server answers; null when nobody is signed in here. */
+/** Returns the person whose pages this device may show while no server answers; null if nobody is signed in. */
 export function rememberedPerson(): Person | null {
   try {
     const kept: unknown = JSON.parse(localStorage.getItem(PERSON_KEY) ?? "null");

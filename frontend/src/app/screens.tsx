@@ -41,7 +41,7 @@ export function preloadAt(path: string): Promise<void> {
   return part.preload();
 }
 
-/** Others follow one by one while nothing else is to be done; not where data is to be saved. */
+/** Loads the other screens one by one while the browser is idle; not where data is to be saved. */
 export async function preloadWhenIdle(): Promise<void> {
   const { connection } = navigator as { connection?: { saveData?: boolean } };
   if (!connection?.saveData) await preloadParts(idle);

@@ -17,7 +17,7 @@ export interface EditAction {
   readonly changes: boolean;
   /** The browser raises an event of its own for its shortcut, and gives the clipboard with it. */
   readonly event?: "copy" | "cut" | "paste";
-  /** Other words that people look for it by. */
+  /** Further words by which the palette finds the action. */
   readonly also?: string;
   enabled(context: EditorContext): boolean;
   /** The message for a person who presses its key while it has nothing to do. */

@@ -81,7 +81,7 @@ export function useCompared(
     ...{ from, to, newest, changes, foreign },
     graph: later.graph,
     here: later.here,
-    /** By which one steps. */
+    /** The walk of the side on which the reader steps. */
     walk: to === place.at ? later.walk : earlier.walk,
     error: later.error ?? earlier.error ?? sent.error,
   };

@@ -254,7 +254,7 @@ export function countWords(things: readonly ChangedThing[], change: ChangeMark["
   ].join(", ");
 }
 
-/** In which order they are walked through: what means something first. */
+/** Sorts changes for walking through; changes of looks come last. */
 export function walkOrder(things: readonly ChangedThing[]): ChangedThing[] {
   return [...things].sort((a, b) => Number(a.looks) - Number(b.looks));
 }

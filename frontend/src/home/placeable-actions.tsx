@@ -94,7 +94,7 @@ interface RobotsProps {
   onPlace: Place;
 }
 
-/** Other graphs: each is one action that runs the whole of it. */
+/** The other graphs, each as one action that runs all of it. */
 function Graphs({ graphs, onPlace }: { graphs: readonly KnownGraph[]; onPlace: Place }) {
   const { robots, unknown, graphs: indexed } = useRobotsKnowledge();
   if (graphs.length === 0) return null;

@@ -17,7 +17,7 @@ export interface ParameterFacts {
   readonly allowed: string;
   /** The value as it is written; null: none. */
   readonly value: string | null;
-  /** Other members, such as `unit m`. */
+  /** Further members, such as `unit m`. */
   readonly more: readonly string[];
 }
 

@@ -33,7 +33,7 @@ interface Props {
   children: ReactElement<HTMLAttributes<HTMLElement>>;
 }
 
-/** Until the pointer is elsewhere, also where a browser keeps that from what was disabled meanwhile. */
+/** Calls `end` when the pointer is elsewhere, also where the browser sends no event to an element disabled meanwhile. */
 function useEnd(target: HTMLElement | null, end: () => void): void {
   useEffect(() => {
     if (target === null) return;

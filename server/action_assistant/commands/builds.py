@@ -18,7 +18,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import read_action
 from action_assistant.umrf.packages.naming import snake_case
 
-#: Of one package; what comes after the first errors is mostly their consequence.
+#: The number of errors reported for one package; later ones mostly follow from the first.
 MOST_ERRORS: Final = 50
 _LONGEST: Final = 500  # characters of a message
 _MOST_BYTES: Final = 4_000_000  # of a log

@@ -15,7 +15,7 @@ from typing import BinaryIO, Final, NamedTuple, Protocol, Self
 #: Larger files are not read: no server takes one, and nobody's memory holds all of them.
 _LARGEST: Final = 256 << 20
 
-#: Whether files can be named relative to an open folder.
+#: True if the system can name files relative to an open folder.
 HOLDS: Final = os.open in os.supports_dir_fd and hasattr(os, "O_DIRECTORY")
 
 

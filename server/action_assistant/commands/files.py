@@ -352,7 +352,7 @@ def actions_below(folder: Path) -> Mapping[str, Signature]:
 
 def _report(event: semantics.Trace, *, as_json: bool) -> None:
     if isinstance(event, semantics.NodeResultEvent):
-        # What an action answered is ours to know; the engine sends no such thing.
+        # Only the simulator knows what an action answered; an engine does not send it.
         if event.message and not as_json:
             said = f"{event.graph}  {event.node} says: {event.message}"
             print(one_line(f"{event.t_ms / 1000:10.3f} s  {said}"))

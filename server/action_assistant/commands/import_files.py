@@ -14,7 +14,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS, read_action, write_action
 
 _JSON: Final = {"content-type": "application/json"}
-#: As engines look for actions below the folders of packages.
+#: The ending by which engines find files of actions below the folders of packages.
 _ENDING: Final = "umrf.json"
 #: Below a folder that has one of them, colcon looks for no packages.
 _IGNORED: Final = frozenset({"COLCON_IGNORE", "AMENT_IGNORE"})

@@ -176,7 +176,7 @@ async def _greet(services: EditorServices, folder: Path) -> None:
     files = [path async for path in anyio.Path(folder).glob("*.umrf.graph.json")]
     for path in sorted(files, reverse=True):  # the last one made stands first in the list
         try:
-            # At once: they are small, ours, and nobody is here whom that could hold up.
+            # In this process: the files are small and ours, and there is no client yet who would wait.
             await services.catalogue.bring(
                 await path.read_bytes(), h.EXAMPLES, run_in_worker=run_here
             )

@@ -22,7 +22,7 @@ class WatchedEditor(Watched):
         return Activity(sockets=sum(len(room.members) for room in rooms), rooms=len(rooms))
 
     def families(self) -> Iterator[Family]:
-        """Rooms, and who is in them."""
+        """Yield the metrics of rooms and their sockets."""
         now, metrics = self.activity(), self._rooms.metrics
         yield Family("rooms", "Graphs that somebody has open.", now.rooms or 0)
         yield Family("sockets", "Sockets in rooms.", now.sockets)

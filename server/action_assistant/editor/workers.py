@@ -35,8 +35,8 @@ _NICE: Final = 5
 
 
 class EditorWorkers:
-    """The lanes of an editor. `files`: what people bring, and what is played for them. `graphs`: what
-    is read of stored graphs. `edits`: large updates before a room takes them."""
+    """The lanes of an editor. `files`: imports and simulations. `graphs`: reading of stored graphs.
+    `edits`: trials of large updates."""
 
     def __init__(self) -> None:
         threads = CapacityLimiter(8)
@@ -47,7 +47,7 @@ class EditorWorkers:
     @classmethod
     @asynccontextmanager
     async def opened(cls) -> "AsyncIterator[EditorWorkers]":
-        """Workers, as long as you are inside. The first ones are made soon after."""
+        """Yield the lanes, with workers kept ready inside of the `async with`."""
         lanes = cls()
         async with kept_warm(lanes.files, lanes.graphs, lanes.edits):
             yield lanes

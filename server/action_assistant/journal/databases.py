@@ -20,7 +20,7 @@ def database_of(url: str) -> Database:
     try:
         parsed = make_url(url)
     except ArgumentError as error:
-        # Not quoted: a password may be what is wrong with it.
+        # The URL is not quoted, since its faulty part may be a password.
         raise CannotStart("--database is not a URL such as sqlite:////data/editor.db.") from error
     if parsed.drivername in {"postgresql", "postgres"} and parsed.database:
         from action_assistant.journal.postgres import Postgres

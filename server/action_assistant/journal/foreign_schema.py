@@ -48,7 +48,7 @@ class SchemaObject(NamedTuple):
         return f"the {self.kind} {self.name!r}{on}"
 
 
-#: What makes an object what it is, in an order that does not depend on how it came about.
+#: The definition of an object, in an order that does not depend on how it was created.
 _Shape: TypeAlias = tuple[object, ...]
 
 

@@ -39,7 +39,7 @@ _SETTINGS: Final = {
     "server_encoding": ({"UTF8"}, "it cannot hold every text"),
     _READ_ONLY: ({"off"}, "it is a read-only copy"),
 }
-#: One statement: the events, and with them the counter of each stream.
+#: One statement that inserts the events and updates the counter of each stream.
 _STORE: Final = """
 WITH ends AS (
     INSERT INTO head (stream, seq, chain)

@@ -58,7 +58,7 @@ CREATE TEMP TRIGGER ends AFTER INSERT ON main.event BEGIN
 END
 """
 _ROWS: Final = 50  # of one statement; for each number of rows there is one, which SQLite keeps
-#: In the order of the rows themselves: an index may be what is damaged.
+#: The rows are read in their stored order, without an index, since an index may be damaged.
 _SCAN: Final = (
     "SELECT stream, seq, kind, author, at, body, position, chain, rowid FROM event NOT INDEXED"
     f" WHERE rowid > ? ORDER BY rowid LIMIT {_PAGE}"

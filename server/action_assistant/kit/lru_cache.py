@@ -8,7 +8,8 @@ V = TypeVar("V")
 
 
 class LruCache(Generic[K, V]):
-    """Holds up to `size` values whose weights add up to at most `weight`; the newest one always stays."""
+    """Holds up to `size` values whose weights add up to at most `weight`; the newest value always
+    stays."""
 
     def __init__(self, size: int, weight: int | None = None) -> None:
         self._size = size
@@ -17,7 +18,7 @@ class LruCache(Generic[K, V]):
         self._values: OrderedDict[K, tuple[V, int]] = OrderedDict()
 
     def get(self, key: K) -> V | None:
-        """Return the value of a key; None where it was never put or was dropped."""
+        """Return the value of a key; None if it has none."""
         found = self._values.get(key)
         if found is None:
             return None
@@ -25,7 +26,7 @@ class LruCache(Generic[K, V]):
         return found[0]
 
     def put(self, key: K, value: V, weight: int = 0) -> V:
-        """Store a value and return it; drop the least recently used ones beyond the limits."""
+        """Store a value and return it; drop the least recently used values beyond the limits."""
         self._weight += weight - self._values.pop(key, (None, 0))[1]
         self._values[key] = value, weight
         while len(self._values) > 1 and self._is_too_much():

@@ -9,8 +9,8 @@ T = TypeVar("T")
 
 
 class SharedCheck(Generic[T]):
-    """`ask` is asked again when its answer is `fresh` seconds old; who wants one waits for `patience`
-    seconds at most. A question without an answer stays under way: what hangs is not asked twice."""
+    """Calls `ask` for many callers together. An answer is reused for `fresh` seconds; a caller
+    waits for at most `patience` seconds. A call that hangs is not repeated."""
 
     def __init__(
         self, ask: Callable[[], Awaitable[T]], *, patience: float, fresh: float = 1.0
@@ -23,7 +23,7 @@ class SharedCheck(Generic[T]):
         self._last: tuple[T, float, float] | None = None
 
     async def answer(self) -> T | None:
-        """The answer; None when there is none in time. Raises what `ask` raises."""
+        """Return the answer; None if there is none in time. Raises the errors of `ask`."""
         task = self.begin()
         done, _ = await asyncio.wait({task}, timeout=self._patience)
         return task.result() if done else None
@@ -50,15 +50,14 @@ class SharedCheck(Generic[T]):
 
     @property
     def under_way(self) -> float | None:
-        """Return for how many seconds the present question has been waiting for its answer; None if
-        no question is under way."""
+        """Return for how many seconds the present call has been running; None if none is."""
         if self._task is None or self._task.done():
             return None
         return asyncio.get_running_loop().time() - self._asked_at
 
     @property
     def failure(self) -> BaseException | None:
-        """Return the exception of the last question; None if it has an answer or is under way."""
+        """Return the exception of the last call; None if it has an answer or is running."""
         task = self._task
         return (
             task.exception() if task is not None and task.done() and not task.cancelled() else None
@@ -75,7 +74,7 @@ class SharedCheck(Generic[T]):
             self._answered_at = loop.time()
 
     def cancel(self) -> None:
-        """Cancel the question that is under way, since nobody will ask any more."""
+        """Cancel the running call, since nobody needs its answer."""
         if self._task is not None:
             self._task.cancel()
 

@@ -8,8 +8,8 @@ Clock = Callable[[], float]
 
 
 class TokenBucket:
-    """Holds up to `capacity` tokens and gains `rate` of them a second. It may be overdrawn: then it is in
-    debt until enough tokens have come."""
+    """Holds up to `capacity` tokens and gains `rate` of them a second. It may be overdrawn, and is
+    then in debt."""
 
     __slots__ = ("_at", "_capacity", "_clock", "_rate", "_tokens")
 
@@ -21,13 +21,13 @@ class TokenBucket:
         self._at = clock()
 
     def spend(self, tokens: float) -> None:
-        """Take tokens, also where there are fewer than that."""
+        """Take tokens, also more than there are."""
         self._refill()
         self._tokens -= tokens
 
     def take(self) -> bool:
-        """Take one token. Return False where there was none; what there is of the next one is lost then, so
-        that whoever tries without end never gets one."""
+        """Take one token; return False if there is none. A failed attempt also loses the part of
+        the next token, so that endless attempts never succeed."""
         self._refill()
         there = self._tokens >= 1
         self._tokens = max(0.0, self._tokens - 1)
@@ -55,8 +55,8 @@ class TokenBucket:
 
 
 class TokenBuckets:
-    """A token bucket for each key, such as a person or an address. Beyond `remembered` keys it drops those
-    that have not been used for as long as an empty bucket takes to be full."""
+    """A token bucket for each key, such as a person or an address. Beyond `remembered` keys it
+    drops buckets that are certainly full again."""
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class TokenBuckets:
         return len(self._buckets)
 
     def of(self, key: str) -> TokenBucket:
-        """Return the bucket of a key, a full one for a key that is new."""
+        """Return the bucket of a key; a new key gets a full one."""
         bucket = self._buckets.get(key)
         if bucket is None:
             bucket = self._buckets[key] = TokenBucket(self._capacity, self._rate, self._clock)

@@ -16,22 +16,22 @@ _SUBJECTS: Final[ContextVar[Mapping[str, str]]] = ContextVar("subjects", default
 
 
 def subjects() -> Mapping[str, str]:
-    """Ids by what they are of; none where nobody has said."""
+    """Return the ids that log lines of this task carry, by kind of subject."""
     return _SUBJECTS.get()
 
 
 def request_id() -> str | None:
-    """The id of the request that is answered."""
+    """Return the id of the request that this task answers; None without one."""
     return _SUBJECTS.get().get("request")
 
 
 def begin(ids: Mapping[str, str]) -> None:
-    """This task, and those that it begins, are about these and nothing else."""
+    """Let log lines of this task, and of tasks that it starts, carry exactly these ids."""
     _SUBJECTS.set(ids)
 
 
 def is_about(subject: Subject, id_of_it: str) -> None:
-    """From here on this task, and those that it begins, are about this, too."""
+    """Add an id to those that log lines of this task, and of tasks that it starts, carry."""
     _SUBJECTS.set({**_SUBJECTS.get(), subject: id_of_it})
 
 

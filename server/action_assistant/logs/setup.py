@@ -21,7 +21,7 @@ from action_assistant.safe_text import PrintableLog, one_line, printable, redact
 
 
 class ConsoleLog(PrintableLog):
-    """For people: what a line is about stands behind it, in brackets."""
+    """Log lines for people, with the ids of a line in brackets behind it."""
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - as `logging` asks
         said = super().formatMessage(record)
@@ -30,10 +30,10 @@ class ConsoleLog(PrintableLog):
 
 
 class JsonLog(PrintableLog):
-    """For programs: one JSON object for each record, whatever is in it.
+    """Log lines for programs: one JSON object for each record.
 
-    `time` (RFC 3339, UTC), `level`, `process`, `pid`, `logger`, `message`; `error` where something was
-    raised; and the ids of what it is about.
+    `time` (RFC 3339, UTC), `level`, `process`, `pid`, `logger`, `message`; `error` with a
+    traceback, if any; and the ids of the context.
     """
 
     def __init__(self, process: str, *secrets: str) -> None:
@@ -100,12 +100,12 @@ def log_settings(
 
 
 def hand_on(chosen: LogSettings) -> None:
-    """Have whatever this process starts write in the same way."""
+    """Pass the log settings on to processes that this one starts."""
     os.environ[_FORM], os.environ[_LEVEL] = chosen.form, chosen.level
 
 
 def set_up(process: str, chosen: LogSettings, *secrets: str) -> None:
-    """Write lines to the standard error from here on; `secrets` are never among them."""
+    """Write log lines to stderr from now on; `secrets` are never written."""
     handler = logging.StreamHandler(sys.stderr)
     known = tuple(each for each in secrets if each)
     is_json = chosen.form == "json"
@@ -137,7 +137,8 @@ def writes_json() -> bool:
 
 
 def say(text: str, level: Level = "info") -> None:
-    """Tell whoever started a command how it goes: in plain words, unless programs read them."""
+    """Tell the person who started a command how it goes: in plain words, or as a log line if
+    programs read the log."""
     if writes_json():
         log.log(logging.getLevelName(level.upper()), "%s", text)
         return

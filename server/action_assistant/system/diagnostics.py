@@ -14,8 +14,8 @@ Severity: TypeAlias = Literal["error", "warning", "fine"]
 
 
 class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
-    """One thing that was looked at. With `error` something does not work or is not safe; `warning`
-    may matter or not; `fine` has neither code nor remedy. `where`: the file, variable, port or robot."""
+    """One finding. `error`: something does not work or is not safe; `warning`: it may matter;
+    `fine`: without code and remedy. `where`: the file, variable, port or robot."""
 
     code: str
     severity: Severity
@@ -27,7 +27,7 @@ class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
         hold_names(self, "message", "remedy")
 
 
-#: Everything that can be wrong, by its code, in the order in which it is explained to people.
+#: All faults by code, in the order of the documentation.
 CODES: Final[Mapping[str, Severity]] = {
     # settings
     "setting-unknown": "error",

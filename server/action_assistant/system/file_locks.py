@@ -6,8 +6,8 @@ from action_assistant.system.posix import fcntl
 
 
 def take(descriptor: int) -> bool:
-    """Lock a file that is open, until it is closed or its process ends; False when somebody else has
-    locked it. Raises CannotStart where there are no such locks."""
+    """Lock an open file until it is closed or the process ends; return False if another process has
+    locked it. Raise CannotStart if the system has no such locks."""
     try:
         _locking(descriptor, wait=False)
     except OSError:

@@ -11,7 +11,8 @@ _WINDOWS: Final = 512  # descriptors, where nobody says
 
 
 def raise_descriptors() -> int:
-    """Let this process open as many files and connections as it may; how many that are."""
+    """Raise the limit of open files and connections of this process as far as allowed; return the
+    new limit."""
     if resource is None:
         return _WINDOWS
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -33,15 +34,15 @@ def descriptors_allowed() -> int:
 
 
 def bound_memory(more: int) -> None:
-    """Let this process take so many more bytes of memory and no more, where the system tells how many
-    it has. Raises OSError, ValueError."""
+    """Limit this process to `more` additional bytes of memory, if the system tells how many it has.
+    Raise OSError or ValueError if the limit cannot be set."""
     mapped = _statm(0)
     if resource is not None and mapped:
         resource.setrlimit(resource.RLIMIT_AS, (mapped + more, mapped + more))
 
 
 def memory_in_use() -> int:
-    """Bytes; 0 where nobody says."""
+    """Return the bytes of memory in use; 0 if unknown."""
     return _statm(1)
 
 

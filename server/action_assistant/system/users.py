@@ -6,12 +6,12 @@ from action_assistant.system.posix import pwd
 
 
 def me() -> int | None:
-    """The number of the user whose rights this process has; None where users have none."""
+    """Return the id of the effective user; None on systems without user ids."""
     return os.geteuid() if hasattr(os, "geteuid") else None
 
 
 def name_of(uid: int) -> str:
-    """A user for people. Those of containers mostly have no name outside."""
+    """Return the name of a user for messages. Users of containers mostly have no name outside."""
     if pwd is not None:
         try:
             return str(pwd.getpwuid(uid).pw_name)
@@ -21,7 +21,7 @@ def name_of(uid: int) -> str:
 
 
 def mine() -> str:
-    """The user of this process, for people."""
+    """Return the name of this process's user, for messages."""
     uid = me()
     return name_of(uid) if uid is not None else os.environ.get("USERNAME", "this user")
 

@@ -61,7 +61,8 @@ export interface EditorApi {
     };
     /**
      * Answering
-     * @description Yes or no to a proposal, of somebody who has seen the draft after its change `seq`.
+     * @description An answer, yes or no, to a proposal by a person who has seen the draft after its change
+     *     `seq`.
      */
     Answering: {
         yes: boolean;
@@ -183,15 +184,15 @@ export interface EditorApi {
     };
     /**
      * CalledUses
-     * @description The graphs in which an action was called otherwise, each by one edit.
+     * @description The graphs in which actions were renamed, each by one edit.
      */
     CalledUses: {
         changed: string[];
     };
     /**
      * CallingUses
-     * @description A request to rename actions called `before` in some graphs, since the graph that they stand for is called
-     *     `name` now.
+     * @description A request to rename the actions called `before` in these graphs to `name`, after the graph
+     *     that they stand for was renamed.
      */
     CallingUses: {
         before: string;
@@ -275,8 +276,8 @@ export interface EditorApi {
     };
     /**
      * Diagnostic
-     * @description One thing that was looked at. With `error` something does not work or is not safe; `warning`
-     *     may matter or not; `fine` has neither code nor remedy. `where`: the file, variable, port or robot.
+     * @description One finding. `error`: something does not work or is not safe; `warning`: it may matter;
+     *     `fine`: without code and remedy. `where`: the file, variable, port or robot.
      */
     Diagnostic: {
         code: string;
@@ -359,7 +360,8 @@ export interface EditorApi {
     };
     /**
      * DraftOf
-     * @description The origin of a draft: the graph, the change of it that the draft began with, and the name of the draft.
+     * @description The origin of a draft: the graph and the change that the draft began with; and the name of
+     *     the draft.
      */
     DraftOf: {
         graph: string;
@@ -428,7 +430,7 @@ export interface EditorApi {
     };
     /**
      * Example
-     * @description A graph that comes with the program. Posting `umrf` makes it one of yours.
+     * @description A graph that comes with the program. Send `umrf` to create a copy of it.
      */
     Example: {
         name: string;
@@ -452,9 +454,10 @@ export interface EditorApi {
     };
     /**
      * ExtractionLook
-     * @description A preview of moving actions into a sub-graph. `umrf`: the sub-graph; null where there can be none, for
-     *     these `reasons`. `inputs`, `outputs`: its parameters by flat name, with their types. `changes`: of the
-     *     document of the outer graph after `seq`. `differences`: in which ways the graph may then behave otherwise.
+     * @description A preview of moving actions into a sub-graph. `umrf`: the sub-graph; null if it is
+     *     impossible, for the `reasons`. `inputs`, `outputs`: types of its parameters by flat name.
+     *     `changes`: of the outer document after `seq`. `differences`: ways in which the graph may
+     *     behave differently.
      */
     ExtractionLook: {
         seq: number;
@@ -523,9 +526,9 @@ export interface EditorApi {
      * FlatGraph
      * @description A graph with its sub-graphs, flattened into one graph (docs/decisions/069-flatten.md).
      *
-     *     `umrf`: the flat graph, under the same name; null where none is known to do the same, for these `reasons`.
-     *     `origins`: the graph and action from which each of its actions comes. `left_out`: fields that no action has
-     *     any more.
+     *     `umrf`: the flat graph, under the same name; null if none is known to do the same, for the
+     *     `reasons`. `origins`: the graph and action from which each action comes. `left_out`: fields that
+     *     are lost.
      */
     FlatGraph: {
         seq: number;
@@ -612,13 +615,13 @@ export interface EditorApi {
     };
     /**
      * GraphView
-     * @description A graph, or an action of the library, as lists and pages show it. `seq` counts the changes of its
-     *     document.
+     * @description A graph, or an action of the library, as lists and pages show it. `seq` counts the changes of
+     *     its document.
      *
-     *     `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
-     *     change it. `people`: who is in it now. `problems` counts what the check found; `wrong` and
-     *     `to_fill_in` what people are told of it, one thing once, as the page tells it. `drafts`: how many
-     *     there are of it.
+     *     `damaged`: the first change that cannot be read; the graph stays in the state before it, and
+     *     cannot be changed. `people`: who is in it now. `problems`: counts of the check; `wrong` and
+     *     `to_fill_in`: counts for people, in which related problems count once. `drafts`: the number of
+     *     its drafts.
      */
     GraphView: {
         id: string;
@@ -737,7 +740,8 @@ export interface EditorApi {
     };
     /**
      * InsideGraph
-     * @description A graph inside of another, as it is now. `name`: of the actions that stand for it; `graph`: its id.
+     * @description A graph inside of another one, with its present content. `name`: of the actions that stand
+     *     for it; `graph`: its id.
      */
     InsideGraph: {
         name: string;
@@ -750,9 +754,10 @@ export interface EditorApi {
     };
     /**
      * InsideView
-     * @description All graphs inside of a graph after its change `seq`, as they are now, by name; and what a version of
-     *     that would have as its digests. `several`: names of more than one graph, of which the oldest is taken;
-     *     `cut`: there are more than these.
+     * @description All graphs inside of a graph after its change `seq`, in their present state, by name;
+     *     `digest`, `tree_digest`: those of a version that would be published now. `several`: names
+     *     that several graphs have, of which the oldest counts; `cut`: more graphs are inside than
+     *     listed.
      */
     InsideView: {
         seq: number;
@@ -923,7 +928,7 @@ export interface EditorApi {
     };
     /**
      * MadeGraph
-     * @description A new graph; `reading` is there when it was read from a file.
+     * @description A new graph. `reading`: the report on the file it was read from, if any.
      */
     MadeGraph: {
         id: string;
@@ -958,8 +963,8 @@ export interface EditorApi {
     };
     /**
      * MadeSubGraph
-     * @description A new graph, and what to change in the document of the one around it, so that an action there stands
-     *     for it. Nothing of that document is changed yet.
+     * @description A new graph, and the changes that put an action for it into the document of the outer graph.
+     *     The page makes these changes.
      */
     MadeSubGraph: {
         graph: EditorApi["GraphView"];
@@ -1222,9 +1227,9 @@ export interface EditorApi {
     };
     /**
      * PinnedGraph
-     * @description A graph inside of a version: as it was when that was published. `name`: of the actions that stand for
-     *     it; `version`: of it, the newest with that content, null where there was none; `graph`: its id.
-     *     `current_digest`: of the graph that the name stands for now, null where there is none.
+     * @description A graph inside of a version, with its content at publication. `name`: of the actions that
+     *     stand for it; `graph`: its id; `version`: its newest version with that content, null if none.
+     *     `current_digest`: of the graph that has the name now, null if none has.
      */
     PinnedGraph: {
         name: string;
@@ -1437,8 +1442,8 @@ export interface EditorApi {
     };
     /**
      * Restoring
-     * @description The change after which the graph was as it shall be again; with `of` only that action, arrow or
-     *     note, by its key.
+     * @description The change to whose state the graph is restored; with `of` only the action, arrow or note
+     *     with this key is.
      */
     Restoring: {
         seq: number;
@@ -1579,8 +1584,8 @@ export interface EditorApi {
     };
     /**
      * TakingOver
-     * @description The graph whose action the library takes over, and the `aid` of that action; without one the first action
-     *     that differs.
+     * @description The graph with the use whose parameters the library takes over, and the `aid` of that action;
+     *     if missing, the first use that differs.
      */
     TakingOver: {
         graph: string;
@@ -1615,10 +1620,10 @@ export interface EditorApi {
     };
     /**
      * UnpackingLook
-     * @description A preview of replacing an action by the actions of the graph `inside` that it stands for. `changes`: of
-     *     the document after `seq`; none where it cannot be done, for these `reasons`. `actions`: the keys of the new
-     *     actions; `differences`: in which ways the graph may then behave otherwise; `left_out`: fields that no action
-     *     has any more.
+     * @description A preview of replacing an action by the actions of the graph `inside`. `changes`: of the
+     *     document after `seq`; empty if it is impossible, for the `reasons`. `actions`: the keys of
+     *     the new actions; `differences`: ways in which the graph may behave differently; `left_out`:
+     *     fields that are lost.
      */
     UnpackingLook: {
         seq: number;
@@ -1656,9 +1661,8 @@ export interface EditorApi {
     };
     /**
      * VersionView
-     * @description A version. `umrf` is the graph as text to be kept as it is, `subgraphs` are all graphs inside of it,
-     *     by name; lists leave both out. `tree_digest`: of the graph together with them, null where that was
-     *     not kept yet.
+     * @description A version. `umrf`: the graph as text, kept unchanged; `subgraphs`: all graphs inside, by
+     *     name; lists omit both. `tree_digest`: of the graph together with them, null for old versions.
      */
     VersionView: {
         id: string;

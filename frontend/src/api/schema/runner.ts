@@ -28,8 +28,8 @@ export interface RunnerApi {
     };
     /**
      * ActionShown
-     * @description One action of a run. `older` visits are not listed. The action ran `count` times; with
-     *     `at_least` perhaps more often, since visits of it may have been missed.
+     * @description One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
+     *     may have been missed. `visits` are the newest ones; `older`: how many are not listed.
      */
     ActionShown: {
         aid: string | null;
@@ -44,11 +44,10 @@ export interface RunnerApi {
     };
     /**
      * ActionStatistics
-     * @description One action over all these runs. `levels`: the actions that it is inside of, outermost first,
-     *     and `name` its own there; `action`: the name by which the engine of its newest run told it.
-     *     Durations are seconds over the `timed` visits that have ended, null where they are not known
-     *     exactly; `spans` has all of them between bounds. `unknown` counts visits of unknown result.
-     *     `at_least`: there may have been more `visits`, which nobody saw.
+     * @description One action over all these runs. `levels`: the actions around it, outermost first; `name`: its
+     *     own; `action`: the name that the engine of its newest run used. Durations: seconds over the
+     *     `timed` ended visits, null if not known exactly; `spans`: bounds of all. `unknown`: visits of
+     *     unknown result. `at_least`: there may have been more `visits`, which nobody saw.
      */
     ActionStatistics: {
         action: string;
@@ -130,7 +129,8 @@ export interface RunnerApi {
     };
     /**
      * ArchivedShown
-     * @description The moment at which the events of a run went to an archive, and the file in its folder.
+     * @description The time at which the events of a run were moved to an archive, and its file in the folder of
+     *     archives.
      */
     ArchivedShown: {
         /** Format: date-time */
@@ -178,8 +178,8 @@ export interface RunnerApi {
     };
     /**
      * Author
-     * @description The person behind a command, and where the command came from. `address`: on the network; ""
-     *     for the runner's own computer. `by` is "" where it was not recorded.
+     * @description The person behind a command, and the origin of the command. `address`: on the network; "" for
+     *     the runner's own computer. `by`: "" if it was not recorded.
      */
     Author: {
         id: string;
@@ -296,8 +296,8 @@ export interface RunnerApi {
     };
     /**
      * CheckRequest
-     * @description A check of the expected courses of `graph`, against a text of it and the graphs inside. Where
-     *     no graphs inside are sent, those of the expectation count.
+     * @description A request to check the expected courses of `graph` against the text `umrf`. `subgraphs`: the
+     *     graphs inside; if empty, those stored with each expectation are used.
      */
     CheckRequest: {
         /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
@@ -310,8 +310,8 @@ export interface RunnerApi {
     };
     /**
      * CheckedCourse
-     * @description One expected course, checked. `same` is null where there was no time for it; `why`: where the
-     *     courses part. `run` is "" for a course of a dry-run.
+     * @description One checked expected course. `same`: null if there was no time to check it; `why`: where the
+     *     courses differ. `run`: "" for the course of a dry-run.
      */
     CheckedCourse: {
         name: string;
@@ -327,7 +327,8 @@ export interface RunnerApi {
     };
     /**
      * CheckedCourses
-     * @description All expected courses of a graph, by name, and the coverage by those that it still takes.
+     * @description All expected courses of a graph, by name, and the coverage by those that still go the same
+     *     way.
      */
     CheckedCourses: {
         courses: RunnerApi["CheckedCourse"][];
@@ -335,10 +336,9 @@ export interface RunnerApi {
     };
     /**
      * ComparedVisit
-     * @description The `visit`-th visit (from 1) of an action in both runs. `levels`: the actions that it is
-     *     inside of, outermost first, and `name` its own there; `action`: the name by which its engine
-     *     told it. `slower` names the run in which it took notably longer, whichever values within its
-     *     bounds are true.
+     * @description The visit number `visit` (from 1) of an action in both runs; null where a run lacks it.
+     *     `levels`: the actions around it, outermost first; `name`: its own; `action`: the name that
+     *     its engine used. `slower`: the run in which it certainly took notably longer.
      */
     ComparedVisit: {
         action: string;
@@ -654,8 +654,8 @@ export interface RunnerApi {
     };
     /**
      * Listed
-     * @description A run of the list, with the marks that people gave it. `cause`: in one sentence why it did
-     *     not end well, as far as that is recorded.
+     * @description A run of the list, with the marks that people gave it. `cause`: one sentence why it did not
+     *     end well, "" if unknown.
      */
     Listed: {
         id: string;
@@ -709,7 +709,7 @@ export interface RunnerApi {
     };
     /**
      * MarkShown
-     * @description An event that is no observation of the engine; `since`: from when on nothing was known.
+     * @description An event that is no observation of the engine. `since`: from when on the state was unknown.
      */
     MarkShown: {
         seq: number;
@@ -724,7 +724,7 @@ export interface RunnerApi {
     };
     /**
      * Marks
-     * @description The marks of a run that a person changes; a field that is left out stays as it was.
+     * @description The marks of a run to be changed; a missing field keeps its value.
      */
     Marks: {
         /** @default null */
@@ -762,8 +762,7 @@ export interface RunnerApi {
     };
     /**
      * NeverTaken
-     * @description An arrow whose parent ran, and is known never to have ended with one of the arrow's
-     *     `outcomes`.
+     * @description An arrow whose parent ran and certainly never ended with one of the arrow's `outcomes`.
      */
     NeverTaken: {
         parent: string;
@@ -829,8 +828,8 @@ export interface RunnerApi {
     };
     /**
      * PartingCause
-     * @description An event of one of the runs that explains why they differ: a command of a person, an alarm,
-     *     or the script of the simulator. `run`: the number of that run.
+     * @description An event of one run that explains why the runs differ: a command of a person, an alarm, or
+     *     the script of the simulator. `run`: the number of that run.
      */
     PartingCause: {
         kind: string;
@@ -994,7 +993,7 @@ export interface RunnerApi {
     };
     /**
      * Recorded
-     * @description A run as a script (`behaviours`, docs/contracts.md 5.2), and the guesses in it.
+     * @description A run as a script (`behaviours`, docs/contracts.md 5.2), and where the script is a guess.
      */
     Recorded: {
         behaviours: {
@@ -1063,8 +1062,8 @@ export interface RunnerApi {
     };
     /**
      * ReplayFrame
-     * @description The changes by one event: `head` has the fields of the run that changed, `actions` the
-     *     actions that did.
+     * @description The changes by one event. `head`: the changed fields of the run; `actions`: the changed
+     *     actions.
      */
     ReplayFrame: {
         seq: number;
@@ -1212,10 +1211,10 @@ export interface RunnerApi {
     };
     /**
      * RunComparison
-     * @description Run `a` compared with run `b`. `graph` is the difference of the graphs that were sent;
-     *     `parameters` those of its changes that touch values of actions; `subgraphs` names the graphs
-     *     inside that differ. `because`: an event of a run that explains the parting, before any
-     *     difference of the graphs; null where none is known.
+     * @description The comparison of run `a` with run `b`. `graph`: the difference of the sent graphs;
+     *     `parameters`: its changes of values of actions; `subgraphs`: the names of graphs inside that
+     *     differ. `because`: an event that explains the first difference of the runs, rather than any
+     *     difference of the graphs; null if unknown.
      */
     RunComparison: {
         a: RunnerApi["RunSummary"];
@@ -1251,8 +1250,8 @@ export interface RunnerApi {
     };
     /**
      * RunPoint
-     * @description One run of the statistics. `took` in seconds where it is known exactly; `span`: its bounds,
-     *     null where nothing is known.
+     * @description One run of the statistics. `took`: seconds, if known exactly; `span`: its bounds, null if
+     *     unknown.
      */
     RunPoint: {
         id: string;
@@ -1321,9 +1320,8 @@ export interface RunnerApi {
     };
     /**
      * RunSummary
-     * @description A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as
-     *     far as that was seen, which is before `ended_at`, when that was proven; null where that is not
-     *     known.
+     * @description A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
+     *     more, which is before the proof at `ended_at`; null if unknown.
      */
     RunSummary: {
         id: string;
@@ -1358,10 +1356,9 @@ export interface RunnerApi {
     };
     /**
      * RunWhole
-     * @description A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
-     *     name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent
-     *     along; `tree_digest`: of the graph together with them, null where the starter did not send
-     *     it.
+     * @description A run with the graph that was sent. `sent`: the values of its actions, by full name and flat
+     *     name, written as in `inputs` of visits. `subgraphs`: all graphs inside that were sent along;
+     *     `tree_digest`: of the graph together with them, null if the starter did not send it.
      */
     RunWhole: {
         id: string;
@@ -1522,8 +1519,8 @@ export interface RunnerApi {
     };
     /**
      * StartShown
-     * @description The state of a start. `under_way`: it is being carried out at this moment. Where that is
-     *     false and `runs` is empty, nothing of the start has arrived here so far.
+     * @description The state of a start. `under_way`: it is being carried out now. If it is false and `runs` is
+     *     empty, the start has not arrived here so far.
      */
     StartShown: {
         request_id: string;
@@ -1532,10 +1529,10 @@ export interface RunnerApi {
     };
     /**
      * Statistics
-     * @description Statistics of the newest `runs` of a graph. `judged`: runs whose result is known and says
-     *     something about the graph (neither refused, lost nor stopped); `succeeded`: those of them that
-     *     finished true. `unknown`: finished runs of unknown result, since robots do not tell it.
-     *     `untold`: the number of arrows of which it is not known whether they were ever taken.
+     * @description Statistics of the newest `runs` of a graph. `judged`: runs whose known result says something
+     *     about the graph (neither refused, lost nor stopped); `succeeded`: those that finished true.
+     *     `unknown`: finished runs of unknown result, which robots do not report. `untold`: the number
+     *     of arrows that may or may not have been taken.
      */
     Statistics: {
         runs: RunnerApi["RunPoint"][];
@@ -1628,10 +1625,10 @@ export interface RunnerApi {
     /**
      * VisitShown
      * @description One visit of an action. It began between `not_before` and `from`, and ended between `until`
-     *     (null: no end was seen) and `not_after` (null: it may go on still). Where `until` lies before
-     *     `from`, no moment is known at which it went on for certain. `inputs`: values that the engine
-     *     reported for it, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null
-     *     when nobody saw them.
+     *     (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
+     *     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
+     *     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
+     *     none were seen.
      */
     VisitShown: {
         /** Format: date-time */

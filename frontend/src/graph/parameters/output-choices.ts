@@ -22,7 +22,7 @@ export interface OutputChoice {
   /** The outputs and the inputs that they become. */
   readonly ties: readonly Tie[];
   readonly type: string | null;
-  /** By which arrow it comes; null where none leads here. */
+  /** The arrow that brings the output; null where none leads here. */
   readonly relation: string | null;
   readonly reason: string | null;
   /** True if the input gets it now. */

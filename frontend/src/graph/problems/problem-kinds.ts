@@ -24,7 +24,7 @@ export interface CheckedProblem {
   readonly severity: "error" | "warning";
   readonly message: string;
   readonly where: CheckedPlace;
-  /** Other places of which the same is said. */
+  /** Further places with the same problem. */
   readonly also?: readonly CheckedPlace[];
   readonly fix?: string | null;
   readonly inside?: CheckedPlaceInside;

@@ -76,7 +76,7 @@ interface MeanwhileProps {
   onBack: () => void;
 }
 
-/** Others changed the same meanwhile: never written over silently. */
+/** Says that another person has changed the same values meanwhile, and asks before they are overwritten. */
 function Meanwhile({ names, onRest, onAll, onBack }: MeanwhileProps) {
   return (
     <div className={style.foot} role="alertdialog" aria-label="Changed meanwhile">

@@ -79,7 +79,7 @@ export function openLanes<One extends Pick<Lane, "name" | "around">>(
   });
 }
 
-/** Whose lanes they are, in their order. */
+/** Returns the robots of the lanes, in the order of the lanes. */
 export function robotsOf(lanes: readonly Lane[]): string[] {
   return [...new Set(lanes.map((lane) => lane.robot))];
 }

@@ -39,7 +39,7 @@ RECORDINGS: Final = "recordings"
 #: its files never change; the others are put back where there is none.
 MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
 WHOLE: Final = frozenset({keys.TOKEN_FILE, certificate.FOLDER, "sessions", "sessions.db"})
-#: What is made anew, or belongs to this place alone.
+#: Files that are created again, or that belong to this data folder only.
 _OWN: Final = frozenset(
     {
         *(f"{branch}.db" for branch in BRANCHES),
@@ -49,7 +49,7 @@ _OWN: Final = frozenset(
 )
 _PASSING: Final = (".lock", ".lock.new", "-wal", "-shm", "-journal", ".part")
 ASIDE: Final = "before-restore-"
-#: What `move` leaves behind.
+#: The prefix of folders that `move` leaves behind.
 MOVED: Final = "before-move-"
 _MAGIC: Final = b"SQLite format 3\0"
 _PAGES: Final = 5_000  # copied between two words about it

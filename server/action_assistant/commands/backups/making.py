@@ -41,9 +41,9 @@ from action_assistant.version import VERSION
 from action_assistant.web.auth.keys import TOKEN_FILE
 
 WORK: Final = ".backup-"
-#: What archives are of, in their folder.
+#: The kinds of archives, as folders in the folder of archives.
 _ARCHIVES: Final = ("runs", "raw")
-#: Of the environment, and never in what a backup says of itself.
+#: Variables that the manifest of a backup never contains.
 _SECRET: Final = frozenset(
     {"ACTION_ASSISTANT_TOKEN", "ACTION_ASSISTANT_DATABASE", "ACTION_ASSISTANT_METRICS_TOKEN"}
 )

@@ -12,7 +12,7 @@ import msgspec
 
 from action_assistant import settings
 
-#: As scheduled backups are named; others in the folder are nobody's business here.
+#: The names of scheduled backups; other files in the folder are left alone.
 _NAME: Final = re.compile(r"action-assistant-(\d{8}-\d{6})Z\.zip")
 _STAMP: Final = "%Y%m%d-%H%M%S"
 _PART: Final = re.compile(r"(\d{1,4})([dwm])")

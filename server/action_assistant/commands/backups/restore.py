@@ -266,7 +266,7 @@ def _exchange(new: Path, old: Path, aside: Path | None) -> None:
     for path in (old, old.with_name(f"{old.name}-wal")):
         if aside is not None and path.exists() and not (aside / path.name).exists():
             os.link(path, aside / path.name)
-    # What an old log still holds must not be applied to the new file.
+    # Pages in an old write-ahead log must not be applied to the new file.
     for suffix in ("-wal", "-shm"):
         old.with_name(f"{old.name}{suffix}").unlink(missing_ok=True)
     sync(new)

@@ -35,7 +35,7 @@ from action_assistant.private_files import opener, sync
 from action_assistant.schema.branches import BRANCHES, VERSIONS
 
 _ROWS: Final = 500  # in memory
-#: What SQLite says of a file that is none of its own, or none of ours.
+#: Errors of SQLite for a file that is no database, or no copy of ours.
 _DAMAGED: Final = {sqlite3.SQLITE_ERROR, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB}
 
 

@@ -64,7 +64,7 @@ def _forward(options: argparse.Namespace) -> int:
     for branch, url in urls.items():
         place = database_of(url)
         try:
-            # As its only writer: an older version that runs would go on writing as it knows the tables.
+            # Take the lock of the only writer: a running older version would write to the new tables.
             place.open(branch, before).close()
         finally:
             place.disown()

@@ -42,7 +42,7 @@ _PAGE: Final = 500  # events in a transaction
 _PAUSE: Final = 1.0  # seconds between two looks
 _AWAY: Final = 10.0  # seconds between attempts while the database is away
 _FAULTS: Final = (DBAPIError, asyncpg.PostgresError, asyncpg.InterfaceError, OSError)
-#: Of Postgres, which has the copies.
+#: The schema of Postgres that holds the copies.
 SCHEMA: Final = "action_assistant_runs"
 _COPY: Final = MetaData(schema=SCHEMA)
 #: The events, with what they say as bytes; a view beside it has it as JSON.

@@ -209,7 +209,7 @@ def proxy_leads_here(place: Installation) -> Iterator[Diagnostic]:
         yield from problems
         if problems:
             return
-    # As a browser comes: by the page's origin.
+    # The request has the page's origin, as one of a browser.
     headers = {**_UPGRADE, "origin": public.origin}
     with client(verify=trust) as asking:
         yield _shown(asking, "page", public.page, headers)

@@ -289,7 +289,7 @@ _SECRET: Final = frozenset(
     name for name in settings.VARIABLES if name.rpartition("_")[2] in {"TOKEN", "DATABASE", "URL"}
 ) - {"ACTION_ASSISTANT_PUBLIC_URL"}
 
-#: What the unit's command says.
+#: Settings that the unit's command gives as options.
 _SAID: Final = frozenset({"ACTION_ASSISTANT_DATA", "ACTION_ASSISTANT_PORT"})
 
 

@@ -21,7 +21,7 @@ from action_assistant.version import VERSION
 Scope: TypeAlias = Literal["user", "system"]
 
 NAME: Final = "action-assistant.service"
-#: What a sourced ROS 2 sets that the runner needs; the packages are found by the first.
+#: Variables of a sourced ROS 2 that the runner needs; packages are found by the first.
 SOURCED: Final = (
     *("AMENT_PREFIX_PATH", "LD_LIBRARY_PATH", "ROS_DISTRO", "ROS_VERSION", "ROS_DOMAIN_ID"),
     *("ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_LOCALHOST_ONLY"),
@@ -31,7 +31,7 @@ SOURCED: Final = (
 _DIGEST: Final = "# sha256: "
 _OPTIONS: Final = "# options: "
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_@%+=:,./-]+")
-#: Of seccomp and prctl: a user's own manager can do these, too.
+#: Restrictions by seccomp and prctl, which a user's own manager can apply, too.
 _HARDENED: Final = (
     "NoNewPrivileges=yes",
     "LockPersonality=yes",
@@ -43,7 +43,7 @@ _HARDENED: Final = (
     "SystemCallFilter=@system-service",
     "SystemCallErrorNumber=EPERM",
 )
-#: Of namespaces and capabilities. /dev/shm stays the computer's: engines share it.
+#: Restrictions by namespaces and capabilities. /dev/shm is not private, since engines share it.
 _ENCLOSED: Final = (
     "ProtectSystem=strict",
     "ProtectHome=read-only",

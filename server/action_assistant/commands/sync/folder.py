@@ -25,7 +25,7 @@ from action_assistant.umrf.files.file_names import ENDING, graph_file_name
 _STATE: Final = ".action-assistant-sync.json"
 _FRESH: Final = re.compile(r"\.action-assistant-sync-([0-9a-f]{16})\.new")
 _ASIDE: Final = re.compile(r"\.action-assistant-sync-([0-9a-f]{16})\.aside")
-#: How files were put aside by versions up to November 2026.
+#: The names of files put aside by versions up to November 2026.
 _FORMER_ASIDE: Final = re.compile(rf"\.(.+{re.escape(ENDING)})\.([0-9a-f]{{64}})\.aside", re.DOTALL)
 
 _Sha = Annotated[str, msgspec.Meta(pattern=r"\A[0-9a-f]{64}\Z")]

@@ -30,13 +30,13 @@ from action_assistant.safe_text import one_line
 _PAUSES: Final = (0.3, 1.0, 3.0, 10.0)  # seconds before coming again; the last one from then on
 #: Refusals of the upgrade after which coming again leads nowhere.
 _FINAL: Final = frozenset({401, 403, 404})
-#: The same of close codes, in words.
+#: The final close codes, in words.
 _CLOSED: Final = {
     messages.SESSION_ENDED: "The session has ended.",
     messages.FORBIDDEN: "This graph may not be seen any more.",
     messages.NO_SUCH_GRAPH: "The graph was deleted.",
 }
-#: How a connection is lost.
+#: The errors by which a connection is lost.
 _LOST: Final = (
     HTTPXWSException,
     httpx.HTTPError,

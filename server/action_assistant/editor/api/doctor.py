@@ -34,7 +34,7 @@ class LastExamination(msgspec.Struct, frozen=True):
 
 
 def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
-    """The route. However many ask, it is looked once at a time."""
+    """Return the route that runs `doctor`, once at a time for all requests."""
 
     examination = SharedCheck(lambda: _examined(settings), patience=_PATIENCE_S, fresh=_FRESH_S)
 
@@ -81,7 +81,7 @@ def _told(failure: BaseException) -> str:
 
 
 async def _examined(settings: EditorSettings) -> list[Diagnostic]:
-    """The command itself, in a process that gives way: it loads much, and may hang on what is wrong."""
+    """Run the command `doctor` in a process of low priority, since it loads much and may hang."""
     command = [sys.executable, "-m", "action_assistant", "doctor", "--json"]
     command += ["--data", str(settings.data), "--port", str(settings.port)]
     async with await anyio.open_process(

@@ -27,7 +27,8 @@ class Proposing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Answering(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Yes or no to a proposal, of somebody who has seen the draft after its change `seq`."""
+    """An answer, yes or no, to a proposal by a person who has seen the draft after its change
+    `seq`."""
 
     yes: bool
     seq: int

@@ -49,7 +49,7 @@ class StoredEvent(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Example(msgspec.Struct, frozen=True):
-    """A graph that comes with the program. Posting `umrf` makes it one of yours."""
+    """A graph that comes with the program. Send `umrf` to create a copy of it."""
 
     name: str
     umrf: UmrfGraph
@@ -120,7 +120,8 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
 
 
 async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[ServerSentEventMessage]:
-    """Stored events after a position, then new ones as they come."""
+    """Yield the stored events after a position (None: no old ones), then new events as they are
+    stored."""
     services = app_state.services
     async with services.journal.follow() as events:
         done = await services.journal.position() if after is None else after

@@ -26,7 +26,8 @@ class FlatCopy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 async def _whole(
     services: EditorServices, graph: str, seq: int | None
 ) -> tuple[GraphAtSeq, Inside]:
-    """A graph at a moment, with all that is inside of it now."""
+    """Return a graph after its change `seq` (None: the newest), with the present state of all
+    graphs inside. Raise Conflict if there are too many."""
     await services.catalogue.require(graph, "graph")
     sight = await services.graph_reader.moment(graph, seq)
     inside = await services.graph_checks.inside(sight)

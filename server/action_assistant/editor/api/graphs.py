@@ -31,7 +31,7 @@ _TOLD: Final = 50  # keys of a conflict
 
 
 class MadeGraph(GraphView, frozen=True, omit_defaults=True):
-    """A new graph; `reading` is there when it was read from a file."""
+    """A new graph. `reading`: the report on the file it was read from, if any."""
 
     reading: ImportReport | None = None
 
@@ -65,14 +65,15 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
 
 
 async def _previewed(services: EditorServices, body: bytes) -> bytes:
-    """JSON of a `Preview`, with the graphs that are here inside."""
+    """Return the JSON of a `Preview` of a file, checked with the stored graphs that would be
+    inside."""
     name, uses = await services.workers.files(importing.names, body)
     inside = await services.graph_checks.inside_of(name, uses)
     return await services.workers.files(importing.preview, body, inside)
 
 
 async def _inside_with(services: EditorServices, then: GraphAtSeq, text: bytes) -> Inside:
-    """The graphs inside of one that an edited text may change."""
+    """Return the graphs inside of a graph, including those that only the edited text uses."""
     _, uses = await services.workers.files(importing.names, text)
     return await services.graph_checks.inside(then, more=uses)
 

@@ -28,8 +28,8 @@ _STEPS: Final = 5_000  # changes of keys in one answer
 
 
 class Restoring(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The change after which the graph was as it shall be again; with `of` only that action, arrow or
-    note, by its key."""
+    """The change to whose state the graph is restored; with `of` only the action, arrow or note
+    with this key is."""
 
     seq: int
     of: str | None = None
@@ -46,10 +46,8 @@ class PastDocument(msgspec.Struct, frozen=True):
 
 
 async def _moment(services: EditorServices, graph: str, seq: int | None, place: str) -> int:
-    """Return a change of a graph that the index has: without `seq` the newest.
-
-    Raises Conflict with the place of `seq` where there is no such change.
-    """
+    """Return a change of a graph that the index has: `seq`, or the newest one. Raise Conflict, with
+    `place` as its place, if there is no such change."""
     at = await services.journal.newest(graph_stream(graph)) if seq is None else seq
     upto = await services.change_index.upto(graph, at)
     if upto < at:

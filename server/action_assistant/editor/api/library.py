@@ -48,8 +48,8 @@ class UpdatingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TakingOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The graph whose action the library takes over, and the `aid` of that action; without one the first action
-    that differs."""
+    """The graph with the use whose parameters the library takes over, and the `aid` of that action;
+    if missing, the first use that differs."""
 
     graph: str
     aid: str | None = None

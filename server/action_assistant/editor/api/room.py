@@ -59,11 +59,12 @@ class RoomConnection:
         return spend(member.person.id, len(data))
 
     def debt(self) -> float:
-        """Return for how many seconds the socket is not to be read, for what its person sent by other sockets."""
+        """Return for how many seconds the socket must not be read, because of what its person sent
+        on other sockets."""
         return self._rate_limits.spend(self.member.person.id, 0)
 
     async def pause(self, seconds: float) -> None:
-        """Wait so many seconds, and until the socket may be read again."""
+        """Wait this many seconds, and until the socket may be read again."""
         await self.member.until_caught_up()
         wait = seconds + self.member.cpu_debt()
         if wait > 0:
@@ -71,7 +72,8 @@ class RoomConnection:
 
 
 async def serve_directly(connection: RoomConnection, socket: DirectSocket) -> int:
-    """Serve a socket of our own server until it ends; return the close code. Raises what went wrong."""
+    """Serve a socket of our own server until it ends; return the close code. Raise the error that
+    ended it."""
     directly = _Directly(connection, socket)
     connection.room.join(connection.member)
     socket.take_over(directly)
@@ -83,7 +85,7 @@ async def serve_directly(connection: RoomConnection, socket: DirectSocket) -> in
 
 
 class _Directly:
-    """Reads a socket, and writes to it once for each turn of the event loop."""
+    """Reads a socket, and writes to it at most once per turn of the event loop."""
 
     def __init__(self, connection: RoomConnection, socket: DirectSocket) -> None:
         self._connection = connection
@@ -168,7 +170,8 @@ def _nothing() -> None:
 
 
 async def serve_by_asgi(connection: RoomConnection, receive: Receive, send: Send) -> int:
-    """Serve a socket under any server until it ends; return the close code. Raises what went wrong."""
+    """Serve a socket of any ASGI server until it ends; return the close code. Raise the error that
+    ended it."""
     connection.room.join(connection.member)
     # Two plain tasks: a thousand idle sockets are a thousand times what stands around each.
     tasks = [
@@ -263,8 +266,8 @@ def _wants_acks(socket: Socket) -> bool:
 
 
 def _has_other_history(socket: Socket, epoch: str, room: Room) -> bool:
-    """Tell whether the client comes from another history of the log: its epoch differs, or it knows later
-    changes than there are."""
+    """Return whether the client has another history of the log: its epoch differs, or it knows
+    later changes than exist."""
     asked = socket.query_params
     if asked.get("epoch", epoch) != epoch:
         return True

@@ -37,8 +37,8 @@ class Extracting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class MadeSubGraph(msgspec.Struct, frozen=True):
-    """A new graph, and what to change in the document of the one around it, so that an action there stands
-    for it. Nothing of that document is changed yet."""
+    """A new graph, and the changes that put an action for it into the document of the outer graph.
+    The page makes these changes."""
 
     graph: GraphView
     changes: tuple[KeyChange, ...]
@@ -55,8 +55,8 @@ class UnpackingAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CallingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to rename actions called `before` in some graphs, since the graph that they stand for is called
-    `name` now."""
+    """A request to rename the actions called `before` in these graphs to `name`, after the graph
+    that they stand for was renamed."""
 
     before: str
     name: str
@@ -64,7 +64,7 @@ class CallingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CalledUses(msgspec.Struct, frozen=True):
-    """The graphs in which an action was called otherwise, each by one edit."""
+    """The graphs in which actions were renamed, each by one edit."""
 
     changed: tuple[str, ...]
 
@@ -72,7 +72,7 @@ class CalledUses(msgspec.Struct, frozen=True):
 async def _chosen(
     services: EditorServices, graph: str, data: Extracting
 ) -> tuple[GraphAtSeq, ChosenActions]:
-    """The graph at that moment, and what to make of it."""
+    """Return the outer graph, and the request for a sub-graph of its chosen actions."""
     await services.catalogue.require(graph, "graph")
     name, _ = fit(data.name, "")
     names = services.graph_checks.names

@@ -31,7 +31,8 @@ _LARGE_FILE: Final = 256 * 1024  # bytes of an imported file that is stored in a
 
 
 class DraftOf(msgspec.Struct, frozen=True):
-    """The origin of a draft: the graph, the change of it that the draft began with, and the name of the draft."""
+    """The origin of a draft: the graph and the change that the draft began with; and the name of
+    the draft."""
 
     graph: str
     seq: int
@@ -39,13 +40,13 @@ class DraftOf(msgspec.Struct, frozen=True):
 
 
 class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A graph, or an action of the library, as lists and pages show it. `seq` counts the changes of its
-    document.
+    """A graph, or an action of the library, as lists and pages show it. `seq` counts the changes of
+    its document.
 
-    `damaged`: the first change that cannot be read; the graph is what it was before, and nobody can
-    change it. `people`: who is in it now. `problems` counts what the check found; `wrong` and
-    `to_fill_in` what people are told of it, one thing once, as the page tells it. `drafts`: how many
-    there are of it.
+    `damaged`: the first change that cannot be read; the graph stays in the state before it, and
+    cannot be changed. `people`: who is in it now. `problems`: counts of the check; `wrong` and
+    `to_fill_in`: counts for people, in which related problems count once. `drafts`: the number of
+    its drafts.
     """
 
     id: str
@@ -76,7 +77,8 @@ class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Catalogue:
-    """All graphs. Raises NotFound for those that are none, or deleted."""
+    """All graphs and actions of the library. Its methods raise NotFound for an id that is unknown
+    or deleted."""
 
     def __init__(
         self,
@@ -145,8 +147,9 @@ class Catalogue:
         keys: tuple[Key, ...] = (),
         run_in_worker: RunInWorker | None = None,
     ) -> tuple[GraphView, bytes]:
-        """Make a graph from a UMRF file. The log keeps the file as it came. `keys`: of its actions in their
-        order, where they have some."""
+        """Make a graph from a UMRF file, which the log keeps unchanged. `keys`: the keys of its
+        actions in order; without them actions get new ones. Return the graph and the JSON of an
+        `ImportReport`."""
         found = await (run_in_worker or self._run_in_worker)(importing.imported, body, keys)
         about = found.about
         made = h.draft(
@@ -180,9 +183,9 @@ class Catalogue:
     async def call_uses(
         self, graphs: Collection[str], before: str, name: str, author: str
     ) -> tuple[str, ...]:
-        """Give the actions called `before` of these graphs another name, one edit for each graph, since the
-        graph for which they stand is called so now. Return the graphs that had one. Raises NotFound, before
-        anything is written, where one of the graphs is gone."""
+        """Rename the actions called `before` in these graphs, one edit for each graph, after the
+        graph that they stand for was renamed. Return the graphs that had such an action. Raise
+        NotFound, before anything is written, if a graph does not exist."""
         new_name, _ = fit(name, "")
         for graph in graphs:
             await self.require(graph, "graph")
@@ -196,7 +199,7 @@ class Catalogue:
         return tuple(changed)
 
     async def delete(self, graph: str, author: str) -> None:
-        """Take a graph out of sight; everyone in it has to leave."""
+        """Mark a graph as deleted, and close the sockets of all who are in it."""
         await self._row(graph)
         stream = h.graph_stream(graph)
         self._rooms.check_existence(stream)  # also where it is never known whether this was stored
@@ -246,8 +249,8 @@ class Catalogue:
         author: str,
         file: Draft | None = None,
     ) -> GraphView:
-        """Store a new graph. A large `file`, from which it was read, is stored in a commit of its own before the
-        graph is there: others' edits wait for every commit."""
+        """Store a new graph. A large `file` is stored before it in a commit of its own, since edits
+        of others wait for every commit."""
         made = random_id()
         document = Draft(h.UPDATED, author, update)
         if file is not None and len(file.body) > _LARGE_FILE:

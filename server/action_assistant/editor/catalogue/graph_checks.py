@@ -46,7 +46,7 @@ class GraphSummary(msgspec.Struct, frozen=True):
     first: tuple[str, str] | None = None
 
     def called(self, kind: DocumentKind) -> tuple[str | None, str | None]:
-        """Name and description; of an action they are those of the action itself."""
+        """Return name and description; for a library document those of its action."""
         return (self.name, self.description) if kind == "graph" or not self.first else self.first
 
 
@@ -60,7 +60,7 @@ class _About(msgspec.Struct, frozen=True):
 
 
 class _Member(msgspec.Struct, frozen=True):
-    """A graph inside of another, by the name of the actions that stand for it."""
+    """A graph inside of another one, by the name of the actions that stand for it."""
 
     name: str
     graph: str
@@ -68,9 +68,9 @@ class _Member(msgspec.Struct, frozen=True):
 
 
 class NamedInside(msgspec.Struct, frozen=True):
-    """The graphs inside of a graph, by name; the result of a check depends on them too. `several`: names that
-    more than one graph has; `cut`: there are more graphs than these; `hidden`: names that an action of the
-    library has as well as a graph."""
+    """The graphs inside of a graph, by name, on which a check depends, too. `several`: names that
+    several graphs have; `cut`: more graphs are inside than listed; `hidden`: names that an
+    action of the library has, too."""
 
     members: tuple[_Member, ...] = ()
     several: tuple[str, ...] = ()
@@ -101,7 +101,8 @@ class GraphChecks:
         self._uses = LruCache[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
 
     async def problems(self, sight: GraphAtSeq) -> bytes:
-        """Return the problems of a graph at a moment as JSON, with the graphs inside as they are now."""
+        """Return the JSON of a graph's problems, checked with the present state of the graphs
+        inside."""
         await self.names.refresh()
         named = await self._resolved(*await self._names_at(sight))
         key = sight.graph, sight.seq, named.key()
@@ -147,8 +148,8 @@ class GraphChecks:
         self._remember(graph, _About(1, 1, about))
 
     async def summary(self, graph: str, newest: int) -> GraphSummary:
-        """Return what lists show of a graph whose last change is `newest`. Names of graphs are those of the
-        last refresh."""
+        """Return what lists show of a graph whose last change is `newest`. Names of other graphs
+        are those of the last refresh."""
         try:
             about = await self._about(graph, newest)
             named = await self._resolved(about.info.name, about.info.uses)
@@ -207,7 +208,8 @@ class GraphChecks:
         return self._abouts.put(graph, about, len(uses))
 
     async def _name(self, graph: str, newest: int, kind: DocumentKind) -> str:
-        """The name of a document. Raises Unavailable, TooLarge."""
+        """Return the name of a document. Raise Unavailable if it cannot be read, TooLarge if it
+        needs too much memory."""
         room = self._rooms.open_room(graph_stream(graph))
         if room is not None and kind == "graph":
             return await room.read(lambda replica, _: document.name_of(replica.doc))

@@ -32,7 +32,7 @@ ReadName = Callable[[str, int, DocumentKind], Awaitable[str]]
 
 
 class NamedGraph(msgspec.Struct, frozen=True):
-    """A graph, and the change of it that is known."""
+    """A graph, and its last change that is known here."""
 
     graph: str
     seq: int
@@ -47,7 +47,8 @@ class _Document(msgspec.Struct, frozen=True):
 
 
 class GraphNames:
-    """Knows the names of all graphs and of all actions of the library. Looks only at what has changed."""
+    """Knows the names of all graphs and of all actions of the library. Each refresh reads only what
+    has changed."""
 
     def __init__(self, journal: Journal, read_name: ReadName) -> None:
         self._journal = journal
@@ -73,8 +74,7 @@ class GraphNames:
         return NamedGraph(graph, self._seqs[graph])
 
     def of_graphs(self, names: Iterable[str]) -> list[str]:
-        """Return those of these names that a graph has: the few that have to be looked at, of as many as a
-        graph has actions."""
+        """Return those of these names that a graph has."""
         graphs = self._graphs
         return [name for name in names if name in graphs]
 
@@ -114,8 +114,8 @@ class GraphNames:
         return self._next
 
     def _ended(self, task: "asyncio.Task[None]") -> None:
-        """Forget a refresh that has ended. Its error is read so that none is logged where nobody waits any
-        more."""
+        """Forget a refresh that has ended. Its error is read, so that asyncio logs none if nobody
+        waits."""
         self._tasks.discard(task)
         if not task.cancelled():
             task.exception()

@@ -80,7 +80,7 @@ class GraphReader:
         return self._moments.put((graph, seq), sight)
 
     async def moment(self, graph: str, seq: int | None) -> GraphAtSeq:
-        """Return the graph after its change `seq`, or as it is now if `seq` is None."""
+        """Return the graph after its change `seq`, or its present state if `seq` is None."""
         return await (self.now(graph) if seq is None else self.at(graph, seq))
 
     def made(self, graph: str, state: bytes) -> None:

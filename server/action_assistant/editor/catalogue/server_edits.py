@@ -24,7 +24,7 @@ async def rename(
 async def call_actions(
     room: Room, author: str, before: str, name: str, *, run_in_worker: RunInWorker = run_here
 ) -> bool:
-    """Give every action called `before` another name, as one edit. Return whether there was one."""
+    """Rename every action called `before`, as one edit. Return whether there was one."""
     state, seq = await room.read(lambda replica, seq: (replica.state(), seq))
     update = await run_in_worker(calling_actions, state, before, name)
     return await room.submit(update, author) > seq
@@ -33,9 +33,7 @@ async def call_actions(
 async def restore(
     room: Room, author: str, then: bytes, *, run_in_worker: RunInWorker = run_here
 ) -> int:
-    """Make the graph what it was in this document, as an ordinary edit that can be undone; the seq.
-
-    What people said about it stays.
-    """
+    """Restore a graph to the content of the document `then`, as an ordinary edit that can be
+    undone; return the seq. Comments stay."""
     state = await room.read(lambda replica, _: replica.state())
     return await room.submit(await run_in_worker(restoring, state, then), author)

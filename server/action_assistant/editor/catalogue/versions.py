@@ -24,9 +24,9 @@ NOTE_LIMIT: Final = 4_000  # characters
 
 
 class PinnedGraph(msgspec.Struct, frozen=True):
-    """A graph inside of a version: as it was when that was published. `name`: of the actions that stand for
-    it; `version`: of it, the newest with that content, null where there was none; `graph`: its id.
-    `current_digest`: of the graph that the name stands for now, null where there is none."""
+    """A graph inside of a version, with its content at publication. `name`: of the actions that
+    stand for it; `graph`: its id; `version`: its newest version with that content, null if none.
+    `current_digest`: of the graph that has the name now, null if none has."""
 
     name: str
     version: str | None
@@ -37,7 +37,8 @@ class PinnedGraph(msgspec.Struct, frozen=True):
 
 
 class InsideGraph(msgspec.Struct, frozen=True):
-    """A graph inside of another, as it is now. `name`: of the actions that stand for it; `graph`: its id."""
+    """A graph inside of another one, with its present content. `name`: of the actions that stand
+    for it; `graph`: its id."""
 
     name: str
     digest: str
@@ -46,9 +47,10 @@ class InsideGraph(msgspec.Struct, frozen=True):
 
 
 class InsideView(msgspec.Struct, frozen=True):
-    """All graphs inside of a graph after its change `seq`, as they are now, by name; and what a version of
-    that would have as its digests. `several`: names of more than one graph, of which the oldest is taken;
-    `cut`: there are more than these."""
+    """All graphs inside of a graph after its change `seq`, in their present state, by name;
+    `digest`, `tree_digest`: those of a version that would be published now. `several`: names
+    that several graphs have, of which the oldest counts; `cut`: more graphs are inside than
+    listed."""
 
     seq: int
     digest: str
@@ -59,9 +61,8 @@ class InsideView(msgspec.Struct, frozen=True):
 
 
 class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A version. `umrf` is the graph as text to be kept as it is, `subgraphs` are all graphs inside of it,
-    by name; lists leave both out. `tree_digest`: of the graph together with them, null where that was
-    not kept yet."""
+    """A version. `umrf`: the graph as text, kept unchanged; `subgraphs`: all graphs inside, by
+    name; lists omit both. `tree_digest`: of the graph together with them, null for old versions."""
 
     id: str
     graph: str
@@ -93,12 +94,12 @@ class Versions:
         note: str = "",
         seq: int | None = None,
     ) -> tuple[VersionView, bool]:
-        """The version of a graph at `seq`, or as it is, and whether it is new. The graphs inside of it are
-        pinned as they are now.
+        """Publish a version of a graph at `seq` (None: the newest), with the present state of the
+        graphs inside pinned. Return it, and whether it is new.
 
-        Without label and note it is the one that was published at that seq before, with the same graphs
-        inside, if there is one. What is too large to be run is not published: a start would be refused. Raises
-        NotFound, Conflict, BadInput, TooLarge.
+        Without label and note, an equal version of that seq is returned instead of a new one. Raise
+        NotFound for an unknown graph, Conflict for an unknown change, BadInput for a long label or
+        note, TooLarge for a graph that could not be started.
         """
         label, note = _within_limits(label, note)
         sight = await self._graph_reader.moment(graph, seq)
@@ -154,7 +155,7 @@ class Versions:
         return msgspec.structs.replace(_view(row), umrf=published.umrf, subgraphs=subgraphs)
 
     async def of(self, graph: str) -> list[VersionView]:
-        """The versions of a graph, newest first, without their UMRF."""
+        """Return the versions of a graph, newest first, without their UMRF."""
         return [_view(row) for row in await self._rows(graph)]
 
     async def _pinned(self, part: contents.ReleasedPart) -> h.PinnedSubgraph:
@@ -188,7 +189,7 @@ def _of_graph(graph: str) -> Select[Any]:
 
 
 def _require_runnable(found: contents.Released, inside: contents.Inside) -> None:
-    """Raises TooLarge where the runner would refuse to start the version for its size."""
+    """Raise TooLarge if the runner would refuse to start the version for its size."""
     if inside.cut:
         raise TooLarge(
             "Not published: more is inside of the graph than can be run. At most "

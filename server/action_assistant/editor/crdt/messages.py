@@ -46,7 +46,7 @@ REASONS: Final = {
     FULL: "the graph is full",
 }
 
-#: In the place of FORBIDDEN's: a page then takes another client id and goes on.
+#: The reason of a close with FORBIDDEN after which a page reconnects with another client id.
 OTHER_CLIENT: Final = "client id of another person"
 
 UPDATE_LIMIT: Final = 1 << 20  # bytes

@@ -37,9 +37,10 @@ class GraphAtSeq(msgspec.Struct, frozen=True):
 
 
 class Inside(msgspec.Struct, frozen=True):
-    """The graphs that are inside of one, by the names of the actions that stand for them, at one seq each
-    (docs/decisions/070-one-truth-for-sub-graphs.md). `several`: names of more than one graph; `cut`: there
-    are more than these; `hidden`: names of graphs that an action of the library has, too."""
+    """The graphs inside of a graph, by the names of the actions that stand for them, each at one
+    seq (docs/decisions/070-one-truth-for-sub-graphs.md). `several`: names that several graphs
+    have; `cut`: more graphs are inside than listed; `hidden`: names that an action of the
+    library has, too."""
 
     graphs: tuple[tuple[str, GraphAtSeq], ...] = ()
     several: tuple[str, ...] = ()
@@ -48,7 +49,7 @@ class Inside(msgspec.Struct, frozen=True):
 
     @property
     def key(self) -> tuple[object, ...]:
-        """A key that is equal for equal graphs after equal changes, for caches."""
+        """A cache key, equal for equal graphs after equal changes."""
         moments = tuple((name, each.graph, each.seq) for name, each in self.graphs)
         return moments, self.several, self.cut, self.hidden
 
@@ -77,9 +78,9 @@ class Counts(msgspec.Struct, frozen=True):
 
 
 class GraphInfo(msgspec.Struct, frozen=True):
-    """The facts about a graph that lists show. `told`: the number of problems that people are asked to mend or
-    to fill in; both counts leave graphs inside aside. `first`: name and description of its first action.
-    `uses`: the names of its actions."""
+    """The facts about a graph that lists show. `problems`, `told`: the problems found, and those
+    that people should fix or fill in, both without the graphs inside. `first`: name and
+    description of its first action. `uses`: the names of its actions."""
 
     name: str
     description: str
@@ -93,7 +94,7 @@ class GraphInfo(msgspec.Struct, frozen=True):
 
 
 class Read:
-    """A moment, and what was found out about it."""
+    """A graph at one seq, and results computed from it."""
 
     def __init__(self, moment: ReadGraph) -> None:
         self.moment: Final = moment
@@ -112,7 +113,7 @@ _recent: Final = LruCache[tuple[str, int], Read](_REMEMBERED, _ACTIONS)
 
 
 def read(sight: GraphAtSeq) -> Read:
-    """A graph, read once by each worker."""
+    """Return a graph decoded from its document; each worker caches the recent ones."""
     key = sight.graph, sight.seq
     found = _recent.get(key)
     if found is None:
@@ -179,8 +180,7 @@ def _counts(problems: list[Problem]) -> Counts:
 
 
 def first_action(graph: Graph) -> Action | None:
-    """The action of which the document of a library's action tells. Clients may write anything: of
-    several it is the first."""
+    """Return the action of a library document: its first one, since clients may write several."""
     return next((action for action in graph.actions if not action.missing), None)
 
 
@@ -195,7 +195,7 @@ def umrf(sight: GraphAtSeq, stamp: codec.Stamp | None = None) -> bytes:
 
 
 class ReleasedPart(msgspec.Struct, frozen=True):
-    """A graph inside of a version: its name, its id, and what it was."""
+    """A graph inside of a version: its name, id and content."""
 
     name: str
     graph: str
@@ -204,7 +204,8 @@ class ReleasedPart(msgspec.Struct, frozen=True):
 
 
 class Released(msgspec.Struct, frozen=True):
-    """The content of a published version. `size`: that of the graph together with those inside."""
+    """The content of a version to be published. `size`: of the graph together with all graphs
+    inside."""
 
     digest: str
     umrf: bytes
@@ -214,7 +215,7 @@ class Released(msgspec.Struct, frozen=True):
 
 
 def released(sight: GraphAtSeq, stamp: codec.Stamp, inside: Inside) -> Released:
-    """The digest and the text of a version, and of the graphs inside of it."""
+    """Return the content of a version: digest and text of the graph and of all graphs inside."""
     graph = read(sight).moment.graph
     parts = tuple(_part(name, each) for name, each in inside.graphs)
     own = digest(graph)
@@ -242,7 +243,7 @@ def digest_at(sight: GraphAtSeq) -> str:
 
 
 def shown(state: bytes) -> Fingerprint:
-    """Return the fingerprint of what a document shows."""
+    """Return the fingerprint of a document's content."""
     return fingerprint(maps_of(state))
 
 

@@ -100,10 +100,8 @@ def change(doc: Doc, target: Mapping[str, Mapping[str, object]]) -> None:  # typ
 
 
 def flatten(graph: Graph) -> Maps:
-    """The document's maps for a graph whose keys are aids. Absent means the default.
-
-    Raises ValueError for other keys: they could not be told from fields.
-    """
+    """Return the document's maps for a graph whose keys are aids; a missing key means the default.
+    Raise ValueError for other keys, which could look like fields."""
     meta: dict[str, object] = {"schema": SCHEMA, "name": graph.name}
     if graph.description:
         meta["description"] = graph.description
@@ -145,7 +143,7 @@ def _action_fields(action: Action, order: float) -> dict[str, object]:
 
 
 def _extra_fields(head: str, extra: tuple[tuple[str, JsonText], ...]) -> dict[str, object]:
-    """Unknown fields. Without a list of them they stand by name."""
+    """Return keys for unknown fields, and a key with their order unless they are sorted by name."""
     fields: dict[str, object] = {f"{head}/{field}": text for field, text in extra}
     names = [field for field, _ in extra]
     if names != sorted(names, key=by_text):
@@ -182,7 +180,7 @@ def _relation_fields(relation: Relation) -> dict[str, object]:
 
 
 def _remap_fields(head: str, remap: tuple[Remap, ...]) -> dict[str, object]:
-    """Without a list of sources they stand by name."""
+    """Return keys for renamings, and a key with their order unless they are sorted by name."""
     fields: dict[str, object] = {f"{head}|remap/{r.source}": r.target for r in remap}
     sources = [r.source for r in remap]
     if sources != sorted(sources, key=by_text):
@@ -231,5 +229,5 @@ def is_same(a: object, b: object) -> bool:
 
 
 def _plain(value: object) -> object:
-    """A value as it may be set: read back, bytes come as bytearray."""
+    """Return a value as it may be set: bytes come back from the library as bytearray."""
     return bytes(value) if isinstance(value, bytearray) else value

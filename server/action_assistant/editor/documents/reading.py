@@ -60,7 +60,8 @@ def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
 
 
 def _owners(fields: Fields) -> dict[str, dict[str, object]]:
-    """Group fields by the part of their key before the first `|`; the inner keys are what follows it."""
+    """Group fields by the part of their key before the first `|`; the inner keys are the parts
+    after it."""
     owners: dict[str, dict[str, object]] = defaultdict(dict)
     for key, value in fields.items():
         head, bar, rest = key.partition("|")
@@ -69,7 +70,7 @@ def _owners(fields: Fields) -> dict[str, dict[str, object]]:
 
 
 def _under(fields: Fields, prefix: str) -> _Extra:
-    """The JSON texts under a prefix, by name."""
+    """Return the JSON texts whose keys have this prefix, sorted by name."""
     found = (
         (key.removeprefix(prefix), value)
         for key, value in fields.items()
@@ -79,7 +80,7 @@ def _under(fields: Fields, prefix: str) -> _Extra:
 
 
 def _extra(fields: Fields, head: str) -> _Extra:
-    """Unknown fields in the order of their list, the others after them by name."""
+    """Return unknown fields in the stored order; fields that it lacks follow, sorted by name."""
     texts = dict(_under(fields, f"{head}/"))
     return tuple((field, texts[field]) for field in _listed(texts, fields.get(head)))
 
@@ -88,7 +89,7 @@ def _extra(fields: Fields, head: str) -> _Extra:
 
 
 def _actions(fields: Fields, positions: Fields) -> list[Action]:
-    """In the order of the file."""
+    """Return the actions in the order of the file."""
     found: list[tuple[float, Key, Action]] = []
     for key, own in _owners(fields).items():
         name = values.text(own.get(""))
@@ -131,8 +132,9 @@ def _listed(names: Iterable[str], order: object) -> list[str]:
 
 
 def _numbered(actions: list[Action]) -> list[Action]:
-    """Gives every action that only names a number of its own: per name by (instance_id, key) the
-    first keeps it, the rest take the lowest free one. Twins and ghosts keep theirs."""
+    """Return the actions, with a new number for each whose full name is taken: of equal names the
+    first by (instance_id, key) keeps its number, the others get the lowest free one. Twins and
+    ghosts keep theirs."""
     groups: dict[str, list[Action]] = defaultdict(list)
     for action in actions:
         groups[action.name].append(action)
@@ -147,7 +149,7 @@ def _numbered(actions: list[Action]) -> list[Action]:
 
 
 def _shared_out(group: list[Action]) -> dict[Key, int]:
-    """New numbers for the actions of one name that need one."""
+    """Return the new numbers for those actions of one name that need one."""
     fixed = [action.instance_id for action in group if action.twin or action.missing]
     taken: set[int] = set()
     rest: list[Key] = []
@@ -169,7 +171,7 @@ def _shared_out(group: list[Action]) -> dict[Key, int]:
 
 
 def _ghosts_taken_up(actions: list[Action]) -> dict[Key, Key]:
-    """Ghosts whose full name a real action has taken up, and that action."""
+    """Return the ghosts whose full name a real action has by now, each with that action."""
     real: dict[str, Key] = {}
     for action in actions:
         if not action.missing:
@@ -248,8 +250,8 @@ def _ends(relation: Relation) -> Ends:
 
 
 def _redirected(relations: list[Relation], taken_up: Mapping[Key, Key]) -> list[Relation]:
-    """Arrows of ghosts that were taken up lead to the real action; a pair that exists already gets
-    a further listing."""
+    """Return the arrows, with those of replaced ghosts led to the real action. If that pair has an
+    arrow already, the other gets the next listing."""
     touching = [r for r in relations if r.parent in taken_up or r.child in taken_up]
     arrows = [r for r in relations if r.parent not in taken_up and r.child not in taken_up]
     taken = {relation_id(relation) for relation in arrows}

@@ -72,14 +72,15 @@ def direction(value: object) -> Direction:
 
 
 def number(value: object) -> float | None:
-    """Return the value as a finite number; None if it is none."""
+    """Return the value as a finite number; None for any other value."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
     return float(value) if math.isfinite(value) else None
 
 
 def instance_id(value: object) -> int | None:
-    """A whole number that the engine takes as `instance_id` (32 bits, unsigned)."""
+    """Return a whole number that the engine accepts as `instance_id` (32 bits, unsigned); None for
+    any other value."""
     found = number(value)
     if found is None or not found.is_integer():
         return None
@@ -87,7 +88,7 @@ def instance_id(value: object) -> int | None:
 
 
 def position(value: object) -> Position | None:
-    """Return the value as a pair of numbers; None if it is none."""
+    """Return the value as a pair of numbers; None for any other value."""
     if not isinstance(value, list | tuple) or len(value) != 2:
         return None
     x, y = number(value[0]), number(value[1])
@@ -113,7 +114,7 @@ def json_text(value: object) -> str | None:
 
 
 def text_list(value: object) -> list[str] | None:
-    """A JSON list of texts."""
+    """Return the texts of a JSON list; None for any other value."""
     if not isinstance(value, str):
         return None
     try:

@@ -35,8 +35,8 @@ class StoredLocation(msgspec.Struct, frozen=True):
 
 
 def of(data: Path) -> str:
-    """The URL of the graphs of a folder, for commands that are not told another one. Raises
-    CannotStart when they were in a database that nobody knows any more."""
+    """Return the URL of the database with the graphs of a folder, for a command without --database.
+    Raise CannotStart if the graphs are in a database that the folder does not remember."""
     known = remembered(data)
     if known is not None:
         return known
@@ -49,8 +49,8 @@ def of(data: Path) -> str:
 
 
 def journal_of(data: Path, given: str | None) -> str | None:
-    """The URL of the journal with the graphs of a folder; None when it has none. Raises CannotStart
-    when it has one that is nowhere to be found."""
+    """Return the URL of the journal with the graphs of a folder; None if it has no graphs. Raise
+    CannotStart if its database is missing."""
     url = given or of(data)
     if not _is_nowhere(url):
         return url
@@ -153,7 +153,7 @@ def _address(url: str) -> tuple[object, ...]:
 
 
 def _graphs(url: str) -> int | None:
-    """Count the graphs of a database; None where it cannot be read."""
+    """Return the number of graphs in a database; None if it cannot be read."""
     counted = select(func.count()).where(_graph.deleted_at.is_(None))
 
     def count(connection: Connection) -> int:

@@ -57,7 +57,8 @@ async def begin(journal: Journal, why: Why) -> str:
 
 @asynccontextmanager
 async def living_in(journal: Journal, data: Path) -> AsyncIterator[str]:
-    """The epoch of this log, which is begun if need be; inside, the mark is kept up."""
+    """Yield the epoch of this log, begun if there is none; keep the mark up to date inside of the
+    `async with`."""
     mark = data / MARK
     try:
         epoch = await _epoch(journal, mark)
@@ -97,7 +98,7 @@ async def _chain(journal: Journal, position: int) -> str:
 
 
 def marked(mark: Path) -> EpochMark | None:
-    """Read the last event that a folder has seen; None where there is none, or where its file cannot be read."""
+    """Read the last event that a folder has seen; return None if its file is missing or unreadable."""
     try:
         return msgspec.json.decode(mark.read_bytes(), type=EpochMark)
     except (OSError, msgspec.DecodeError):  # a new folder, or one of an older version

@@ -54,7 +54,7 @@ DocumentKind: TypeAlias = Literal["graph", "action"]
 
 
 class GraphCreated(msgspec.Struct, frozen=True):
-    """A graph or action came to be. `dialect` and `notes` speak of the file it was read from."""
+    """A graph or action was created. `dialect` and `notes`: of the file it was read from, if any."""
 
     name: str
     description: str
@@ -72,15 +72,15 @@ class GraphDescribed(msgspec.Struct, frozen=True):
 
 
 class GraphRestored(msgspec.Struct, frozen=True):
-    """The graph was made again what it had been at `restored`; the edit has the number `seq`."""
+    """The edit `seq` restored the graph to its state after the change `restored`."""
 
     restored: int
     seq: int
 
 
 class GraphReverted(msgspec.Struct, frozen=True):
-    """The edit `seq` took back what `author` had changed between `from_seq` and `upto`, where nobody had
-    changed it since."""
+    """The edit `seq` reverted what `author` had changed between `from_seq` and `upto`, where nobody
+    had changed it since."""
 
     author: str
     from_seq: int
@@ -89,9 +89,9 @@ class GraphReverted(msgspec.Struct, frozen=True):
 
 
 class GraphAdapted(msgspec.Struct, frozen=True):
-    """The edit `seq` brought parameters to what another document says: the uses of a library's action
-    in a graph to that action, or an action of the library to its use in a graph or to a file. `source` is
-    that other document, "" for a file, `at` its change, `name` the action."""
+    """The edit `seq` made parameters equal to another document: the uses of an action in a graph to
+    the library, or an action of the library to its use or to a file. `source`: that document, ""
+    for a file; `at`: its change; `name`: the action."""
 
     seq: int
     source: str
@@ -100,7 +100,8 @@ class GraphAdapted(msgspec.Struct, frozen=True):
 
 
 class GraphDrafted(msgspec.Struct, frozen=True):
-    """The graph was made as a draft: what `origin` was after its change `seq`, under the same keys."""
+    """The graph was made as a draft, with the state of `origin` after its change `seq`, under the
+    same keys."""
 
     origin: str
     seq: int
@@ -108,9 +109,9 @@ class GraphDrafted(msgspec.Struct, frozen=True):
 
 
 class GraphMerged(msgspec.Struct, frozen=True):
-    """The edit `seq` brought in what `authors` had changed in the graph `source` from `from_seq` to `upto`.
-    Of the two `draft` is the draft, which is called `name`. `seq` 0: everything stayed as it was, since
-    people chose so."""
+    """The edit `seq` merged what `authors` had changed in the graph `source` from `from_seq` to
+    `upto`. `draft`, `name`: the draft among the two graphs, and its name. `seq` 0: nothing
+    changed, since people chose so."""
 
     draft: str
     name: str
@@ -122,8 +123,8 @@ class GraphMerged(msgspec.Struct, frozen=True):
 
 
 class DraftProposed(msgspec.Struct, frozen=True):
-    """The draft after its change `seq` was proposed to be merged. `device`: the browser of the person, "" where
-    it is not known."""
+    """The draft after its change `seq` was proposed to be merged. `device`: the browser of the
+    person, "" if unknown."""
 
     note: str
     seq: int
@@ -158,8 +159,8 @@ class ActionBuilt(msgspec.Struct, frozen=True):
 
 
 class PinnedSubgraph(msgspec.Struct, frozen=True):
-    """A graph inside of a version, as it was then: by the name of the actions that stand for it. `graph`:
-    its id; `version`: of it, the newest with that content."""
+    """A graph inside of a version, with its content at publication. `name`: of the actions that
+    stand for it; `graph`: its id; `version`: its newest version with that content."""
 
     name: str
     version: str | None
@@ -169,8 +170,9 @@ class PinnedSubgraph(msgspec.Struct, frozen=True):
 
 
 class VersionPublished(msgspec.Struct, frozen=True):
-    """A version: what a graph was at `seq`, as UMRF that never changes. `note`: what its author says of
-    it. `subgraphs`: all graphs inside of it, by name; `tree_digest`: of it together with them."""
+    """A version was published: the graph at `seq`, as UMRF that never changes. `note`: by its
+    author. `subgraphs`: all graphs inside, by name; `tree_digest`: of the graph together with
+    them."""
 
     id: str
     label: str
@@ -184,13 +186,13 @@ class VersionPublished(msgspec.Struct, frozen=True):
 
 
 class PersonNamed(msgspec.Struct, frozen=True):
-    """The author of the event goes by this name."""
+    """The author of the event has this name from now on."""
 
     name: str
 
 
 class MadeInvitation(msgspec.Struct, frozen=True):
-    """A link was made. What its secret is follows from `id` and the token."""
+    """An invitation was made. Its secret is derived from `id` and the token."""
 
     id: str
     role: Role
@@ -198,14 +200,14 @@ class MadeInvitation(msgspec.Struct, frozen=True):
 
 
 class AcceptedInvitation(msgspec.Struct, frozen=True):
-    """The author of the event came in by a link for the first time."""
+    """The author of the event came in by an invitation for the first time."""
 
     id: str
     name: str
 
 
 class RevokedInvitation(msgspec.Struct, frozen=True):
-    """A link lets nobody in any more, and nobody stay."""
+    """An invitation was revoked, and all its sessions ended."""
 
     id: str
 
@@ -222,13 +224,13 @@ def about_stream(graph: str) -> str:
 
 
 def graph_of(stream: str) -> str | None:
-    """The graph that a stream tells of."""
+    """Return the graph to which a stream belongs; None for other streams."""
     head, _, graph = stream.partition("/")
     return graph if head in {"graph", "about"} else None
 
 
 def draft(kind: str, author: str, body: msgspec.Struct | None = None) -> Draft:
-    """An event with a JSON body."""
+    """Return a pending event with a JSON body."""
     return Draft(kind, author, msgspec.json.encode(body) if body is not None else b"")
 
 
@@ -335,7 +337,7 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
 
 
 def _merged(merged: GraphMerged) -> Sequence[Executable]:
-    """From here on both sides are compared with what was merged."""
+    """Return the statements that make the merged state the base of the next comparison."""
     draft = update(editor_tables.graph).where(editor_tables.graph.c.id == merged.draft)
     base: dict[str, Any] = {"base_graph": merged.source, "base_seq": merged.upto}
     if merged.source == merged.draft:

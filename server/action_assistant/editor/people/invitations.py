@@ -67,8 +67,8 @@ class Invitation(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Invitations:
-    """All that were ever made. Kept in mind, so that what opens and ends them needs no database; this
-    process is the only one that adds to them."""
+    """All invitations ever made, held in memory, so that using and revoking one needs no database.
+    Only this process adds invitations."""
 
     def __init__(self, journal: Journal, people: People, keys: Keys, revoked: Revocations) -> None:
         self._journal = journal
@@ -81,9 +81,9 @@ class Invitations:
 
     @asynccontextmanager
     async def opened(self) -> AsyncIterator[None]:
-        """Know them all; inside, the log is made to say what it could not take up at once. Log and
-        folder say the same: either may be older, of a backup or after a crash. What one of them calls
-        revoked is revoked."""
+        """Load all invitations; inside of the `async with`, store revocations that could not be
+        stored at once. Log and folder are made equal, since either may be older after a restore
+        or crash: an invitation that one of them calls revoked is revoked."""
         await self._read()
         marked = self._revoked.every()
         for each in tuple(self._made.values()):
@@ -103,12 +103,13 @@ class Invitations:
                 await asyncio.wait([self._recording])
 
     def all(self) -> list[Invitation]:
-        """Every one, the newest first."""
+        """Return all invitations, newest first."""
         newest = sorted(self._made.values(), key=lambda each: each.made_at, reverse=True)
         return [self._view(each) for each in newest]
 
     async def make(self, role: Role, label: str, author: str) -> Invitation:
-        """A new link. Raises BadInput, Conflict, Unavailable."""
+        """Make an invitation. Raise BadInput for a bad role or label, Conflict if there are too
+        many, Unavailable if the journal cannot be written."""
         label = " ".join(label.split())
         if role == OWNER:
             raise BadInput("Owners come in by the token.", where={"path": "/role"})
@@ -149,14 +150,14 @@ class Invitations:
         return self._made[invitation]
 
     def _end(self, link: Invitation, by: PersonRef) -> None:
-        """From now on it opens nothing, whatever the log says yet."""
+        """Make an invitation invalid in memory, before the log has it."""
         self._made[link.id] = replace(
             link, revoked_at=datetime.now(UTC), revoked_by=by, unrecorded=True
         )
         self._unrecorded.append((link.id, by))
 
     async def _recorded(self) -> None:
-        """Have the log say what is revoked; waits a moment for that."""
+        """Start to store the revocations in the log, and wait a short time for that."""
         if not self._unrecorded:
             return
         if self._recording is None or self._recording.done():
@@ -164,7 +165,7 @@ class Invitations:
         await asyncio.wait([self._recording], timeout=_PATIENCE_S)
 
     async def _record(self) -> None:
-        """Tried again and again, as long as there is something that the log does not say."""
+        """Store revocations in the log, and retry until all are stored."""
         told = False
         while self._unrecorded:
             invitation, by = self._unrecorded[0]
@@ -194,7 +195,8 @@ class Invitations:
             await asyncio.to_thread(self._revoked.write_again)
 
     def look(self, proof: str) -> Invited:
-        """Return the role that a link gives, and who made it. Raises Unauthenticated, Withdrawn."""
+        """Return the role that a link gives, and who made it. Raise Unauthenticated if the link is
+        not valid, Withdrawn if it was revoked."""
         invitation, _, secret = proof.partition(".")
         expected = self._keys.secret_of(invitation)
         if not hmac.compare_digest(secret.encode(errors="replace"), expected.encode()):
@@ -250,7 +252,8 @@ class Invitations:
                 self._made[each.invitation].guests.append(guest)
 
     def _view(self, link: Invitation) -> Invitation:
-        """With the names that people go by now, and with its secret."""
+        """Return an invitation with the present names of people, and with its secret link unless it
+        is revoked."""
         over = link.revoked_at is not None
         return replace(
             link,

@@ -70,7 +70,7 @@ QueueItem: TypeAlias = SubmittedEdit | SyncRequest | ComparisonRequest | ReadReq
 
 
 class BatchOutcome:
-    """The outcome of applying one batch: the events to store, the updates to send, and the requests to answer
+    """The outcome of applying one batch: events to store, updates to send, and requests to answer
     after the commit."""
 
     def __init__(self) -> None:
@@ -113,7 +113,7 @@ Objection: TypeAlias = (
     | NotNow
 )
 
-#: The same classes, for `except`.
+#: The classes of `Objection` as a tuple, for `except`.
 OBJECTIONS: Final = (
     Malformed,
     ForeignClient,
@@ -127,7 +127,8 @@ OBJECTIONS: Final = (
 
 
 def refuse(edit: SubmittedEdit, error: Objection) -> None:
-    """Refuse an edit: close its socket with the reason, or raise the reason where the server waits for it."""
+    """Refuse an edit: close its socket with the reason, or raise the reason in the server code that
+    waits for it."""
     code, reason, text = _answer(error)
     if edit.member is not None:
         edit.member.refuse(code, text)
@@ -244,8 +245,8 @@ def batch_of(
 
 
 def before_doubt(items: Sequence[QueueItem], is_doubtful: Callable[[int], bool]) -> int:
-    """Return how many items, from the first one on, can be applied before it is doubtful that the document
-    still opens in time. `is_doubtful` is asked with a number of bytes."""
+    """Return how many items, counted from the first, can be applied before it is in doubt whether
+    the document still opens in time. `is_doubtful` is called with a number of bytes."""
     size = 0
     for n, item in enumerate(items):
         if isinstance(item, SubmittedEdit):
@@ -258,8 +259,8 @@ def before_doubt(items: Sequence[QueueItem], is_doubtful: Callable[[int], bool])
 def next_batch(
     waiting: list[QueueItem], replica: Replica
 ) -> tuple[list[QueueItem], list[QueueItem], bool]:
-    """Return the next batch, the items that wait on, and whether the batch is one edit that has to be tried
-    on a copy first."""
+    """Return the next batch, the remaining items, and whether the batch is one edit that has to be
+    tried on a copy first."""
     match waiting:  # nearly always
         case [SubmittedEdit(update)] if (
             len(update) <= LARGE

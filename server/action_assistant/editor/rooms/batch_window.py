@@ -22,8 +22,8 @@ _MEMORY: Final = 0.1  # seconds over which that is looked at
 
 
 class TurnEnd:
-    """The end of a turn of the event loop: what many rooms and sockets have to do then is one call of it,
-    each once, in the order in which it was put here."""
+    """Calls functions of many rooms and sockets together at the end of a turn of the event loop, in
+    the order of registration."""
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
@@ -31,7 +31,7 @@ class TurnEnd:
         self._work: list[Callable[[], None]] = []
 
     def do(self, work: Callable[[], None]) -> None:
-        """Call this soon, behind what is on its way in this turn."""
+        """Call this function at the end of the present turn of the event loop."""
         if not self._work:
             self._loop.call_soon(self._all, context=self._context)
         self._work.append(work)
@@ -46,7 +46,8 @@ class TurnEnd:
 
 
 class BatchWindow:
-    """Opens at most once in `longest` seconds, or more often where there is time; always, where that is 0."""
+    """Opens at most once in `longest` seconds, or more often while there is time; at every turn of
+    the event loop if `longest` is 0."""
 
     def __init__(self, longest: float = LONGEST) -> None:
         self._longest = longest
@@ -61,7 +62,7 @@ class BatchWindow:
         self._length = self._shortest
 
     def when_open(self, work: Callable[[], None]) -> None:
-        """Call `work` soon, with all others who wait."""
+        """Call `work` when the window opens next, together with all other waiting functions."""
         if not self._longest:
             self.turn_end.do(work)
             return

@@ -21,9 +21,8 @@ _PATIENCE: Final = 1.5  # intervals that an announcement waits for an update to 
 class UpdateBroadcast:
     """Sends committed updates to the members, and acknowledgements to their authors.
 
-    Every member is also told the newest sequence number, by which a page knows which moment it shows. For
-    members that only receive, this is sent every `interval` seconds at most: in a busy room it would be half
-    of all messages.
+    Every member also receives the newest sequence number. Members that only receive get it every
+    `interval` seconds at most: in a busy room it would be half of all messages.
     """
 
     def __init__(self, members: Collection[Member], interval: float, metrics: RoomMetrics) -> None:
@@ -98,8 +97,8 @@ class PresenceBroadcast:
         self._said: dict[int, tuple[PresenceEntry, Member]] = {}  # in this window, by client
 
     def add(self, entries: Sequence[PresenceEntry], speaker: Member) -> None:
-        """Send these entries of a member to the others at the end of this window; of each client only the
-        last one is sent."""
+        """Send these entries of a member to the others when this window opens; of each client only
+        the last entry is sent."""
         if entries and not self._said:
             self._window.when_open(self._send)
         for entry in entries:

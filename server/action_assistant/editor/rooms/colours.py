@@ -23,10 +23,11 @@ def colour_at(place: int) -> str:
 
 
 class PersonColours:
-    """Assigns colours to people, the same in all rooms. A colour does not change while its person is connected.
+    """Assigns colours to people, the same in all rooms. A colour does not change while its person
+    is connected.
 
-    People who have left keep theirs until the whole palette is taken; then the one who left first loses
-    theirs. Held in memory: a restart assigns colours anew.
+    People who have left keep theirs until the palette is used up; then the one who left first loses
+    theirs. A restart assigns colours again.
     """
 
     def __init__(self) -> None:
@@ -35,7 +36,7 @@ class PersonColours:
 
     @contextmanager
     def held(self, person: str) -> Iterator[str]:
-        """Count one more socket of a person while inside, and yield their colour."""
+        """Count a socket of a person inside of the `with`, and yield their colour."""
         colour = self.given(person)
         self._sockets[person] = self._sockets.get(person, 0) + 1
         try:

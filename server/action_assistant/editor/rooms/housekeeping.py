@@ -133,8 +133,8 @@ class ComparedRoom(Protocol):
 
 
 class Comparisons:
-    """Compares what pages show with the document of a room (rule R14). `divergences` counts the pages that
-    showed something else."""
+    """Compares what pages show with the document of a room (rule R14). `divergences`: the number of
+    pages that differed."""
 
     def __init__(self, room: ComparedRoom, run_in_worker: RunInWorker) -> None:
         self.divergences = 0

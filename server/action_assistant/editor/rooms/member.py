@@ -67,7 +67,7 @@ class Member:
         self._closed: asyncio.Future[int] = self._loop.create_future()
 
     def post(self, frame: bytes) -> None:
-        """Append a message to the send queue. Closes the socket where too much waits in it."""
+        """Append a message to the send queue. Close the socket if the queue is full."""
         if self._closed.done():
             return
         if len(self._frames) >= WAITING_FRAMES or self._bytes > WAITING_BYTES:
@@ -78,8 +78,9 @@ class Member:
         self.on_news()
 
     def send_now(self, news: bytes, durable: int | None = None) -> bool:
-        """Write framed messages to the socket at once, and behind them the acknowledgement that everything up
-        to `durable` is stored. Return False where they have to be posted, behind what is in the queue."""
+        """Write framed messages to the socket at once, followed by the acknowledgement that
+        everything up to `durable` is stored. Return False if the queue is not empty, so that
+        they must be posted."""
         if self._frames or self._ack is not None or self._presence is not None:
             return False
         says = self._last_ack
@@ -104,7 +105,7 @@ class Member:
         return True
 
     def post_answer(self, frame: bytes) -> None:
-        """Append the document that was asked for to the send queue, however large it is."""
+        """Append the requested document to the send queue, whatever its size."""
         self._answer = _SyncState.WAITS
         self._frames.append(frame)
         self.on_news()
@@ -201,7 +202,7 @@ class Member:
 
     @property
     def is_far_ahead(self) -> bool:
-        """Tell whether so many edits of the socket wait in the room that it is not to be read on."""
+        """Return whether so many edits of the socket wait in the room that reading has to stop."""
         return self._received - self.handled > _UNHANDLED_EDITS and not self.closed
 
     async def until_caught_up(self) -> None:
@@ -222,7 +223,7 @@ class Member:
             self.on_news()
 
     def refuse(self, code: int, text: str | None = None) -> None:
-        """Close the socket for what it sent, and ignore what it sends after that."""
+        """Close the socket for what it sent, and ignore everything it sends after that."""
         self.refused = True
         self.close_text = self.close_text if self.closed else text
         self.close(code)

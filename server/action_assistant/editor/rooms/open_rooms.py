@@ -22,8 +22,8 @@ _SILENCE: Final = 10.0  # seconds without a message after which a socket is sent
 
 
 class Rooms:
-    """Opens and unloads the rooms of this process, by stream. `run_in_worker` does what grows with a document;
-    `tried` tries large updates in another process before a room applies them."""
+    """Opens and unloads the rooms of this process, by stream. `run_in_worker` runs work that grows
+    with a document; `tried` runs trials of large updates before a room applies them."""
 
     def __init__(
         self,
@@ -81,8 +81,8 @@ class Rooms:
         return self._divergences + sum(room.comparisons.divergences for room in self.open_rooms())
 
     def is_joined(self, stream: str) -> bool:
-        """Tell whether a graph certainly exists: sockets are in its room, and nobody has begun to delete it. The
-        tables need not be asked then."""
+        """Return whether a graph certainly exists, without a query: sockets are in its room, and no
+        deletion has begun."""
         room = self._rooms.get(stream)
         return room is not None and bool(room.members) and room.graph_exists
 

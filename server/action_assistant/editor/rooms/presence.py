@@ -73,7 +73,8 @@ class PresenceNews:
         return framed(self.frame)
 
     def followed_by(self, later: "PresenceNews") -> "PresenceNews":
-        """Return these entries and later ones together; of each client the later one counts."""
+        """Return these entries and later ones together; the later entry of a client replaces the
+        earlier one."""
         return PresenceNews((self.entries | later.entries).values())
 
 

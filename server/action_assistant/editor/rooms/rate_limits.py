@@ -12,7 +12,7 @@ _PRESENCE: Final = PER_MINUTE // (60 * 200)
 
 
 class ByteRateLimits:
-    """Counts the bytes that each person sends. Without `limits` nobody ever waits."""
+    """Counts the bytes that each person sends. Without `limits` it never delays anybody."""
 
     def __init__(self, *, limits: bool, clock: Clock = time.monotonic) -> None:
         self._limits = limits

@@ -68,8 +68,9 @@ _ENDS: Final = (asyncio.CancelledError, KeyboardInterrupt, SystemExit)
 
 
 class Room:
-    """Holds the document of one graph in memory while somebody uses it. `on_end` is called when nobody may join
-    it any more. `run_in_worker` does what grows with the document, `tried` tries large edits."""
+    """Holds the document of one graph in memory while it is in use. `on_end` is called when nobody
+    may join any more. `run_in_worker` runs work that grows with the document, `tried` runs
+    trials of large edits."""
 
     def __init__(
         self,
@@ -115,7 +116,8 @@ class Room:
     # --- members --------------------------------------------------------------------------------
 
     def join(self, member: Member) -> None:
-        """Add a socket: ask which updates it has (sync step 1), and send it who is there."""
+        """Add a socket: ask which updates it lacks (sync step 1), and send it the presence of the
+        others."""
         self.members.add(member)
         if self.damaged is not None:
             member.edits = False
@@ -156,10 +158,11 @@ class Room:
     # --- requests of the server itself ----------------------------------------------------------
 
     async def submit(self, update: bytes, author: str) -> int:
-        """Apply and store an edit of the server's own (rule R9). Return the sequence number up to which the
-        log is committed then; also where the edit changed nothing.
+        """Apply and store an edit of the server itself (rule R9). Return the sequence number up to
+        which the log is committed then, also if the edit changed nothing.
 
-        Raises BadInput, Conflict, TooLarge, Unavailable.
+        Raise BadInput or TooLarge if the edit is refused, Conflict if the log is damaged,
+        Unavailable if the room is closed or the edit cannot be stored.
         """
         if self.damaged is not None:
             raise Conflict(_DAMAGED.format(self.damaged.seq))
@@ -170,10 +173,9 @@ class Room:
         return await done
 
     async def read(self, see: Callable[[Replica, int], T]) -> T:
-        """Call `see(document, seq)` once every edit that was submitted before is committed; return its result.
-
-        `see` must neither change the document nor keep it. Raises what `see` raises, and Unavailable.
-        """
+        """Call `see(document, seq)` once all earlier edits are committed; return its result. `see`
+        must neither change the document nor keep it. Raise the errors of `see`; raise
+        Unavailable if the room is closed."""
         if self._ended:
             raise Unavailable(_CLOSING)
         done: asyncio.Future[T] = self._loop.create_future()
@@ -239,7 +241,8 @@ class Room:
         self._journal.append_then(addition, partial(self._stored, outcome))
 
     def _stored(self, outcome: BatchOutcome, seq: int | None, error: BaseException | None) -> None:
-        """Continue after the commit (`seq`), or fail where there was none (`error`)."""
+        """Continue after the commit with the sequence number `seq`, or end the room if the commit
+        failed with `error`."""
         if self._ended:
             return
         try:
@@ -263,7 +266,7 @@ class Room:
         self._answer(outcome)
 
     def _answer(self, outcome: BatchOutcome) -> None:
-        """Answer the requests of the batch, which ends it, and go on with the next one."""
+        """Answer the requests of the batch, which ends it, and begin the next one."""
         answer_requests(outcome, self._replica, self.seq, self.comparisons)
         if outcome.to_store:
             self._opening_time.measure_if_due(self._replica)
@@ -288,8 +291,8 @@ class Room:
         self._slow_work = self._loop.create_task(guarded())
 
     def _fail(self, error: BaseException) -> None:
-        """Log an error and end the room; the next one is loaded from the log. Raises the error again if it
-        ends a task or the process."""
+        """Log an error and end the room; the next one is loaded from the log. Raise an error again
+        that ends a task or the process."""
         reason = error if isinstance(error, Refused) else Unavailable(_CLOSING)
         with about("graph", self._graph):
             if isinstance(error, Refused):
@@ -301,8 +304,8 @@ class Room:
             raise error
 
     def _apply_batch(self, batch: Sequence[QueueItem]) -> BatchOutcome:
-        """Apply the edits of a batch. After a panic of the library the rest of it waits until the document has
-        been loaded anew."""
+        """Apply the edits of a batch. After a panic of the library the remaining edits wait until
+        the document is loaded again."""
         outcome = BatchOutcome()
         for n, item in enumerate(batch):
             match item:
@@ -342,8 +345,8 @@ class Room:
     async def _check_large_edit_of_viewer(
         self, edit: SubmittedEdit, member: Member, outcome: BatchOutcome
     ) -> None:
-        """Acknowledge an edit of somebody who may only view if it changes nothing. Raises NotAllowed if it
-        does."""
+        """Acknowledge an edit of a person who may only view, if it changes nothing. Raise
+        NotAllowed if it changes anything."""
         if member.refused:
             return
         state = self._replica.doc.get_state()
@@ -354,7 +357,7 @@ class Room:
     def _apply(
         self, edit: SubmittedEdit, outcome: BatchOutcome, read: UpdateOutline | None = None
     ) -> None:
-        """Apply one edit, or refuse it. `read` is its outline, where that is known."""
+        """Apply one edit, or refuse it. `read`: its outline, if the caller has it."""
         begun = time.thread_time()
         try:
             effect = self._effect_of(edit, read)
@@ -371,7 +374,7 @@ class Room:
     async def _apply_in_pieces(
         self, edit: SubmittedEdit, outcome: BatchOutcome, read: UpdateOutline
     ) -> None:
-        """Apply one large edit that was tried, or refuse it. The loop does other work between its pieces."""
+        """Apply one large edit that was tried, or refuse it. Other tasks run between its pieces."""
         pieces = await pieces_aside(edit.update, self._tried)
         member, holder = edit.member, self.presence.holder
         if member is not None and member.refused:
@@ -392,7 +395,7 @@ class Room:
     def _note_effect(
         self, edit: SubmittedEdit, outcome: BatchOutcome, effect: UpdateEffect
     ) -> None:
-        """Add an edit that was applied to the outcome: as which event it is stored, and what is sent."""
+        """Add an applied edit to the outcome: the event to store, and the updates to send."""
         outcome.handled.append(edit)
         if effect is UpdateEffect.WAITS:
             outcome.to_store.append((edit, DEFERRED))
@@ -409,7 +412,7 @@ class Room:
         refuse(edit, error)
 
     def _effect_of(self, edit: SubmittedEdit, read: UpdateOutline | None) -> UpdateEffect | None:
-        """Apply one edit and return its effect; None where its socket was refused before."""
+        """Apply one edit and return its effect; None if its socket was refused before."""
         member = edit.member
         if member is not None and member.refused:
             return None
@@ -426,7 +429,8 @@ class Room:
         self._replica, self.seq = loaded.replica, loaded.seq
 
     def _end(self, reason: Refused) -> None:
-        """End the room: fail all requests with `reason`, and close all sockets so that clients connect anew."""
+        """End the room: fail all requests with `reason`, and close all sockets, so that clients
+        reconnect."""
         if self._ended:
             return
         self._ended = True

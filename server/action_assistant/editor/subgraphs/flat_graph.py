@@ -14,9 +14,9 @@ from action_assistant.umrf.json.embedded import UmrfGraph
 class FlatGraph(msgspec.Struct, frozen=True):
     """A graph with its sub-graphs, flattened into one graph (docs/decisions/069-flatten.md).
 
-    `umrf`: the flat graph, under the same name; null where none is known to do the same, for these `reasons`.
-    `origins`: the graph and action from which each of its actions comes. `left_out`: fields that no action has
-    any more.
+    `umrf`: the flat graph, under the same name; null if none is known to do the same, for the
+    `reasons`. `origins`: the graph and action from which each action comes. `left_out`: fields that
+    are lost.
     """
 
     seq: int
@@ -36,10 +36,8 @@ def flat_graph(sight: GraphAtSeq, inside: Inside) -> bytes:
 
 
 def flat_text(sight: GraphAtSeq, inside: Inside, name: str) -> bytes:
-    """The UMRF of the flat graph under another name; its description says of what it was made.
-
-    Raises Conflict where there is none.
-    """
+    """Return the UMRF of the flat graph under another name; its description names its source. Raise
+    Conflict if no flat graph does the same."""
     graph = read(sight).moment.graph
     found = flattened(graph, graphs_of(inside))
     if isinstance(found, Unflattenable):

@@ -31,10 +31,10 @@ class ChosenActions(msgspec.Struct, frozen=True):
 
 
 class ExtractionLook(msgspec.Struct, frozen=True):
-    """A preview of moving actions into a sub-graph. `umrf`: the sub-graph; null where there can be none, for
-    these `reasons`. `inputs`, `outputs`: its parameters by flat name, with their types. `changes`: of the
-    document of the outer graph after `seq`. `differences`: in which ways the graph may then behave otherwise.
-    """
+    """A preview of moving actions into a sub-graph. `umrf`: the sub-graph; null if it is
+    impossible, for the `reasons`. `inputs`, `outputs`: types of its parameters by flat name.
+    `changes`: of the outer document after `seq`. `differences`: ways in which the graph may
+    behave differently."""
 
     seq: int
     umrf: UmrfGraph | None
@@ -46,10 +46,10 @@ class ExtractionLook(msgspec.Struct, frozen=True):
 
 
 class UnpackingLook(msgspec.Struct, frozen=True):
-    """A preview of replacing an action by the actions of the graph `inside` that it stands for. `changes`: of
-    the document after `seq`; none where it cannot be done, for these `reasons`. `actions`: the keys of the new
-    actions; `differences`: in which ways the graph may then behave otherwise; `left_out`: fields that no action
-    has any more."""
+    """A preview of replacing an action by the actions of the graph `inside`. `changes`: of the
+    document after `seq`; empty if it is impossible, for the `reasons`. `actions`: the keys of
+    the new actions; `differences`: ways in which the graph may behave differently; `left_out`:
+    fields that are lost."""
 
     seq: int
     inside: str
@@ -61,8 +61,8 @@ class UnpackingLook(msgspec.Struct, frozen=True):
 
 
 class SubGraphFile(msgspec.Struct, frozen=True):
-    """The file of a new sub-graph, the keys of its actions in their order, and JSON of the changes that put
-    an action for it in its place."""
+    """The file of a new sub-graph, the keys of its actions in order, and the JSON of the changes
+    that replace these actions by one for the sub-graph."""
 
     umrf: bytes
     keys: tuple[Key, ...]
@@ -75,7 +75,8 @@ def extraction_look(sight: GraphAtSeq, chosen: ChosenActions) -> bytes:
 
 
 def subgraph_file(sight: GraphAtSeq, chosen: ChosenActions) -> SubGraphFile:
-    """The new graph. Raises Conflict where there is none."""
+    """Return the new sub-graph. Raise Conflict if it is impossible, or may behave differently
+    without `otherwise`."""
     found = _extraction(sight, chosen)
     look = _look(sight, found, chosen)
     for reason in look.reasons:
@@ -114,7 +115,8 @@ def _look(sight: GraphAtSeq, found: Extraction, chosen: ChosenActions) -> Extrac
 def unpacking_look(
     sight: GraphAtSeq, action: Key, at: Position | None, inside: GraphAtSeq
 ) -> bytes:
-    """JSON of an `UnpackingLook`. `at`: where the action is drawn if it has no place."""
+    """Return the JSON of an `UnpackingLook`. `at`: where the action is drawn if it has no stored
+    position."""
     moment = read(sight).moment
     drawn = tuple(
         replace(a, position=a.position or at) if a.key == action else a

@@ -12,7 +12,7 @@ _MODE: Final = 0o644 << 16
 
 
 def packed(graphs: Iterable[tuple[str, bytes]]) -> bytes:
-    """A ZIP file with one file for each of these graphs, by name and text."""
+    """Return a ZIP file with one file for each of these graphs, given by name and text."""
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as file:
         taken: set[str] = set()

@@ -38,7 +38,7 @@ Label = Annotated[str, msgspec.Meta(min_length=1, max_length=60, pattern=r"^\S(.
 
 
 class Marks(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The marks of a run that a person changes; a field that is left out stays as it was."""
+    """The marks of a run to be changed; a missing field keeps its value."""
 
     pinned: bool | None = None
     note: Annotated[str, msgspec.Meta(max_length=4_000)] | None = None
@@ -56,10 +56,10 @@ class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The sum of one action of a run that is over. It was visited `visits` times, with `at_least`
-    perhaps more often. `results` counts results that are known; `inferred` the visits that nobody
-    saw; `spans` has the durations of visits that have ended, the newest hundred at most. `took` is
-    of older versions: lower bounds in microseconds."""
+    """The sum of one action of a run that is over. `visits`: how often it ran, with `at_least`
+    perhaps more often. `results`: the number of visits by known result; `inferred`: visits that
+    nobody saw; `spans`: durations of ended visits, at most the newest hundred. `took`: lower
+    bounds in microseconds, from older versions."""
 
     aid: str | None = None
     visits: int = 0
@@ -88,9 +88,8 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class RunArchived(msgspec.Struct, frozen=True):
-    """The events of a run were put into an archive and taken out of the journal. `file` is a path
-    in the folder of archives; `by` is the number of the removal; `row` is the run's row as it
-    was."""
+    """The events of a run were moved from the journal to an archive. `file`: its path in the folder
+    of archives; `by`: the number of the removal event; `row`: the run's row at that time."""
 
     kind: ClassVar[str] = "run.archived.v1"
 
@@ -118,8 +117,8 @@ def draft(event: Marked | SummedUp | RunArchived) -> Draft:
 
 
 def sum_of(run: Run, graph: Graph | None, at: int, said: Iterable[str] = ()) -> SummedUp:
-    """Sum up a run. `graph`: as it was sent, None where it cannot be read; `at`: microseconds UTC
-    of the sum; `said`: the texts of its events."""
+    """Return the sum of a run. `graph`: the graph that was sent, None if it cannot be read; `at`:
+    the time of the sum in microseconds UTC; `said`: the texts of its events."""
     found = causes(run, graph)[:1]
     cause = cause_sentence(found[0], run) if found else ""
     texts = itertools.chain(

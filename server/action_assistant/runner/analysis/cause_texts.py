@@ -31,8 +31,7 @@ _SAME_S: Final = 0.101  # bounds that are no further apart are told as one figur
 
 
 def cause_sentence(cause: Cause, run: Run) -> str:
-    """Return a cause as one sentence without its moment. Names of right-to-left scripts are
-    isolated."""
+    """Return a cause as one sentence without its time. Names of right-to-left scripts are isolated."""
     return sentence(_in_words(cause, run))
 
 
@@ -102,7 +101,8 @@ def _stop_in_words(cause: OperatorStop, run: Run) -> str:
 
 
 def _while_in_words(ran: Sequence[RunningAction], run: Run, lead: str = " while ") -> str:
-    """Return which actions ran at that moment, and for how long they had run by then."""
+    """Return a phrase that says which actions ran at the time of the cause, and how long they had
+    run by then."""
     if not ran:
         return ""
     names = [f"{short_name(run, each.action)} ({_lasted(each)})" for each in ran[:_NAMED]]

@@ -33,8 +33,8 @@ UNCONFIRMED: Final = "stop_unconfirmed"
 
 
 class _Evidence(msgspec.Struct, frozen=True, kw_only=True):
-    """The evidence of a cause: a moment (microseconds UTC), an action (full name), and the words
-    that were said there."""
+    """The evidence of a cause: its time (microseconds UTC), the action (full name), and a quoted
+    text."""
 
     at: int
     action: str | None = None
@@ -81,7 +81,7 @@ class OperatorStop(_Evidence, frozen=True, tag="operator_stop", tag_field="kind"
 
 
 class OperatorPause(_Evidence, frozen=True, tag="operator_pause", tag_field="kind"):
-    """A person paused the run and nobody resumed it. `seen`: the engine showed it paused."""
+    """A person paused the run and nobody resumed it. `seen`: the engine showed the run paused."""
 
     by: str
     ran: tuple[RunningAction, ...] = ()
@@ -95,25 +95,25 @@ class OperatorChange(_Evidence, frozen=True, tag="operator_change", tag_field="k
 
 
 class Waiting(_Evidence, frozen=True, tag="waiting", tag_field="kind"):
-    """`action` never ran, since it waited for `parent`: that had begun at `at` and was not seen to
-    end until the run was given up, or it had ended as `ended` says, which the arrow between them
-    ignores."""
+    """The action `action` never ran, since it waited for `parent`. Either the parent had begun at
+    `at` and was not seen to end before the run was given up, or it had ended with the outcome
+    `ended`, which the arrow ignores."""
 
     parent: str
     ended: str = ""
 
 
 class Stalled(_Evidence, frozen=True, tag="stalled", tag_field="kind"):
-    """The graph ran and no action in it did; `quote` says what `action` waited for."""
+    """The graph was RUNNING and none of its actions ran. `quote`: what `action` waited for."""
 
 
 class EngineRestarted(_Evidence, frozen=True, tag="engine_restarted", tag_field="kind"):
-    """Another process of the engine took the place of the one before."""
+    """Another process of the engine replaced the one that ran the graph."""
 
 
 class ForeignCause(_Evidence, frozen=True, tag="foreign", tag_field="kind"):
-    """A command of somebody else to the robot. `ended`: the run was over then, without a Stop from
-    here."""
+    """A command of somebody else to the robot. `ended`: the run was over after it, without a Stop
+    from here."""
 
     command: str
     graph: str
@@ -129,13 +129,13 @@ class ActionFailed(_Evidence, frozen=True, tag="action_failed", tag_field="kind"
 
 
 class RefusalCause(_Evidence, frozen=True, tag="refused", tag_field="kind"):
-    """The start was refused. `sent`: by the engine; else it never left this computer."""
+    """The start was refused: by the engine if `sent`, else before it was sent."""
 
     sent: bool = True
 
 
 class Silence(_Evidence, frozen=True, tag="silence", tag_field="kind"):
-    """The engine does not answer, or does not show the run; since `at` nothing is known."""
+    """The engine does not answer, or does not show the run; its state is unknown since `at`."""
 
 
 class Warned(_Evidence, frozen=True, tag="warned", tag_field="kind"):
@@ -163,8 +163,8 @@ Cause: TypeAlias = (
 
 
 def causes(run: Run, graph: Graph | None) -> tuple[Cause, ...]:
-    """Return the proven causes of a run's end, or of its trouble so far, the weightiest first;
-    empty for a run that went well. `graph`: as it was sent, None where it is not known."""
+    """Return the proven causes of a run's bad end, or of its trouble so far, the most important
+    first; empty for a run that went well. `graph`: the graph that was sent, None if unknown."""
     if run.end == "finished" and (run.result == "on_true" or _nothing_failed(run)):
         return ()
     found = list(_found(run, graph))
@@ -172,8 +172,8 @@ def causes(run: Run, graph: Graph | None) -> tuple[Cause, ...]:
 
 
 def _nothing_failed(run: Run) -> bool:
-    """Return whether a finished run of unknown result went well: no action ended in error. Robots
-    do not tell results of graphs."""
+    """Return whether no action failed in a finished run of unknown result. Robots report no results
+    of graphs."""
     return run.result is None and all(_failed(each) is None for each in run.actions.values())
 
 
@@ -199,7 +199,7 @@ def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
 
 
 def operator(run: Run) -> tuple[OperatorStop | OperatorPause | OperatorChange, ...]:
-    """Return what people at this runner did to a run, a Stop first."""
+    """Return the commands of people at this runner that affected a run, a Stop first."""
     found: list[OperatorStop | OperatorPause | OperatorChange] = []
     asked = run.interventions
     found += [_stop(run, each) for each in asked if each.kind == "stop"]
@@ -239,7 +239,7 @@ def _stop(run: Run, asked: Intervention) -> OperatorStop:
 
 
 def _ran(run: Run, asked: Intervention) -> tuple[RunningAction, ...]:
-    """Return the innermost actions that ran at that moment, proven ones first."""
+    """Return the innermost actions that ran when a command was given, proven ones first."""
     found: list[RunningAction] = []
     for name in asked.active:
         visit = _at(run.actions.get(name, ActionRun()), asked.at)
@@ -253,8 +253,8 @@ def _ran(run: Run, asked: Intervention) -> tuple[RunningAction, ...]:
 
 
 def _at(action: ActionRun, moment: int) -> Visit | None:
-    """Return the visit of an action that may have been going on at `moment` (microseconds UTC), or
-    None."""
+    """Return the visit of an action that may have been running at `moment` (microseconds UTC); None
+    if there is none."""
     for visit in reversed(action.visits):
         if visit.not_before <= moment:
             ended = visit.not_after is not None and visit.not_after < moment
@@ -319,8 +319,8 @@ def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
 
 
 def _refusals(run: Run, graph: Graph | None) -> Iterator[Cause]:
-    """Yield the refusal of a start by the engine's own log, with the actions that it is known to
-    lack."""
+    """Yield the refusal of a start, from the engine's log; and the actions that the engine is known
+    to lack."""
     said = (each for each in run.log if each.text.startswith(_REFUSAL))
     line = next(said, None) if run.end == "refused" or not _shown(run) else None
     lacking = [each for each in run.despite if each.code in _PROBLEMS]
@@ -368,7 +368,7 @@ def _parameters(run: Run, graph: Graph) -> Iterator[Cause]:
 
 
 def _given(action: Action, problem: Overridden) -> tuple[str, str]:
-    """Return the name of a problem's parameter and its value as it was sent."""
+    """Return the name and the sent value of the parameter that a problem is about."""
     path = problem.path.rpartition("_parameters/")[2]
     leaf = next((parse_small(each.text) for each in action.inputs if each.path == path), None)
     value = leaf.get("pvf_value") if isinstance(leaf, dict) else None
@@ -398,10 +398,13 @@ def _failures(run: Run, graph: Graph | None) -> Iterator[Cause]:
 
 
 def _failing_visit(run: Run, graph: Graph | None) -> EndedVisit | None:
-    """Return the visit that the bad end goes back to: the first that ended in error; in a run that
-    ended false, the last of the top level that did. An error comes last if an action around it
-    ended true, or an action that it started by an arrow of `graph`: these recovered from it. In a
-    run that a person stopped it does not come at all."""
+    """Return the visit that explains a bad end; None if there is none. It is the first that ended
+    in error, or, in a run that ended false, the last top-level visit that ended false.
+
+    An error from which the run recovered comes last: an action around it ended true, or an action
+    that it started by an arrow of `graph`. In a run that a person stopped such an error does not
+    count.
+    """
     found = places_of(run)
     ended = _ended_visits(run, found, run.actions)
     errors = [each for each in ended if each[2].result == "error"]
@@ -426,7 +429,7 @@ def _failing_visit(run: Run, graph: Graph | None) -> EndedVisit | None:
 def _ended_visits(
     run: Run, found: Mapping[str, LevelPlace], names: Iterable[str]
 ) -> list[EndedVisit]:
-    """Return the visits that have ended, in the order of their ends; at the same moment, inner ones
+    """Return the ended visits of these actions, sorted by their ends; at equal times, inner ones
     first."""
     visits = [
         (visit.not_after or visit.start, name, visit)
@@ -451,7 +454,7 @@ def _made_good(
 
 
 def _recovery(graph: Graph | None) -> Mapping[str, frozenset[str]]:
-    """Return by the full name of an action the full names of those that its error starts."""
+    """Return, by the full name of each action, the full names of the actions that its error starts."""
     if graph is None:
         return {}
     names = {action.key: action.full_name for action in graph.actions}
@@ -508,7 +511,8 @@ def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
 
 
 def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
-    """Yield the joins that one of their parents kept waiting when the run was given up."""
+    """Yield the joins whose action never ran, since a parent kept it waiting when the run was given
+    up."""
     if run.end in {"finished", "error", "refused"}:
         return
     moment = _given_up(run)
@@ -522,7 +526,7 @@ def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
 
 
 def _around(run: Run, going: set[str]) -> set[str]:
-    """Return those of the actions `going` that have another one of them inside: they run only
+    """Return those of the actions `going` that have another one of them inside, and so run only
     because the inner one does."""
     found = places_of(run)
     levels = {found[name].levels for name in going}
@@ -530,9 +534,8 @@ def _around(run: Run, going: set[str]) -> set[str]:
 
 
 def _given_up(run: Run) -> int | None:
-    """Return the moment (microseconds UTC) from which on the states of actions prove nothing any
-    more: a Stop, the beginning of a silence, or the end of the run. Return None if there is
-    none."""
+    """Return the time (microseconds UTC) from which on states of actions prove nothing: a Stop, the
+    beginning of a silence, or the end of the run; None without any."""
     if run.stop_requested_at is not None:
         return run.stop_requested_at
     return run.unknown_since if run.unknown_since is not None else run.ended_at
@@ -612,7 +615,7 @@ def _silence(run: Run) -> Iterator[Cause]:
 
 
 def _alarms(run: Run, named: set[str]) -> Iterator[Cause]:
-    """Yield other alarms, except those that later events contradict."""
+    """Yield the remaining alarms as causes, except those that later events contradict."""
     for alarm in run.alarms:
         if alarm.code in named or alarm.code in {RESTARTED, stall.STALLED}:
             continue

@@ -37,10 +37,9 @@ Relation: TypeAlias = Literal["same", "result", "only_a", "only_b", "unknown", "
 
 
 class ComparedVisit(msgspec.Struct, frozen=True, kw_only=True):
-    """The `visit`-th visit (from 1) of an action in both runs. `levels`: the actions that it is
-    inside of, outermost first, and `name` its own there; `action`: the name by which its engine
-    told it. `slower` names the run in which it took notably longer, whichever values within its
-    bounds are true."""
+    """The visit number `visit` (from 1) of an action in both runs; null where a run lacks it.
+    `levels`: the actions around it, outermost first; `name`: its own; `action`: the name that
+    its engine used. `slower`: the run in which it certainly took notably longer."""
 
     action: str
     levels: tuple[str, ...]
@@ -67,8 +66,8 @@ class Parting(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PartingCause(msgspec.Struct, frozen=True, kw_only=True):
-    """An event of one of the runs that explains why they differ: a command of a person, an alarm,
-    or the script of the simulator. `run`: the number of that run."""
+    """An event of one run that explains why the runs differ: a command of a person, an alarm, or
+    the script of the simulator. `run`: the number of that run."""
 
     kind: str
     run: int
@@ -79,10 +78,10 @@ class PartingCause(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
-    """Run `a` compared with run `b`. `graph` is the difference of the graphs that were sent;
-    `parameters` those of its changes that touch values of actions; `subgraphs` names the graphs
-    inside that differ. `because`: an event of a run that explains the parting, before any
-    difference of the graphs; null where none is known."""
+    """The comparison of run `a` with run `b`. `graph`: the difference of the sent graphs;
+    `parameters`: its changes of values of actions; `subgraphs`: the names of graphs inside that
+    differ. `because`: an event that explains the first difference of the runs, rather than any
+    difference of the graphs; null if unknown."""
 
     a: views.RunSummary
     b: views.RunSummary
@@ -102,7 +101,7 @@ class RunComparison(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class SentTree(msgspec.Struct, frozen=True):
-    """A graph as it was sent, the digests of the graphs inside by their names, and the script of a
+    """A graph that was sent, the digests of the graphs inside by name, and the script of a
     simulated run."""
 
     umrf: str
@@ -149,12 +148,12 @@ def _graph(umrf: str) -> Graph:
 
 
 def aligned(a: Graph, b: Graph) -> tuple[Graph, dict[Key, Key]]:
-    """Return graph `a` with the keys of `b` for each action that is the same in both, and these
-    keys by those of `a` that changed.
+    """Return graph `a` with the keys of `b` for each action that is the same in both; and the
+    replaced keys, as new keys by old ones.
 
     An action is the same by its key; else by its full name; else by its name, type and parameters,
-    where each side has only one such action. Keys change when actions are removed from a graph and
-    put back, or when a file is imported again.
+    if each graph has only one such action. Keys change when actions are removed and put back, or a
+    file is imported again.
     """
     same = {each.key: each.key for each in b.actions if each.key in {one.key for one in a.actions}}
     for says in (_called, _described):
@@ -188,7 +187,7 @@ def _described(action: Action) -> tuple[object, ...]:
 def _alone_by(
     says: Callable[[Action], tuple[object, ...]], actions: Iterable[Action]
 ) -> dict[tuple[object, ...], Key]:
-    """Return keys of actions by a description, where only one action has it."""
+    """Return the keys of actions by a description, for descriptions that exactly one action has."""
     found: dict[tuple[object, ...], list[Key]] = {}
     for each in actions:
         found.setdefault(says(each), []).append(each.key)
@@ -196,16 +195,16 @@ def _alone_by(
 
 
 def _changed_inside(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
-    """Return the names of graphs inside that differ, or that one side lacks. Empty where a run was
-    stored without its graphs inside, as older ones were."""
+    """Return the names of graphs inside that differ, or that one run lacks; empty if a run was
+    stored without its graphs inside, as older versions did."""
     if not a or not b:
         return []
     return sorted(name for name in a.keys() | b.keys() if a.get(name) != b.get(name))
 
 
 class MissedVisits:
-    """Knows of which actions of either run visits may have been missed. Then it is not known which
-    visits belong together, and a visit that was not seen may have happened."""
+    """Knows for which actions of either run visits may have been missed. For these it is unknown
+    which visits correspond, and a missing visit may have happened."""
 
     def __init__(self, a: Run, b: Run) -> None:
         self._a, self._b = _MissedVisitsOfRun(a), _MissedVisitsOfRun(b)
@@ -255,8 +254,8 @@ def _steps(
 
 
 class _ActionPair(msgspec.Struct, frozen=True):
-    """One action by its name in either run (None where the run lacks it), and its place, in the
-    second run if it is there."""
+    """One action by its name in each run (None if that run lacks it), and its place, in the second
+    run if possible."""
 
     a: str | None
     b: str | None
@@ -271,9 +270,9 @@ class _ActionPair(msgspec.Struct, frozen=True):
 
 
 def _pairs(a: Run, b: Run, identities: Mapping[Key, Key]) -> list[_ActionPair]:
-    """Pair the actions of both runs: by key where they have one, so that a renamed action is the
-    same; inside of others by their names below the outermost action. `identities`: keys of `b` by
-    keys of `a` of the same actions."""
+    """Return the actions of both runs in pairs: top-level actions by key, so that renamed ones
+    match; inner actions by their names below the outermost action. `identities`: keys of `b` by
+    the keys of the same actions in `a`."""
     in_a, in_b = places_of(a), places_of(b)
     same = {_identity(a, name, place, identities): name for name, place in in_a.items()}
     found = {name: same.get(_identity(b, name, place, {})) for name, place in in_b.items()}
@@ -342,7 +341,7 @@ def _parts(step: ComparedVisit) -> bool:
 
 
 def _inner_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
-    """Put an action with another result behind the visit inside of it that explains the result."""
+    """Put a visit with a different result after the visit inside of it that explains the result."""
     within: dict[tuple[str, ...], list[ComparedVisit]] = {}
     for step in filter(_parts, steps):
         for depth in range(len(step.levels)):
@@ -363,7 +362,7 @@ def _inner_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
 
 
 def _is_inside(step: ComparedVisit, other: ComparedVisit) -> bool:
-    """Return whether the first visit can have been going on within the second one."""
+    """Return whether the visit `step` may have run during the visit `other`."""
     way = (*other.levels, other.name)
     pairs = ((step.a, other.a), (step.b, other.b))
     return step.levels[: len(way)] == way and any(
@@ -376,8 +375,8 @@ def _is_inside(step: ComparedVisit, other: ComparedVisit) -> bool:
 
 
 def _own_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
-    """Put the first visit of run `b` before that of run `a`, where each run went on with an action
-    that the other lacks: which one began earlier is chance, and the page shows the graph of `b`."""
+    """If each run continued with an action that the other lacks, put the first visit of run `b`
+    before that of run `a`: their order is chance, and the page shows the graph of `b`."""
     first = next((at for at, step in enumerate(steps) if _parts(step)), None)
     if first is None or steps[first].relation != "only_a":
         return steps
@@ -411,12 +410,12 @@ def _because(
     *,
     led_otherwise: bool,
 ) -> PartingCause | None:
-    """Return the event that explains why the runs differ: commands of people in either run first,
-    then alarms, then scripts of the simulator. For runs without a different visit but with
-    different ends: what explains the end.
+    """Return the event that explains why the runs differ, or None: commands of people first, then
+    alarms, then scripts of the simulator. If only the ends differ, the event explains the end.
 
-    Where only one run has the visit, only an event of the other run can explain that, and none
-    does if the graphs lead to the action in different ways (`led_otherwise`)."""
+    For a visit of only one run, the event must be of the other run; there is none if the graphs
+    lead to the action in different ways (`led_otherwise`).
+    """
     step = parting.step if parting is not None else None
     if step is None and a[0].end == b[0].end:
         return None
@@ -442,15 +441,15 @@ def _because(
 
 
 def _changes_graph(cause: Cause) -> bool:
-    """Return whether a cause is a change of the graph of a run that went on."""
+    """Return whether a cause is a change of the graph during a run."""
     return isinstance(cause, OperatorChange) or (
         isinstance(cause, ForeignCause) and cause.command == "modify"
     )
 
 
 def _led_otherwise(step: ComparedVisit, a: Graph, b: Graph, inside: Sequence[str]) -> bool:
-    """Return whether other arrows lead to the action of a visit in graph `a` than in graph `b`, or
-    one of them lacks it. `inside`: names of graphs inside that differ."""
+    """Return whether graph `a` leads to the action of a visit by other arrows than graph `b`, or
+    one graph lacks it. `inside`: names of graphs inside that differ."""
     if step.levels:
         return any(level.rpartition("_")[0] in inside for level in step.levels)
     return _arrows_to(step, a) != _arrows_to(step, b)
@@ -471,8 +470,8 @@ def _operators(run: Run) -> Iterator[Cause]:
 
 
 def _troubles(run: Run) -> Iterator[Cause]:
-    """Yield the causes of a run that are alarms or silence; what later events contradict is no
-    cause."""
+    """Yield the causes of a run that are alarms or silence, except those that later events
+    contradict."""
     moments = {each.at for each in run.alarms if each.code in _ALARMS}
     for cause in causes(run, None):
         if isinstance(cause, Silence) or (not isinstance(cause, OPERATOR) and cause.at in moments):
@@ -480,8 +479,8 @@ def _troubles(run: Run) -> Iterator[Cause]:
 
 
 def _explains(at: int, run: Run, shown: views.VisitShown | None) -> bool:
-    """Return whether an event at this moment can explain a visit of that run, or that there is
-    none. A visit with a result of its own ended by itself."""
+    """Return whether an event at the time `at` can explain a visit of its run, or the absence of
+    one (`shown` None). A visit with an own result ended by itself."""
     if shown is None:
         return run.ended_at is None or at <= run.ended_at
     if shown.result in {"true", "false"}:
@@ -497,8 +496,8 @@ def _happened(kind: str, run: Run, text: str) -> PartingCause:
 
 
 def _scripted(sent: SentTree, name: str | None) -> object:
-    """Return what the script of a simulated run says about an action; None where it says
-    nothing."""
+    """Return the behaviour of an action in the script of a simulated run; None if the script has
+    none."""
     script = parse_small(sent.script) if sent.script else None
     says = script.get("behaviours") if isinstance(script, dict) else None
     if not isinstance(says, dict) or name is None:

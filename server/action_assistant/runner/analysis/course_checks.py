@@ -38,8 +38,8 @@ BUDGET_S: Final = 10.0
 
 
 class CheckRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A check of the expected courses of `graph`, against a text of it and the graphs inside. Where
-    no graphs inside are sent, those of the expectation count."""
+    """A request to check the expected courses of `graph` against the text `umrf`. `subgraphs`: the
+    graphs inside; if empty, those stored with each expectation are used."""
 
     umrf: SentGraph
     graph: str
@@ -55,8 +55,8 @@ class ProposalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CheckedCourse(msgspec.Struct, frozen=True, kw_only=True):
-    """One expected course, checked. `same` is null where there was no time for it; `why`: where the
-    courses part. `run` is "" for a course of a dry-run."""
+    """One checked expected course. `same`: null if there was no time to check it; `why`: where the
+    courses differ. `run`: "" for the course of a dry-run."""
 
     name: str
     run: str
@@ -72,7 +72,8 @@ class CheckedCourse(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CheckedCourses(msgspec.Struct, frozen=True):
-    """All expected courses of a graph, by name, and the coverage by those that it still takes."""
+    """All expected courses of a graph, by name, and the coverage by those that still go the same
+    way."""
 
     courses: list[CheckedCourse]
     coverage: ArrowCoverage
@@ -115,7 +116,7 @@ def check_courses(
 def _checked(
     saved: Expected, now: Graph, inside: Inner, *, looks: bool
 ) -> tuple[CheckedCourse, TakenArrows | None]:
-    """Check one course; return the arrows that it took if it is the expected one."""
+    """Check one course. Also return the arrows that it took, if it is as expected."""
     unchecked = CheckedCourse(
         name=saved.name,
         run=saved.run,

@@ -77,7 +77,7 @@ class Doubt(msgspec.Struct, frozen=True):
 
 
 class Recorded(msgspec.Struct, frozen=True):
-    """A run as a script (`behaviours`, docs/contracts.md 5.2), and the guesses in it."""
+    """A run as a script (`behaviours`, docs/contracts.md 5.2), and where the script is a guess."""
 
     behaviours: dict[str, list[dict[str, Any]]]
     doubts: list[Doubt]
@@ -111,8 +111,8 @@ class Retired(msgspec.Struct, frozen=True):
 
 
 def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
-    """Return a run as a script. `fault` makes one action (full name) fail at its last visit
-    instead."""
+    """Return a run as a script. `fault`: an action (full name) and the fault with which its last
+    visit ends instead."""
     behaviours: dict[str, list[dict[str, Any]]] = {}
     doubts: list[Doubt] = []
     for name, action in run.actions.items():
@@ -131,8 +131,8 @@ def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
 
 
 def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
-    """Return the script for another version of the graph: an action that was renamed keeps what it
-    did. An action that the run did not have, or never ran, gets the simulator's default."""
+    """Return the script for another version of the graph: renamed actions keep their behaviour. An
+    action that never ran gets the simulator's default."""
     by_aid = {action.aid: name for name, action in run.actions.items() if action.aid is not None}
     behaviours: dict[str, list[dict[str, Any]]] = {}
     used: set[str] = set()
@@ -155,8 +155,8 @@ def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
 
 
 def _spread(action: ActionRun) -> Iterable[str]:
-    """Yield one message for each visit of an action, "" without one: a script can repeat one per
-    visit."""
+    """Yield one message for each visit of an action, "" if it has none, since a script can repeat
+    one message per visit."""
     for visit in action.visits:
         until = visit.not_after
         yield next(

@@ -65,7 +65,7 @@ class EventLine(msgspec.Struct, frozen=True):
 
 
 def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
-    """Yield each event as a line of JSON, as it is stored."""
+    """Yield each stored event as a line of JSON."""
     for each in events:
         at = views.time(each.at).isoformat().replace("+00:00", "Z")
         line = EventLine(run, each.seq, each.kind, each.author, at, msgspec.Raw(each.body))
@@ -73,9 +73,9 @@ def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
 
 
 def intervals(run: Run) -> bytes:
-    """Return CSV with a line per visit, in the order of their begins. Cells of unknown values are
-    empty, also `seconds` where only bounds are known; these follow in columns of their own.
-    `missed` tells how many visits of the action have no line: "none", or "N or more"."""
+    """Return CSV with a line per visit, sorted by begin. Cells of unknown values are empty, also
+    `seconds` if only bounds are known, which have columns of their own. `missed`: how many
+    visits of the action have no line, "none" or "N or more"."""
     text = io.StringIO()
     sheet = csv.writer(text)
     sheet.writerow(_COLUMNS)
@@ -110,9 +110,9 @@ def _cell(text: str) -> str:
 
 
 def mcap(events: Iterable[Event]) -> bytes:
-    """Return MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, when they
-    were shown), `/visits/NAME` (a visit that has ended, when that was known; with `at_least` others
-    may have been missed, so that `visit` is a lower bound), `/log`."""
+    """Return MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, at the
+    time they were shown), `/visits/NAME` (an ended visit, at the time its end was known; with
+    `at_least`, visits may have been missed and `visit` is a lower bound), `/log`."""
     out = io.BytesIO()
     writer = Writer(out, compression=CompressionType.NONE)
     writer.start(profile="", library=f"temoto-action-assistant {VERSION}")

@@ -73,7 +73,7 @@ class ReplayMark(msgspec.Struct, frozen=True):
 
 class RunKeyframes(msgspec.Struct, frozen=True):
     """Keyframes in order; the last one is the run after its newest event. `marks`: the first
-    `MARKS` of the run. `fold`: the value of `FOLD` with which they were made."""
+    `MARKS` marks of the run. `fold`: the value of `FOLD` with which they were made."""
 
     fold: int
     keys: tuple[Keyframe, ...]
@@ -99,7 +99,7 @@ class SnapshotJournal(RunnerJournal, Protocol):
         ...
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
-        """Return the stored snapshot of a stream; None where there is none that still fits it."""
+        """Return the stored snapshot of a stream; None if there is none that is still valid."""
         ...
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
@@ -138,8 +138,9 @@ class KeyframeStore:
         return (await self.run_in_worker(lambda: _next(key, _whole(events)))).run
 
     async def seq_at(self, run: str, at: int) -> int:
-        """Return the seq of the first event that happened at this moment (microseconds UTC) or
-        later, else of the last event. Raises NotFound, Unavailable."""
+        """Return the seq of the first event at or after the time `at` (microseconds UTC), else of
+        the last event. Raise NotFound if there is no such run, Unavailable if the journal cannot
+        be read."""
         key = (await self.keyframes(run)).until(at - 1)
         events = await self.page(run, key.seq if key else 0)
 
@@ -152,7 +153,7 @@ class KeyframeStore:
         return await self.run_in_worker(found)
 
     async def page(self, run: str, after: int) -> Sequence[Event]:
-        """Return the events of one page, those with `seq > after`."""
+        """Return the first `APART` events with `seq > after`."""
         return await self._journal.read(stream_of(run), after=after, limit=APART)
 
     async def _up_to_date(self, run: str) -> RunKeyframes:
@@ -218,8 +219,8 @@ class KeyframeStore:
 
 
 def _worth_keeping(newest: Keyframe, had: int) -> bool:
-    """Return whether to store new keyframes, when those up to `had` are stored: at the end of a
-    run, and at each multiple of `APART` of one that goes on."""
+    """Return whether to store new keyframes, given that those up to `had` are stored: at the end of
+    a run, and at each multiple of `APART` while it runs."""
     if newest.run.end is None:
         return newest.seq // APART > had // APART
     return newest.seq > max(had, _WORTH)
@@ -252,7 +253,7 @@ class _Part(NamedTuple):
 
 
 def _whole(events: Sequence[Event]) -> _Part:
-    """Return stored events as a part; some may be missing between them."""
+    """Return stored events as a part; there may be gaps between them."""
     return _Part([each.seq for each in events], [(e.body, e.kind, e.at) for e in events])
 
 

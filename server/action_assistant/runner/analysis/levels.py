@@ -18,9 +18,9 @@ INTO: Final = " › "
 
 
 class LevelPlace(msgspec.Struct, frozen=True):
-    """The place of an action in a run. `levels`: the actions that it is inside of, outermost first,
-    by their full names; `name`: its own. `known`: false where its name fits no level; then it
-    stands at the top."""
+    """The place of an action in a run. `levels`: the full names of the actions around it, outermost
+    first; `name`: its own. `known`: false if its name fits no level; it then counts as top
+    level."""
 
     levels: tuple[str, ...]
     name: str
@@ -65,7 +65,8 @@ def places_of(run: Run) -> dict[str, LevelPlace]:
 
 
 def within(found: dict[str, LevelPlace], action: str) -> list[str]:
-    """Return the actions directly inside of one, by the names of `found`."""
+    """Return the names of the actions directly inside of `action`. `found`: the place of each
+    action by name."""
     way = found[action].way
     return [name for name, place in found.items() if place.levels == way]
 

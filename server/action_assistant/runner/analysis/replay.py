@@ -48,8 +48,8 @@ class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
 
 
 class ReplayFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The changes by one event: `head` has the fields of the run that changed, `actions` the
-    actions that did."""
+    """The changes by one event. `head`: the changed fields of the run; `actions`: the changed
+    actions."""
 
     seq: int
     at: datetime
@@ -69,7 +69,7 @@ class ReplayPageStart(msgspec.Struct, frozen=True):
 
 
 class MarkShown(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """An event that is no observation of the engine; `since`: from when on nothing was known."""
+    """An event that is no observation of the engine. `since`: from when on the state was unknown."""
 
     seq: int
     at: datetime
@@ -194,8 +194,8 @@ def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
 
 
 def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
-    """Return the change of an action. Visits change at their end only, so the first one that
-    differs is searched from there."""
+    """Return the change of an action. Only its last visits can have changed, so the first different
+    one is searched from the end."""
     total = after.older + len(after.visits)
     known = before.older + len(before.visits) if before is not None else 0
     first = total

@@ -18,8 +18,8 @@ _OUTCOMES: Final = ("true", "false", "error", "stopped")
 
 
 class RunPoint(msgspec.Struct, frozen=True):
-    """One run of the statistics. `took` in seconds where it is known exactly; `span`: its bounds,
-    null where nothing is known."""
+    """One run of the statistics. `took`: seconds, if known exactly; `span`: its bounds, null if
+    unknown."""
 
     id: str
     number: int
@@ -39,11 +39,10 @@ class Spans(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
-    """One action over all these runs. `levels`: the actions that it is inside of, outermost first,
-    and `name` its own there; `action`: the name by which the engine of its newest run told it.
-    Durations are seconds over the `timed` visits that have ended, null where they are not known
-    exactly; `spans` has all of them between bounds. `unknown` counts visits of unknown result.
-    `at_least`: there may have been more `visits`, which nobody saw."""
+    """One action over all these runs. `levels`: the actions around it, outermost first; `name`: its
+    own; `action`: the name that the engine of its newest run used. Durations: seconds over the
+    `timed` ended visits, null if not known exactly; `spans`: bounds of all. `unknown`: visits of
+    unknown result. `at_least`: there may have been more `visits`, which nobody saw."""
 
     action: str
     levels: tuple[str, ...]
@@ -64,8 +63,7 @@ class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class NeverTaken(msgspec.Struct, frozen=True):
-    """An arrow whose parent ran, and is known never to have ended with one of the arrow's
-    `outcomes`."""
+    """An arrow whose parent ran and certainly never ended with one of the arrow's `outcomes`."""
 
     parent: str
     child: str
@@ -73,10 +71,10 @@ class NeverTaken(msgspec.Struct, frozen=True):
 
 
 class Statistics(msgspec.Struct, frozen=True, kw_only=True):
-    """Statistics of the newest `runs` of a graph. `judged`: runs whose result is known and says
-    something about the graph (neither refused, lost nor stopped); `succeeded`: those of them that
-    finished true. `unknown`: finished runs of unknown result, since robots do not tell it.
-    `untold`: the number of arrows of which it is not known whether they were ever taken."""
+    """Statistics of the newest `runs` of a graph. `judged`: runs whose known result says something
+    about the graph (neither refused, lost nor stopped); `succeeded`: those that finished true.
+    `unknown`: finished runs of unknown result, which robots do not report. `untold`: the number
+    of arrows that may or may not have been taken."""
 
     runs: list[RunPoint]
     judged: int
@@ -206,8 +204,8 @@ def _exact(span: DurationBounds | None) -> float | None:
 def _never_taken(
     graph: Graph | None, actions: Mapping[str, ActionStatistics]
 ) -> tuple[list[NeverTaken], int]:
-    """Return the arrows that are known never to have been taken, and the number of those of which
-    it is not known."""
+    """Return the arrows that were certainly never taken, and the number of arrows for which that is
+    unknown."""
     if graph is None:
         return [], 0
     names = {each.key: each.full_name for each in graph.actions} | {EXIT: EXIT}
@@ -233,7 +231,7 @@ def _outcomes(arrow: Relation) -> list[str]:
 
 
 def _must_have_been(arrow: Relation, graph: Graph, child: ActionStatistics | None) -> bool:
-    """Return whether an arrow must have been taken: its child has run, and no other arrow leads
-    there."""
+    """Return whether an arrow must have been taken: its child has run, and no other arrow leads to
+    the child."""
     ways = [each for each in graph.relations if each.child == arrow.child and _outcomes(each)]
     return child is not None and child.visits > 0 and len(ways) == 1

@@ -21,7 +21,7 @@ from action_assistant.web.network.connection_limits import ConcurrencyLimit
 SMALL: Final = 100_000
 #: Bytes of one with a graph: twice `sent_graphs.MOST`, since as a string its text may be escaped.
 GRAPH_BODY: Final = 2 * MOST
-#: For `opt=` of such a route: the limit that OpenAPI and refusals tell.
+#: The key in `opt=` of a route for the limit that OpenAPI and refusals name.
 COUNTED: Final[dict[str, object]] = {BODY_LIMIT_TOLD: MOST}
 _BODY_S: Final = 60.0
 

@@ -91,10 +91,10 @@ _Command: TypeAlias = Callable[[str, float], list[Trace]]
 
 
 class EmulatedEngine:
-    """One life of one engine. `hear` and `ask` bring it messages, `advance` returns its own.
+    """One life of one engine. `hear` and `ask` pass messages to it, `advance` returns its own.
 
-    `born_ms` is the moment of its start, from which the beats of its feedback count; `epoch_ms` is its 0 ms in
-    milliseconds since 1970. `performer` runs its behaviours, where time is real.
+    `born_ms`: the time of its start, from which the period of its feedback counts; `epoch_ms`: its
+    0 ms in milliseconds since 1970. `performer`: runs its behaviours in real time.
     """
 
     def __init__(
@@ -157,7 +157,7 @@ class EmulatedEngine:
         return () if self.gone else tuple(self._engine.executing(self._awake_ms))
 
     def hear(self, message: Message, at_ms: float) -> None:
-        """Take in a command; it may have to wait, and a newer one of its topic replaces it then."""
+        """Receive a command. It may have to wait; a newer command of its topic then replaces it."""
         self._pass(at_ms)
         if isinstance(message, Start) and self.quirks.late_ms:
             self._later(self.quirks.late_ms, partial(self._arrive, message))
@@ -171,7 +171,7 @@ class EmulatedEngine:
         self._plan_work(self.quirks.reaction_ms)
 
     def ask(self, ticket: int, at_ms: float) -> None:
-        """Take in a get; the answer, if one comes, carries the ticket."""
+        """Receive a get; the answer, if any, carries the ticket."""
         self._pass(at_ms)
         if not self._deaf and not self.gone:
             self._inbox.put_get(ticket)
@@ -193,7 +193,7 @@ class EmulatedEngine:
         self._frozen, self._frozen_ms = True, self._now
 
     def thaw(self, at_ms: float) -> None:
-        """Let the process go on (SIGCONT); what was due meanwhile happens now."""
+        """Let the process continue (SIGCONT); what was due during the freeze happens now."""
         self._frozen = False
         self._now = self._engine.now = self._tick = at_ms
         self._take(self._engine.advance(at_ms))  # threads of actions wake before the one that hears
@@ -256,7 +256,7 @@ class EmulatedEngine:
             self._later(wait_ms, self._work)
 
     def _work(self) -> None:
-        """Take up the next message that waits: commands in the order of their topics, then gets."""
+        """Handle the next waiting message: commands in the order of their topics, then gets."""
         self._works = False
         if self._blocked or self._deaf:
             return
@@ -270,7 +270,7 @@ class EmulatedEngine:
         self._plan_work(_NEXT_MS)
 
     def _hold(self, then: Callable[[], None]) -> None:
-        """Block the thread until the engine has carried the command out, then call `then`."""
+        """Block the engine's thread until the present command is carried out, then call `then`."""
         self._under_way.append(then)
         self._see_to_it()
 
@@ -284,7 +284,7 @@ class EmulatedEngine:
             self._plan_work(_NEXT_MS)
 
     def _linger(self, wait_ms: float, then: Callable[[], None]) -> None:
-        """Block the thread for so long after a command, then call `then`."""
+        """Block the engine's thread for `wait_ms` after a command, then call `then`."""
         self._lingers += 1
 
         def leave() -> None:
@@ -409,7 +409,7 @@ class EmulatedEngine:
         self._keep_time()
 
     def _keep_time(self) -> None:
-        """Plan feedback for the next beat, if the ring has any snapshot."""
+        """Plan feedback for the next period, if the ring has a snapshot."""
         if self._view.waiting and not self._drains:
             self._drains = True
             period = self._facts.feedback_period_ms

@@ -48,11 +48,11 @@ _WAITING: Final = 100  # messages of one topic that wait, without the trait of a
 
 
 class EmulatorNode:
-    """A node for one life of an emulated engine. `make(epoch_ms)` returns that engine, at 0 ms of the node's own
-    clock.
+    """A ROS 2 node for one life of an emulated engine. `make(epoch_ms)` returns that engine, at 0
+    ms of the node's clock.
 
-    `told` is called with every message of the engine; `indexes` is a period in seconds and a function that
-    reads the engine's folder. Raises RuntimeError when the domain cannot be joined.
+    `told` is called with every message of the engine; `indexes`: a period in seconds and a function
+    that reads the engine's folder. Raise RuntimeError if the domain cannot be joined.
     """
 
     def __init__(
@@ -145,7 +145,7 @@ class EmulatorNode:
         return self.robot.gone
 
     def _turn(self, wait_s: float) -> None:
-        """Take in one message, if one comes within `wait_s`."""
+        """Handle one message, if one arrives within `wait_s`."""
         try:
             self._executor.spin_once(timeout_sec=wait_s)
         except (RuntimeError, SystemError) as error:  # whoever asked has left before the answer

@@ -46,7 +46,7 @@ class _Held:
 class PublishedGraphs:
     """The graphs of an engine as feedback and answers show them, and the ring of snapshots.
 
-    `taken`: the map of graphs is locked, so that every snapshot is lost.
+    `taken`: the map of graphs is locked, so that no snapshot can be added.
     """
 
     def __init__(
@@ -77,7 +77,8 @@ class PublishedGraphs:
         self.plans |= index.graphs
 
     def take(self, traces: Sequence[Trace], now_ms: float) -> list[str]:
-        """Take in traces of the engine; return the names of the graphs that they ended, without sub-graphs."""
+        """Process traces of the engine; return the names of the graphs that ended, without
+        sub-graphs."""
         ended: list[str] = []
         seen = _as_threads_do(traces)
         at_once = sum(isinstance(each, NodeStateEvent) and each.state in _SHOWN for each in seen)
@@ -103,8 +104,8 @@ class PublishedGraphs:
         return tuple(each.text() for each in shown if keeps or each.state not in ENDED)
 
     def snapshot(self, name: str, at_once: int = 1) -> None:
-        """Add a snapshot to the ring, unless the map of graphs is locked or chance drops it: of `at_once`
-        snapshots that come together about one is kept."""
+        """Add a snapshot to the ring, unless the map of graphs is locked or chance drops it: of
+        `at_once` simultaneous snapshots about one is kept."""
         held = self._held.get(name)
         if held is None or self.taken or self._engine.locked:
             return
@@ -124,7 +125,7 @@ class PublishedGraphs:
         return history if self._quirks.newest_first else history[::-1]
 
     def modified(self, name: str, plan: GraphPlan) -> None:
-        """Take in that a graph has another structure now."""
+        """Note the new structure of a graph."""
         held, known = self._held.get(name), self.plans.get(name)
         if held is not None:
             before = known.attributes if known is not None else {}
@@ -150,8 +151,8 @@ class PublishedGraphs:
         return held
 
     def _sheet(self, running: Running, *, again: bool = False) -> GraphPrinter:
-        """Return the printer of a graph. A graph loses its description when its actions are matched with the
-        index, which is not done again for a graph that is held already (`again`)."""
+        """Return the printer of a graph. Matching its actions with the index, which is not repeated
+        for a graph that is held already (`again`), loses its description."""
         plan = self.plans.get(running.own if running.home else running.name)
         whole = not self._quirks.drops_fields
         return GraphPrinter(
@@ -162,7 +163,7 @@ class PublishedGraphs:
         )
 
     def _remember(self, graph: str, node: str, at: int) -> None:
-        """Keep the message of an action, which is known once the action has ended."""
+        """Store the message of an action that has ended."""
         held = self._held.get(graph)
         found = held.running.nodes.get(node) if held is not None else None
         if held is not None and found is not None and found.call.message:
@@ -171,8 +172,8 @@ class PublishedGraphs:
 
 
 def _as_threads_do(traces: Sequence[Trace]) -> list[Trace]:
-    """Sort the traces of one instant as a real engine shows them: actions begin on threads of their own, so an
-    end is seen before a begin."""
+    """Sort the traces of one instant as a real engine shows them: ends before begins, since actions
+    begin on threads of their own."""
     last = {(e.graph, e.node): e for e in traces if isinstance(e, NodeStateEvent)}
 
     def begins(trace: Trace) -> bool:

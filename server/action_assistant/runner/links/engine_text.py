@@ -12,7 +12,7 @@ import msgspec
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.parameter_texts import Values, reported
 
-#: What an engine's log says as soon as it takes a start in, before it does anything of it.
+#: The log line that an engine writes when it receives a start, before it acts.
 RECEIVED_START: Final = "Received request to start UMRF graph: "
 
 #: Responses of a relation that end or hold an action which runs.

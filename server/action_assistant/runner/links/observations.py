@@ -15,7 +15,7 @@ _NAMED: Final = 3
 
 #: States in which a node moves, or may move again without a new start.
 ACTIVE: Final = frozenset({"RUNNING", "STOPPING", "PAUSE_REQUESTED", "PAUSED"})
-#: How far an action has come in one execution, by its state.
+#: The progress of an action within one execution, by its state.
 FAR: Final = {
     "UNINITIALIZED": 0,
     "INITIALIZED": 0,
@@ -46,7 +46,7 @@ class NodeState(
 class NodeResult(
     msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="node_result", tag_field="kind"
 ):
-    """A node ended with this result (`on_true`, …); `message` is what it had to say."""
+    """A node ended with this result (`on_true`, …). `message`: its text, if it gave one."""
 
     at: int
     graph: str
@@ -74,10 +74,8 @@ class GraphResult(msgspec.Struct, frozen=True, gc=False, tag="graph_result", tag
 class Hazard(
     msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="hazard", tag_field="kind"
 ):
-    """The engine did something it should not (codes `H1` …, docs/umrf-and-the-engine.md 3).
-
-    `effect`: `crash` and `hang` end all its answers, `goes on` is a warning.
-    """
+    """The engine did something harmful (codes `H1` …, docs/umrf-and-the-engine.md 3). `effect`:
+    `crash` and `hang` end all its answers, `goes on` is a warning."""
 
     at: int
     graph: str
@@ -90,17 +88,15 @@ class Hazard(
 class Snapshot(
     msgspec.Struct, frozen=True, gc=False, omit_defaults=True, tag="snapshot", tag_field="kind"
 ):
-    """One graph as the engine showed it at `at`; what happened between two snapshots is not known.
+    """One graph as the engine showed it at `at`; the time between two snapshots is unknown.
 
-    `source`: `get` was asked for by us at `asked_at`, `feedback` came by itself and may be late.
-    `since`: when the answer before this came, and `since_asked` when that one was asked for: it showed
-    the graph as it was known until then, so that changes are later than `since_asked`.
-    `run`: the identity that the graph carries; None for graphs that others started.
-    `messages`: per node, all runtime messages so far (the engine keeps ten).
-    `inputs`: the values of nodes that move, where they could be read.
-    `same`: nodes that are not named are as they were before, with the same messages.
-    `stoppable`: nodes in ERROR that the graph's own rules may have stopped or paused before.
-    `spontaneous`: nodes that begin again by themselves, and have begun.
+    `source`: `get` is an answer to our question sent at `asked_at`, `feedback` comes by itself and
+    may be late. `since`, `since_asked`: when the previous answer came and was asked for; changes
+    are later than `since_asked`. `run`: the id that the graph carries; None for graphs that others
+    started. `messages`: all runtime messages so far, by node (the engine keeps ten). `inputs`:
+    values of nodes that move, if readable. `same`: nodes that are not listed are unchanged, also in
+    messages. `stoppable`: nodes in ERROR that the graph's own rules may have stopped or paused.
+    `spontaneous`: nodes that have begun and begin again by themselves.
     """
 
     at: int
@@ -120,7 +116,7 @@ class Snapshot(
 
     @property
     def active(self) -> bool:
-        """True when any node moves, or may move again without a new start."""
+        """True if any node moves, or may move again without a new start."""
         return any(state in ACTIVE for state in self.nodes.values())
 
 

@@ -24,7 +24,7 @@ _NAMED: Final = 3
 
 EngineState: TypeAlias = Literal["answering", "busy", "gone", "restarted"]
 Command: TypeAlias = Literal["start", "stop", "pause", "resume", "modify"]
-#: Which `temoto_msgs` the peer speaks. Only `current` ones can be talked to.
+#: The version of `temoto_msgs` that the peer uses. Messages are exchanged with `current` only.
 Generation: TypeAlias = Literal["current", "older", "unknown"]
 
 

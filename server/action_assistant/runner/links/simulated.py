@@ -53,7 +53,7 @@ _HEAD: Final = 4  # bytes of a length
 _CHANGES: Final = 100  # in one report, which the runner takes in without a pause
 #: Simulated runs at a time; each takes 15 MB, and its part of the processors.
 MOST: Final = 64
-#: Of these, runs with behaviours; each may have many processes.
+#: The limit for those with behaviours, each of which may have many processes.
 MOST_WITH_BEHAVIOURS: Final = 8
 _WAITING: Final = 16_384  # bytes on the way; an answer comes after what was said before it
 _NICE: Final = 10

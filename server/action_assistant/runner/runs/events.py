@@ -19,8 +19,8 @@ End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "l
 
 
 class Author(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The person behind a command, and where the command came from. `address`: on the network; ""
-    for the runner's own computer. `by` is "" where it was not recorded."""
+    """The person behind a command, and the origin of the command. `address`: on the network; "" for
+    the runner's own computer. `by`: "" if it was not recorded."""
 
     id: str
     name: str
@@ -46,8 +46,8 @@ class Overridden(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class RunSubgraph(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A graph inside of the one that was started, as it was sent with it. `name` is that of the
-    actions that stand for it."""
+    """A graph inside of the started one, as it was sent along. `name`: of the actions that stand
+    for it."""
 
     name: str
     version: str | None
@@ -87,8 +87,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The one start message has left. `incarnation` names the life of the engine that it went to,
-    `process` that engine's process where it is on the runner's own computer."""
+    """The start message was sent, once. `incarnation`: the life of the engine that received it;
+    `process`: the engine's process, if it is on the runner's computer."""
 
     kind: ClassVar[str] = "run.published.v1"
 
@@ -139,8 +139,8 @@ class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=T
 
 
 class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The last change of the graph was not made: the version that ran before still runs, and is
-    repeated here. `actions` are all that were known then."""
+    """The last change of the graph was not made: the version that ran before, repeated here, still
+    runs. `actions`: all actions known at that time."""
 
     kind: ClassVar[str] = "run.modify_refused.v1"
 
@@ -172,7 +172,8 @@ class StopSent(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Proof(msgspec.Struct, frozen=True):
-    """A get asked after the stop showed no running node. `hash` is SHA-256 over what it showed."""
+    """No node was running in the answer to a get that was sent after the stop. `hash`: the SHA-256
+    of that answer."""
 
     kind: ClassVar[str] = "run.proof.v1"
 
@@ -182,7 +183,7 @@ class Proof(msgspec.Struct, frozen=True):
 
 
 class Silent(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The engine answers no get; since `since` nothing is known."""
+    """The engine answers no get; its state is unknown since `since`."""
 
     kind: ClassVar[str] = "run.silent.v1"
 
@@ -220,8 +221,8 @@ class EngineSaid(msgspec.Struct, frozen=True):
 
 
 class Unconfirmed(msgspec.Struct, frozen=True, omit_defaults=True):
-    """No word of the engine can show any more that the run is at rest. `why` gives the reason;
-    `lost`: the engine does not hold the run any more, else it holds actions that did not obey."""
+    """No answer of the engine can prove any more that the run is at rest. `why`: the reason.
+    `lost`: the engine does not hold the run any more; else it holds actions that did not obey."""
 
     kind: ClassVar[str] = "run.unconfirmed.v1"
 
@@ -266,8 +267,8 @@ class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class MovesAgain(msgspec.Struct, frozen=True):
-    """The engine shows the run moving after its end: the run is open again and its end is taken
-    back. `text` says what moves and how the run had ended."""
+    """The engine shows the run moving after its end: the run is open again, without that end.
+    `text`: what moves, and how the run had ended."""
 
     kind: ClassVar[str] = "run.moves_again.v1"
 

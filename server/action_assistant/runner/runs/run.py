@@ -84,7 +84,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     actions: dict[str, ActionRun] = {}
     inner: dict[str, Laps] = {}  # which actions of graphs inside run once, by the graphs' own names
     needs: tuple[tuple[str, str, int], ...] = ()  # as `Laps.needs`
-    #: By graph: when the newest answer was asked for that showed the graph as it is here.
+    #: The request time of the newest answer that showed a graph in its present state, by graph.
     looked: dict[str, int] = {}
     #: The graph was modified, or others set it going: its arrows rule nothing out any more.
     reshaped: bool = False

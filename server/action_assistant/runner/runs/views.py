@@ -40,10 +40,10 @@ _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     """One visit of an action. It began between `not_before` and `from`, and ended between `until`
-    (null: no end was seen) and `not_after` (null: it may go on still). Where `until` lies before
-    `from`, no moment is known at which it went on for certain. `inputs`: values that the engine
-    reported for it, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null
-    when nobody saw them."""
+    (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
+    `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
+    reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
+    none were seen."""
 
     start: datetime
     not_before: datetime
@@ -62,8 +62,8 @@ class MessageShown(msgspec.Struct, frozen=True):
 
 
 class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One action of a run. `older` visits are not listed. The action ran `count` times; with
-    `at_least` perhaps more often, since visits of it may have been missed."""
+    """One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
+    may have been missed. `visits` are the newest ones; `older`: how many are not listed."""
 
     aid: str | None
     state: str
@@ -95,9 +95,8 @@ class AtRestShown(msgspec.Struct, frozen=True):
 
 
 class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
-    """A run as a list shows it. `took`: from `started_at` to when nothing of it moved any more, as
-    far as that was seen, which is before `ended_at`, when that was proven; null where that is not
-    known."""
+    """A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
+    more, which is before the proof at `ended_at`; null if unknown."""
 
     id: str
     number: int
@@ -131,15 +130,16 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ArchivedShown(msgspec.Struct, frozen=True):
-    """The moment at which the events of a run went to an archive, and the file in its folder."""
+    """The time at which the events of a run were moved to an archive, and its file in the folder of
+    archives."""
 
     at: datetime
     file: str
 
 
 class Listed(RunSummary, frozen=True, kw_only=True):
-    """A run of the list, with the marks that people gave it. `cause`: in one sentence why it did
-    not end well, as far as that is recorded."""
+    """A run of the list, with the marks that people gave it. `cause`: one sentence why it did not
+    end well, "" if unknown."""
 
     cause: str
     pinned: bool
@@ -159,10 +159,9 @@ class RunShown(RunSummary, frozen=True, kw_only=True):
 
 
 class RunWhole(RunShown, frozen=True, kw_only=True):
-    """A run with the graph as it was sent. `sent`: the values of its actions, by full name and flat
-    name, written as in `inputs` of visits. `subgraphs`: all graphs inside of it, as they were sent
-    along; `tree_digest`: of the graph together with them, null where the starter did not send
-    it."""
+    """A run with the graph that was sent. `sent`: the values of its actions, by full name and flat
+    name, written as in `inputs` of visits. `subgraphs`: all graphs inside that were sent along;
+    `tree_digest`: of the graph together with them, null if the starter did not send it."""
 
     umrf: UmrfGraph
     override: Override | None
@@ -174,8 +173,8 @@ class RunWhole(RunShown, frozen=True, kw_only=True):
 
 
 class StartShown(msgspec.Struct, frozen=True, kw_only=True):
-    """The state of a start. `under_way`: it is being carried out at this moment. Where that is
-    false and `runs` is empty, nothing of the start has arrived here so far."""
+    """The state of a start. `under_way`: it is being carried out now. If it is false and `runs` is
+    empty, the start has not arrived here so far."""
 
     request_id: str
     under_way: bool
@@ -193,8 +192,8 @@ def summary(run: Run, *, recorded: bool = True) -> RunSummary:
 
 
 class ActionViewCache:
-    """Caches the views of the actions of one run. Of thousands of actions few change between two
-    views, and a view is valid for as long as its `ActionRun` is the same object."""
+    """Caches the views of the actions of one run. Few actions change between two views, and a view
+    is valid while its `ActionRun` is the same object."""
 
     def __init__(self) -> None:
         self._known: dict[str, tuple[ActionRun, int, VisitCount, ActionShown]] = {}
@@ -237,8 +236,8 @@ def whole_view(
     place: Row[Any] | None = None,
     cache: ActionViewCache | None = None,
 ) -> RunWhole:
-    """Return a run with all visits and its graph; with a `cache` no more visits than in `run_view`.
-    `place` is the row of the run's archive, None when its events are here."""
+    """Return a run with all visits and its graph; with a `cache` with as many visits as `run_view`.
+    `place`: the row of the run's archive; None if its events are in the journal."""
     actions = _actions(run, _WHOLE if cache is None else _LIVE, cache)
     return RunWhole(
         **_fields(run, recorded),
@@ -309,14 +308,14 @@ def list_entry(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
 
 
 def archived(row: Row[Any] | None) -> ArchivedShown | None:
-    """Return where the events of a run are, from its row; None when they are not in an archive."""
+    """Return when and where the events of a run were archived, from its row; None if they were not."""
     if row is None or row.archived_at is None:
         return None
     return ArchivedShown(time(row.archived_at), row.archived_as)
 
 
 def _fields_of_row_and_run(source: Run | Row[Any]) -> dict[str, Any]:
-    """Return the fields of a summary that a run and its row have under the same names."""
+    """Return the fields of a summary that have the same name in a run and in its row."""
     plain = {name: getattr(source, name) for name in _SAME}
     return plain | {name: _time(getattr(source, name)) for name in _SAME_TIMES}
 
@@ -357,8 +356,8 @@ def visit_view(each: Visit) -> VisitShown:
 
 
 def _most(run: Run, visits: int) -> int:
-    """Return how many visits of each action a view may carry: encoding blocks the event loop, so a
-    view has about `visits` of them over all actions."""
+    """Return how many visits of each action a view may have: all actions together about `visits`,
+    since encoding them blocks the event loop."""
     return max(1, visits // max(1, len(run.actions)))
 
 

@@ -12,9 +12,9 @@ from action_assistant.runner.links.observations import Snapshot, did_not_obey, f
 
 
 class DoubtfulErrors:
-    """Actions of one run whose code may go on although its engine calls them ERROR.
+    """Actions of one run that the engine shows in ERROR although their code may still run.
 
-    `reached`: a stop or a pause may have reached the graph before anything of it was seen here.
+    `reached`: a stop or a pause may have reached the graph before its first answer here.
     """
 
     def __init__(self, *, reached: bool) -> None:
@@ -37,8 +37,8 @@ class DoubtfulErrors:
         return frozenset(graph for graph, _ in self._open)
 
     def look(self, shown: Sequence[Snapshot]) -> str:
-        """Take in one more answer about a graph and its sub-graphs; return why the code of an action may still
-        run, "" when nothing speaks for that."""
+        """Process one more answer about a graph and its sub-graphs; return why the code of an
+        action may still run, "" if nothing suggests that."""
         for each in shown:
             failed = failed_in(each)
             self._thrown -= {

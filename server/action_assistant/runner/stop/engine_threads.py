@@ -21,8 +21,8 @@ ThreadsOf = Callable[[EngineProcess], frozenset[Thread] | None]
 class EngineThreads:
     """Compares the threads of an engine's process with those before the start of a run.
 
-    It concludes nothing of an engine whose process is not seen from here, or of which never two threads
-    of this run were seen while an action of it moved: one only waits for the graph.
+    It concludes nothing if the process is not visible from here, or if two threads of this run were
+    never seen while an action moved: a single one only waits for the graph.
     """
 
     def __init__(self, threads_of: ThreadsOf = threads) -> None:
@@ -32,7 +32,7 @@ class EngineThreads:
         self._was_seen = False
 
     def starts(self, process: EngineProcess | None) -> None:
-        """Remember the threads there are right before the start is handed over."""
+        """Remember the existing threads, right before the start is handed over."""
         self._process = process
         self._before = None if process is None else self._threads_of(process)
         self._was_seen = False

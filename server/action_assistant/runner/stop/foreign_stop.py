@@ -58,8 +58,8 @@ class StoppedAll(msgspec.Struct, frozen=True):
 
 
 class _ForeignStop:
-    """One stop that goes on. `life` is the incarnation of the engine that was to stop the graph; `why` says why
-    that is not proven yet, "" at first."""
+    """One Stop that is not proven yet. `life`: the incarnation of the engine that was to stop the
+    graph; `why`: why it is not proven, "" at first."""
 
     def __init__(self, robot: str, graph: str, life: str, why: str) -> None:
         self.robot = robot
@@ -74,9 +74,9 @@ class _ForeignStop:
 
 
 class ForeignStopLoop:
-    """Carries out all stops of graphs that others have started. `note` records an event; `changed` is called
-    when people see something else; `present` returns the engine of a robot as it is reached now, None without
-    a link, and raises NotFound for a robot that is not registered any more."""
+    """Carries out all Stops of graphs that others have started. `note` records an event; `changed`
+    is called when the page has to show something else; `present` returns the present engine of a
+    robot, None without a link, and raises NotFound for an unregistered robot."""
 
     def __init__(
         self,
@@ -116,7 +116,7 @@ class ForeignStopLoop:
         return ((each.robot, each.why) for each in self._going.values())
 
     def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
-        """Begin to stop a graph. Never waits."""
+        """Begin to stop a graph, and return at once."""
         robot = engine.registration.name
         known = self._going.get((robot, graph))
         if known is not None:
@@ -128,20 +128,20 @@ class ForeignStopLoop:
         self._begin(_ForeignStop(robot, graph, life, ""), engine)
 
     def take_up(self, robot: str, asked: StopAsked) -> None:
-        """Go on with a stop that an earlier process has left without a proof. Never waits."""
+        """Continue a Stop that an earlier process has left unproven, and return at once."""
         if (robot, asked.graph) not in self._going:
             self._begin(_ForeignStop(robot, asked.graph, asked.life, _TAKEN_UP), None)
 
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
-        """Take in a command of somebody else, who may just have set a graph going: an answer that was asked for
-        before proves nothing any more."""
+        """Process a command of somebody else that may just have started the graph: an answer
+        requested before it proves nothing."""
         found = self._going.get((robot, command.graph))
         if command.command in SET_GOING and found is not None:
             found.disturbed = True
             found.loading.meddle()
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Take in graphs that an engine shows, in an answer or by feedback. Never waits."""
+        """Process graphs that an engine shows, in an answer or by feedback; return at once."""
         for (robot, graph), it in self._going.items():
             if robot != engine.registration.name:
                 continue
@@ -170,9 +170,9 @@ class ForeignStopLoop:
             self._changed()
 
     async def _until_proven(self, it: _ForeignStop, known: KnownEngine | None) -> RobotEvent:
-        """Stop a graph until that is proven or can never be; return the event for that. `known` is the engine
-        once it is known to be the one that was to stop the graph; by another link, or after a restart of the
-        runner, it has to show that first."""
+        """Stop a graph until that is proven or impossible to prove; return the event for it.
+        `known`: the engine that is known to be the one to stop; after a new link or a restart of
+        the runner it has to show that first."""
         began, gap = anyio.current_time(), _GAP_S
         while True:
             engine = self._present(it.robot)
@@ -195,8 +195,8 @@ class ForeignStopLoop:
             gap = min(1.5 * gap, _SLOWEST_S)
 
     async def _recognise(self, it: _ForeignStop, engine: KnownEngine) -> StopUnproven | str:
-        """Ask an engine whether it is the one that was to stop the graph, and send no stop. Return "" when it is,
-        why that is not known yet, or the event that it is another one."""
+        """Ask an engine, without sending a stop, whether it is the one that was to stop the graph.
+        Return "" if it is, why that is unknown, or the event that it is another engine."""
         answer = await _ask(engine)
         if answer is None:
             return engine.why or "the engine does not answer"
@@ -205,7 +205,8 @@ class ForeignStopLoop:
         return "" if answer.incarnation == it.life else self._unproven(it, _RESTARTED)
 
     async def _steadily(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
-        """Send once and look once. An exception here does not keep the stop from being sent again."""
+        """Send one stop message and check the answer, as `_once`. An exception is logged, so that
+        the stop is sent again."""
         try:
             return await self._once(it, engine)
         except Exception as error:
@@ -214,7 +215,8 @@ class ForeignStopLoop:
             return f"the runner failed: {error!r}"
 
     async def _once(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
-        """Send one message and look once; return the event that ends the stop, or why it is not proven yet."""
+        """Send one stop message and check the answer; return the event that ends the Stop, or why
+        it is not proven yet."""
         why = await send_stop(engine, it.graph)
         asked = anyio.current_time()
         answer = await _ask(engine)
@@ -239,8 +241,8 @@ class ForeignStopLoop:
         return StopWasProven(at=answer.at, graph=it.graph, asked_at=answer.asked_at)
 
     async def _still_loading(self, it: _ForeignStop, answer: Answer) -> str:
-        """Return in words which actions of the graph may still be loading; "" for none. Sub-graphs of another
-        start count, too, since nothing tells them apart."""
+        """Return in words which actions of the graph may still be loading; "" for none. Sub-graphs
+        of other starts count, too, since they cannot be distinguished."""
         shown = _shown(answer, it.graph)
         try:
             unread = it.loading.unread(shown)
@@ -262,7 +264,7 @@ async def _ask(engine: KnownEngine) -> Answer | None:
 
 
 def _at_rest(answer: Answer, graph: str, rest: RestProof, asked: float) -> bool:
-    """Return whether neither the graph nor a sub-graph of it moves, or will move by itself."""
+    """Return whether neither the graph nor a sub-graph moves, or will move by itself."""
     shown = _shown(answer, graph)
     is_held = bool(shown) and shown[0].graph == graph
     return rest.seen(shown, asked) if is_held else rest.missing(shown, asked)
@@ -273,6 +275,6 @@ def _shown(answer: Answer, graph: str) -> list[Snapshot]:
 
 
 def _parts_of(snapshots: Sequence[Snapshot], graph: str) -> list[Snapshot]:
-    """Return a graph, if it is there, and then its sub-graphs."""
+    """Return the snapshot of a graph, if there is one, and then those of its sub-graphs."""
     own = [each for each in snapshots if each.graph == graph]
     return [*own, *(each for each in snapshots if each.graph.startswith(f"{graph}__"))]

@@ -57,9 +57,9 @@ class RobotRecords(Protocol):
 
 
 class LateActivity:
-    """Watches what engines show for runs that are over and move. `open_` are the runs that are not over;
-    `reopen` is called with a run as it is stored, the seq of its last event, and the event that opens it
-    again."""
+    """Watches for runs that are over and that an engine shows moving. `open_`: the runs that are
+    not over; `reopen` is called with a stored run, the seq of its last event, and the event that
+    opens it again."""
 
     def __init__(
         self,
@@ -86,12 +86,12 @@ class LateActivity:
         self._elsewhere: OrderedDict[tuple[str, str], None] = OrderedDict()
 
     def ended(self, run: Run, seq: int) -> None:
-        """Remember a run that is over and stored, so that its end is known without the journal."""
+        """Remember a stored run that is over, so that its end is known without a query."""
         _put(self._ended, run.id, (run, seq))
 
     def sent_by_others(self, command: ForeignCommand) -> None:
-        """Note that somebody else has published a start message of this runner again: what it starts is their
-        graph."""
+        """Note that somebody else has published a start message of this runner again; its graph
+        then belongs to them."""
         run = run_in(command.umrf) if command.umrf else None
         if run is not None:
             _put(self._others, run, None)
@@ -101,8 +101,8 @@ class LateActivity:
         return run in self._others or (robot, run) in self._elsewhere
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Take in graphs that an engine shows, in an answer or by feedback. Never waits, and starts no task, since
-        feedback comes outside of any task."""
+        """Process graphs that an engine shows, in an answer or by feedback. Return at once and
+        start no task, since feedback arrives outside of any task."""
         robot = engine.registration.name
         for each in snapshots:
             if each.run is None or not each.active or (robot, each.run) in self._looking:
@@ -113,7 +113,7 @@ class LateActivity:
                 self._news.set()
 
     async def run(self) -> None:
-        """Look into each run that was shown moving after its end, until cancelled."""
+        """Examine each run that was shown moving after its end, until cancelled."""
         while True:
             await self._news.wait()
             self._news = anyio.Event()
@@ -188,8 +188,8 @@ class LateActivity:
 
 
 async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | None:
-    """Return the run as an answer shows it moving, or None. Feedback may be late or made up, so an answer
-    decides; when none comes within 3 s, the feedback is believed."""
+    """Return the snapshot of the run in an answer that shows it moving, else None. Feedback may be
+    late or forged, so an answer decides; if none comes within 3 s, the feedback counts."""
     with anyio.move_on_after(_PATIENCE_S):
         while True:
             try:
@@ -205,7 +205,7 @@ async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | N
 
 
 def _is_of(run: Run, engine: KnownEngine) -> bool:
-    """Return whether a run was sent to this engine in its present life."""
+    """Return whether a run was sent to the present life of this engine."""
     lives = {run.incarnation, engine.standing.incarnation} - {None, ""}
     return run.engine == engine.registration.name and len(lives) <= 1
 

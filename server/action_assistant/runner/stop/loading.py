@@ -45,8 +45,9 @@ class LoadingAction(msgspec.Struct, frozen=True):
 
 
 def read_triggers(text: str | None, sent: Sequence[str], meddled: bool) -> Triggers | None:
-    """Return the arrows of a graph as far as triggering goes; None where it cannot be read. `text` is the graph
-    as the engine wrote it, `sent` are the texts that were sent, changes last. For workers."""
+    """Return the arrows of a graph by which actions trigger others; None if it cannot be read.
+    `text`: the graph as the engine wrote it; `sent`: the texts that were sent, changes last;
+    `meddled`: somebody else may have changed the graph. For workers."""
     try:
         versions = [triggers_of(codec.read(each).graph, exits_known=True) for each in sent]
         if len(versions) == 1 and not meddled:
@@ -63,10 +64,11 @@ def read_triggers(text: str | None, sent: Sequence[str], meddled: bool) -> Trigg
 
 
 class LoadingWatch:
-    """Collects what was seen of one graph and its sub-graphs, and tells which actions may be loading.
+    """Collects what was seen of one graph and its sub-graphs, to decide which actions may be
+    loading.
 
-    `meddled`: somebody else may have changed the graph or set actions of it going, so that they may have run
-    more often than its arrows say, and beside each other.
+    `meddled`: somebody else may have changed the graph or started actions of it, so that they may
+    have run more often than the arrows allow, and side by side.
     """
 
     def __init__(self, main: str, *, meddled: bool = False) -> None:
@@ -79,8 +81,8 @@ class LoadingWatch:
         self._age = 0  # number of calls of `forget`
 
     def see(self, shown: Sequence[Snapshot]) -> None:
-        """Take in one answer, or feedback of one engine that serves alone. A sub-graph may be begun
-        anew for as long as one that encloses it is RUNNING."""
+        """Process an answer, or feedback of an engine that is alone on its name. A sub-graph may
+        begin again while a graph around it is RUNNING."""
         self._known.update(each.graph for each in shown)
         for each in sorted(shown, key=lambda one: len(one.graph)):
             if each.state not in LEFT:
@@ -92,25 +94,25 @@ class LoadingWatch:
                 self._after[each.graph] = first, _and(seen, each)
 
     def sends(self, umrf: str, *, beside: bool = False) -> None:
-        """Note that this graph is handed over: the first one, or a change. `beside`: an action of it is started
-        beside those that go on."""
+        """Note that this graph is sent: at the start, or as a change. `beside`: the change starts
+        an action while others run."""
         self.forget()
         self._sent.append(umrf)
         self._meddled = self._meddled or beside
 
     def recalls(self, umrf: str) -> None:
-        """Note that this graph was handed over by an earlier process, or before the run had ended once."""
+        """Note that this graph was sent by an earlier process, or before the run ended once."""
         if not self._sent and not self._meddled:
             self._sent.append(umrf)
             self._read.pop(self._main, None)
 
     def meddle(self) -> None:
-        """Note that somebody else may have changed the graph, or set it going."""
+        """Note that somebody else may have changed or started the graph."""
         self.forget()
         self._meddled = True
 
     def forget(self) -> None:
-        """Forget everything that was seen, since it proves nothing any more."""
+        """Forget all observations, since they prove nothing any more."""
         self._after.clear()
         self._read.clear()
         self._age += 1
@@ -124,8 +126,8 @@ class LoadingWatch:
     async def read(
         self, graphs: Sequence[str], texts: Mapping[str, str], run_in_worker: RunInWorker
     ) -> None:
-        """Read the arrows of graphs, as the engine wrote them in `texts`, or as they were sent. Raises
-        what workers raise."""
+        """Read the arrows of these graphs, from the engine's `texts` or else from what was sent.
+        Raises the errors of workers."""
         for graph in graphs:
             sent = tuple(self._sent) if graph == self._main else ()
             text = texts.get(graph)
@@ -137,8 +139,8 @@ class LoadingWatch:
                 self._read[graph] = found
 
     def actions(self, shown: Sequence[Snapshot]) -> tuple[LoadingAction, ...]:
-        """Return the actions that may be loading in graphs of which nothing moves: of a graph, and of
-        its sub-graphs. Of one that was not read, all that have not begun."""
+        """Return the actions that may be loading, in a graph and its sub-graphs, none of which
+        moves. In a graph that was not read, these are all actions that have not begun."""
         held = {each.graph for each in shown}
         found: list[LoadingAction] = []
         for each in shown:
@@ -149,8 +151,8 @@ class LoadingWatch:
         return tuple(found)
 
     def _seen(self, shown: Snapshot) -> SeenAfter:
-        """Return what was seen of a graph; nothing, where this look denies that what moved has begun:
-        then another engine has shown it, or somebody has made it up."""
+        """Return what was seen of a graph; nothing if this answer shows that an action which was
+        seen moving has not begun: another engine, or a forgery, has shown it."""
         seen = self._after.get(shown.graph, (0, SeenAfter()))[1]
         denied = any(shown.nodes.get(each) in NEVER_BEGAN for each in seen.active)
         return SeenAfter() if denied else seen
@@ -161,17 +163,17 @@ class LoadingWatch:
 
 
 class LoadingTimes:
-    """Learns how long actions take from their trigger until they are seen to begin, by robot and action name,
-    since this runner began. Only sentences use it: no time tells whether an action will come.
+    """Learns how long actions take from their trigger until they begin, by robot and action name,
+    since this runner started. Only texts use it: no time proves that an action will not come.
 
-    It learns from the first action of a run that begins, which was certainly triggered by the start.
+    It learns from the first action of each run, which the start has certainly triggered.
     """
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, str], deque[float]] = {}
 
     def learn(self, run: Run, sent_at: int) -> None:
-        """Learn from a run of which the start left at that moment, in microseconds UTC."""
+        """Learn from a run whose start was sent at `sent_at`, in microseconds UTC."""
         begun = [
             (each.visits[0], node)
             for node, each in run.actions.items()
@@ -186,8 +188,8 @@ class LoadingTimes:
             times.append((first.start - sent_at) / 1e6)
 
     def usual(self, robot: str, actions: Sequence[LoadingAction]) -> str:
-        """Return how long one action usually loads, in words; "" for several, and where too few begins
-        were seen."""
+        """Return in words how long one action usually loads; "" for several actions, or if too few
+        begins were seen."""
         nodes = {each.node.rpartition("_")[0] for each in actions}
         times = self._known.get((robot, nodes.pop()), ()) if len(nodes) == 1 else ()
         if len(times) < _ENOUGH:
@@ -220,7 +222,8 @@ def _is_open(shown: Snapshot) -> bool:
 
 
 def _and(seen: SeenAfter, shown: Snapshot) -> SeenAfter:
-    """Add one look. Anybody may publish feedback that says how a graph ended: only an answer counts."""
+    """Return the observations with one more snapshot. Only an answer counts for the end of a graph,
+    since anybody may publish feedback."""
     has_ended = shown.source == "get" and shown.state in _DRAINED
     return SeenAfter(
         active=seen.active.union(node for node, state in shown.nodes.items() if state in ACTIVE),

@@ -44,13 +44,13 @@ def hash_of(shown: Sequence[Snapshot]) -> str:
 
 
 class RestProof:
-    """Decides from several looks whether a graph has come to rest. Actions that may be loading are not its
-    subject (`loading`).
+    """Decides from several answers whether a graph is at rest. Loading actions are decided by
+    `loading`.
 
-    An action that has run before and was triggered again is not loaded again: what passes until the
-    engine shows it RUNNING is the start of a thread. So one look is not enough: a graph must be seen at
-    rest for a while. RUNNING without a running action may always be about to start one. `exact` is an
-    engine that hides nothing, as the simulator.
+    An action that was loaded before and is triggered again is RUNNING only after its thread starts,
+    so one answer is not enough: the graph must be seen at rest for a while. A graph in RUNNING
+    without a running action may be about to start one. `exact`: an engine that hides nothing, as
+    the simulator.
     """
 
     def __init__(self, *, exact: bool) -> None:
@@ -63,12 +63,12 @@ class RestProof:
 
     @property
     def pending(self) -> bool:
-        """True after a look at which the graph was at rest."""
+        """True if the graph was at rest in the last answer."""
         return self._since is not None
 
     def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
-        """Take in one more look at a graph and then its sub-graphs, asked for at `asked` (seconds); return whether
-        they have been at rest for long enough."""
+        """Process one more answer about a graph (the first of `shown`) and its sub-graphs,
+        requested at `asked` (seconds); return whether they have been at rest for long enough."""
         state = shown[0].state
         moving = any(each.active for each in shown)
         if moving or state not in TERMINAL | NEVER_BEGAN:
@@ -80,8 +80,9 @@ class RestProof:
         return asked - self._since >= _long_enough(shown)
 
     def missing(self, parts: Sequence[Snapshot], asked: float) -> bool:
-        """Take in one more look that did not show the graph itself, only `parts` of it; return whether that has
-        lasted for long enough. An engine that has just been told to start a graph does not show it yet."""
+        """Process one more answer that shows only sub-graphs (`parts`) of a graph, not the graph
+        itself; return whether that has lasted for long enough. An engine does not show a graph
+        at once after its start."""
         if any(each.active for each in parts):
             self._since = None
             return False

@@ -29,8 +29,8 @@ class StopAttempt(NamedTuple):
 
 
 class StopLoop:
-    """Takes presses of Stop, and says when the next message is due. `hung`: why the engine will not answer
-    any more."""
+    """Takes presses of Stop, and yields the times at which stop messages are due. `hung`: why the
+    engine will never answer again."""
 
     def __init__(self, run: Run, clock_us: ClockUs) -> None:
         self.hung = ""
@@ -45,8 +45,8 @@ class StopLoop:
             self._wanted.set()
 
     def press(self, author: Author, stop_id: str) -> StopRequested | None:
-        """Want the run stopped, and return the event to be recorded. One press may come several times and
-        by several ways; only the first gives an event."""
+        """Request the Stop, and return the event to record. One press may arrive several times on
+        several ways; only the first arrival gives an event."""
         now, (who, when) = anyio.current_time(), self._asked
         is_new = who != author.id or (stop_id not in self._ids and now - when > _ONE_PRESS_S)
         if is_new:
@@ -58,8 +58,8 @@ class StopLoop:
         return StopRequested(self._clock_us(), author, stop_id) if is_new else None
 
     def notice(self, run: Run) -> None:
-        """Send again soon where the last message was in vain and the run has changed so that the next one
-        may not be."""
+        """Send again soon, if the last message could not help but the run has changed so that the
+        next one may."""
         if self._vain and not _is_vain(run):
             self._news.set()
 
@@ -79,8 +79,8 @@ class StopLoop:
                 gap = _FIRST_GAP_S
 
     async def _turn(self, current: Callable[[], Run]) -> None:
-        """Wait for a press where the engine does not hold the run any more. It is told once for each press
-        then, and not again: a graph of that name there would be another one."""
+        """If the engine does not hold the run any more, wait for a press: only one message is sent
+        for each then, since a graph of that name would be another one."""
         while current().lost and not self._pressed.is_set():
             with anyio.move_on_after(_GAP_S):
                 await self._pressed.wait()

@@ -20,7 +20,7 @@ _CLASS: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 _CONTROL: Final = re.compile(r"[\x00-\x1f\x7f-\x9f\u2028\u2029]")
 #: The most characters in the name of a graph or an action.
 MAX_NAME: Final = 200
-#: How many characters of a wrong text are quoted.
+#: The number of characters of a wrong text that are quoted.
 _SHOWN: Final = 80
 TYPES: Final = ("sync", "async", "spontaneous")
 

@@ -48,7 +48,7 @@ class State(NamedTuple):
     waiting: bool = False
 
 
-#: How a graph ends. `locked`: a bypass goes round in a circle.
+#: The ends of a graph. `locked`: a bypass goes round in a circle.
 End: TypeAlias = Literal["finished", "halted", "crashed", "locked"]
 Reader: TypeAlias = Callable[[int], State]
 

@@ -34,7 +34,7 @@ ASIDE: Final = 140.0
 WIDE: Final = 240.0
 HIGH: Final = 110.0
 
-#: Whether the graph around a sub-graph is always moved away, or only if something would overlap.
+#: The graph around a sub-graph is moved away always, or only if something would overlap.
 Room: TypeAlias = Literal["always", "needed"]
 
 _Ways: TypeAlias = tuple[tuple[Response, JsonText], ...]

@@ -26,7 +26,7 @@ EXIT_NODE = "graph_exit_0"
 #: Names of actions that the engine takes for the ends of a graph, whatever their number: it never runs them.
 RESERVED = frozenset({"graph_entry", "graph_exit"})
 
-#: How a call of an action can end.
+#: The results with which a call of an action can end.
 Outcome: TypeAlias = Precondition
 
 #: States in which an action holds a thread of its own.

@@ -8,13 +8,13 @@ from typing import Final, Literal, TypeAlias
 
 from action_assistant.umrf.model import Response
 
-#: What an action is doing. Numbers, since the checks look up millions of them.
+#: The activities of an action, as numbers, since the checks look up millions of them.
 IDLE: Final = 0
 RUNS: Final = 1
-#: It was told to stop and has not returned yet.
+#: The action was told to stop and has not returned yet.
 STOPS: Final = 2
 PAUSED: Final = 3
-#: It was told to stop while it was paused: the engine waits until its timeout, then gives up.
+#: The action was told to stop while paused: the engine waits until its timeout, then gives up.
 GIVING_UP: Final = 4
 #: The engine shows an end and the thread still lives, or the action loads and will run.
 THREAD_LEFT: Final = 5

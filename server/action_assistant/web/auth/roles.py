@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Final, Literal, TypeAlias, get_args
 
-#: From the least to the most; each may do what those before it may.
+#: The roles in order of rights; each may do all that the roles before it may.
 Role: TypeAlias = Literal["viewer", "editor", "operator", "owner"]
 
 #: Kinds of things to do. `see` and `stop` are everybody's who is signed in.

@@ -23,7 +23,7 @@ try:
 except ImportError:  # where it was not compiled
     from websockets.utils import apply_mask
 
-#: In the extensions of a scope: here is a socket that can be taken over, as `socket`.
+#: The extension of a scope that holds, as `socket`, a socket that can be taken over.
 _EXTENSION: Final = "action_assistant.direct"
 _WHOLE_BINARY: Final = 0x82  # the first byte of a message in one frame
 _SHORT: Final = 126

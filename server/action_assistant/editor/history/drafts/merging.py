@@ -25,7 +25,7 @@ from action_assistant.editor.interchange.document_edits import Side, chosen
 from action_assistant.umrf.model import ENTRY, EXIT
 
 Places: TypeAlias = Mapping[Place, Any]
-#: By the place of a conflict whose side it is.
+#: The chosen side of each conflict, by its place.
 Choices: TypeAlias = Mapping[str, Side]
 
 _ORDERS: Final = frozenset({"order", "po", "co"})

@@ -11,7 +11,7 @@ from typing import Final
 from action_assistant.runner.links.ros2.ros_values import Endpoint
 
 _WATCHED_S: Final = 10.0
-#: What the middleware calls a node whose name it has not learnt yet.
+#: The name that the middleware gives a node whose name it does not know yet.
 _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 
 
