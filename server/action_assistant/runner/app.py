@@ -149,7 +149,8 @@ async def _executing(
 async def _asking(
     workers: RunnerWorkers, storage: StoragePaths, archive_store: ArchiveStore
 ) -> AsyncIterator[tuple[WorkerQueries, WorkerQueries]]:
-    """Yield the queries of people, and those of the runner itself, which wait behind no others."""
+    """Yield the queries for people, and those for the runner itself, which never queue behind those
+    of people."""
     async with anyio.create_task_group() as tasks:
         background = BackgroundTasks(tasks)
         yield (
@@ -161,7 +162,7 @@ async def _asking(
 
 @asynccontextmanager
 async def _closing(reach: Reach | str) -> AsyncIterator[None]:
-    """Close what reaches robots after everything else."""
+    """Close the reach of robots at the end, after everything else."""
     try:
         yield
     finally:

@@ -14,8 +14,8 @@ Severity: TypeAlias = Literal["error", "warning", "fine"]
 
 
 class Diagnostic(msgspec.Struct, frozen=True, kw_only=True):
-    """One finding. `error`: something does not work or is not safe; `warning`: it may matter;
-    `fine`: without code and remedy. `where`: the file, variable, port or robot."""
+    """The result of one check. `error`: something does not work or is not safe; `warning`: it may
+    matter; `fine`: without code and remedy. `where`: the file, variable, port or robot."""
 
     code: str
     severity: Severity

@@ -276,8 +276,8 @@ export interface EditorApi {
     };
     /**
      * Diagnostic
-     * @description One finding. `error`: something does not work or is not safe; `warning`: it may matter;
-     *     `fine`: without code and remedy. `where`: the file, variable, port or robot.
+     * @description The result of one check. `error`: something does not work or is not safe; `warning`: it may
+     *     matter; `fine`: without code and remedy. `where`: the file, variable, port or robot.
      */
     Diagnostic: {
         code: string;
@@ -870,8 +870,8 @@ export interface EditorApi {
     };
     /**
      * LeftOut
-     * @description The description and unknown fields of an action that was a sub-graph, or of that graph, which
-     *     nothing in the flat graph has.
+     * @description The description and unknown fields, of an action that was a sub-graph or of that graph, that
+     *     the flat graph lacks.
      */
     LeftOut: {
         levels: EditorApi["HierarchyLevel"][];

@@ -118,8 +118,8 @@ export interface RunnerApi {
     };
     /**
      * ArchiveRequest
-     * @description A request to archive runs and raw messages that are older than so many days; null leaves them
-     *     here.
+     * @description A request to archive runs and raw messages that are older than so many days; null archives
+     *     none.
      */
     ArchiveRequest: {
         /** @default null */
@@ -254,8 +254,9 @@ export interface RunnerApi {
     };
     /**
      * BehaviourList
-     * @description The list of behaviours in a folder. `names` are in snake case, as the files without `.py`; `refused` are
-     *     those that cannot be run, with the reason; `problem` is why the folder cannot be read, "" if it can.
+     * @description The behaviours in a folder. `names`: in snake case, as the files without `.py`; `refused`:
+     *     those that cannot be run, with the reason; `problem`: why the folder cannot be read, "" if it
+     *     can.
      */
     BehaviourList: {
         names: string[];
@@ -266,8 +267,8 @@ export interface RunnerApi {
     };
     /**
      * Candidate
-     * @description An engine that discovery shows. One at rest does not say its name: `actor` is "" until its
-     *     feedback was heard, and a person has to know the name.
+     * @description An engine that discovery shows. `actor`: "" until its feedback was heard, since an engine
+     *     without a running graph does not say its name; a person has to know it then.
      */
     Candidate: {
         domain: number;
@@ -281,8 +282,8 @@ export interface RunnerApi {
     };
     /**
      * CauseShown
-     * @description One cause in a sentence, with its evidence: the moment, the event `seq` by which it had been
-     *     seen, the action, and the words that were said there.
+     * @description One cause in a sentence, with its evidence: the time, the event `seq` by which it was seen,
+     *     the action, and a quoted text.
      */
     CauseShown: {
         kind: string;
@@ -375,8 +376,7 @@ export interface RunnerApi {
     };
     /**
      * DurationBounds
-     * @description A duration in seconds: at least `least` and at most `most`; null: nothing bounds it from
-     *     above.
+     * @description A duration in seconds, between `least` and `most`; `most` is null without an upper bound.
      */
     DurationBounds: {
         least: number;
@@ -532,9 +532,8 @@ export interface RunnerApi {
     };
     /**
      * HeldGraph
-     * @description A graph that an engine holds, ended ones too. `run`: the id of this runner's run that it is.
-     *
-     *     `stopping`: why a Stop of it is not proven yet, "" at first; null when no Stop of it is wanted.
+     * @description A graph that an engine holds, also an ended one. `run`: the id of this runner's run, if it is
+     *     one. `stopping`: why a Stop of it is not proven yet, "" at first; null without a Stop.
      */
     HeldGraph: {
         graph: string;
@@ -555,7 +554,7 @@ export interface RunnerApi {
     };
     /**
      * HistoryEvent
-     * @description One stored event, as programs that follow a run read it.
+     * @description One stored event, for programs that follow a run.
      */
     HistoryEvent: {
         seq: number;
@@ -568,8 +567,8 @@ export interface RunnerApi {
     /**
      * IndexFolderState
      * @description The folder that the robot's engine indexes, as the runner sees it. `writable`: graphs that
-     *     can be written there; `waiting`: graphs that are there already, and that the engine has not
-     *     indexed yet; `hindered`: why others cannot be written, as sentences by graph.
+     *     can be written there; `waiting`: graphs whose file exists and that the engine has not indexed
+     *     yet; `hindered`: why other graphs cannot be written, as sentences by graph.
      */
     IndexFolderState: {
         path: string;
@@ -746,7 +745,7 @@ export interface RunnerApi {
     /**
      * ModifyRequest
      * @description Another version of the graph of a run, by value. `continue_from`: the full name of an action
-     *     that shall be started when the graph goes on.
+     *     to start when the graph continues.
      */
     ModifyRequest: {
         version: string;
@@ -959,8 +958,8 @@ export interface RunnerApi {
     };
     /**
      * RawMessages
-     * @description The raw messages of `robot` from the hours of a run, the oldest first. `text`: a note about
-     *     them for people, "" where all are here.
+     * @description The raw messages of `robot` from the hours of a run, oldest first. `text`: a note for people
+     *     about missing ones, "" if all are on this computer.
      */
     RawMessages: {
         robot: string;
@@ -1094,7 +1093,7 @@ export interface RunnerApi {
     };
     /**
      * RestRequest
-     * @description A person's statement that a run is at rest. `how` says by what the person saw that.
+     * @description A person's statement that a run is at rest. `how`: how the person saw that.
      */
     RestRequest: {
         how: string;
@@ -1111,11 +1110,11 @@ export interface RunnerApi {
     };
     /**
      * Robot
-     * @description An engine as people see it. `why` explains any state but `answering`.
+     * @description An engine as people see it. `why`: explains any state but `answering`.
      *
      *     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
-     *     besides this runner. `actions`, `graphs`: how many it has indexed; null before its first answer.
-     *     `pauses`: whether pausing is safe there.
+     *     besides this runner. `actions`, `graphs`: the size of its index; null before its first answer.
+     *     `pauses`: pausing is safe on it.
      */
     Robot: {
         name: string;
@@ -1202,8 +1201,8 @@ export interface RunnerApi {
     };
     /**
      * RobotStopped
-     * @description The graphs that a Stop of a robot concerns: this runner's runs, and graphs that others
-     *     started.
+     * @description The targets of a Stop of a robot: the ids of this runner's runs, and the names of graphs that
+     *     others started.
      */
     RobotStopped: {
         runs: string[];
@@ -1241,7 +1240,7 @@ export interface RunnerApi {
     };
     /**
      * RunMessage
-     * @description A run as it is now.
+     * @description The present state of a run.
      */
     RunMessage: {
         /** @enum {string} */
@@ -1439,8 +1438,8 @@ export interface RunnerApi {
     };
     /**
      * SentSubgraph
-     * @description A graph inside of the one that is sent. `name` is that of the actions that stand for it;
-     *     `version` and `graph`: where it comes from.
+     * @description A graph inside of the sent one. `name`: of the actions that stand for it; `version`, `graph`:
+     *     its source.
      */
     SentSubgraph: {
         name: string;
@@ -1467,8 +1466,8 @@ export interface RunnerApi {
     };
     /**
      * Sighting
-     * @description Engines that are seen at this moment. `left_s`: seconds for which others may still come into sight,
-     *     since discovery goes on; 0 where all that answer are seen.
+     * @description The engines that are seen now. `left_s`: seconds during which discovery may still find
+     *     others; 0 when it is complete.
      */
     Sighting: {
         engines: RunnerApi["Candidate"][];
@@ -1545,8 +1544,8 @@ export interface RunnerApi {
     };
     /**
      * StopBody
-     * @description The body of a Stop. The page makes `stop_id` once per press; the same press may arrive by
-     *     several ways.
+     * @description The body of a Stop. The page makes one `stop_id` for each press, since one press may arrive
+     *     on several ways.
      */
     StopBody: {
         /** @default  */
@@ -1565,8 +1564,8 @@ export interface RunnerApi {
     };
     /**
      * Stopping
-     * @description The runs that a Stop concerns and, when everything is stopped, `graphs` of others by robot.
-     *     `unknown`: by robot, why it is not known what that runs.
+     * @description The runs that a Stop concerns and, if everything is stopped, the `graphs` of others by robot.
+     *     `unknown`: by robot, why it is unknown which graphs it runs.
      */
     Stopping: {
         /** @enum {string} */
@@ -1598,8 +1597,8 @@ export interface RunnerApi {
     };
     /**
      * SubgraphShown
-     * @description A graph inside of the one that was started, as it was sent along. `name` is that of the
-     *     actions that stand for it; `graph`: its id; `version`: of it, where there was one.
+     * @description A graph inside of the started one, as it was sent along. `name`: of the actions that stand
+     *     for it; `graph`: its id; `version`: its version, null without one.
      */
     SubgraphShown: {
         name: string;
@@ -1613,8 +1612,8 @@ export interface RunnerApi {
     };
     /**
      * SweepResult
-     * @description The result of a sweep: how many runs and hours of raw messages were archived; `more`: others
-     *     are due; `problems`: what stays here, and why.
+     * @description The result of a sweep: numbers of archived runs and hours of raw messages. `more`: others are
+     *     due; `problems`: what could not be archived, and why.
      */
     SweepResult: {
         runs: number;

@@ -54,8 +54,8 @@ class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
 
 
 class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
-    """The runs that a Stop concerns and, when everything is stopped, `graphs` of others by robot.
-    `unknown`: by robot, why it is not known what that runs."""
+    """The runs that a Stop concerns and, if everything is stopped, the `graphs` of others by robot.
+    `unknown`: by robot, why it is unknown which graphs it runs."""
 
     stop_id: str
     runs: list[str]
@@ -86,7 +86,7 @@ class Hello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
 
 
 class RunMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
-    """A run as it is now."""
+    """The present state of a run."""
 
     run: views.RunShown
 

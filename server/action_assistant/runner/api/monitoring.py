@@ -29,8 +29,8 @@ _UNCONFIRMED: Final = "stop_unconfirmed"
 
 
 class StopTimes:
-    """The Stop of one open run: when it was asked for (monotonic seconds), and which of its steps
-    were counted."""
+    """The times of one Stop of an open run: when it was requested (monotonic seconds), and which of
+    its steps were counted."""
 
     def __init__(self) -> None:
         self.asked_at = time.monotonic()
@@ -80,7 +80,7 @@ class RunMetrics(Collector):
         yield from self._proven.collect()
 
     def families(self) -> Iterator[Family]:
-        """Yield the gauges of this moment."""
+        """Yield the gauges, computed now."""
         yield from self._run_families()
         yield from self._stop_families()
         yield from self._robot_families()
@@ -112,7 +112,7 @@ class RunMetrics(Collector):
 
     @property
     def unconfirmed(self) -> Counter[str]:
-        """The number of STOP UNCONFIRMED that the page shows, by engine."""
+        """The number of runs with STOP UNCONFIRMED on the page, by engine."""
         open_runs = (each.run for each in self._control.open.values() if each.run.end is None)
         found = Counter(
             run.engine

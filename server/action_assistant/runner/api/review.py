@@ -60,8 +60,8 @@ class ScriptRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ArchiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to archive runs and raw messages that are older than so many days; null leaves them
-    here."""
+    """A request to archive runs and raw messages that are older than so many days; null archives
+    none."""
 
     runs: Annotated[float, msgspec.Meta(ge=0)] | None = None
     raw: Annotated[float, msgspec.Meta(ge=0)] | None = None

@@ -126,8 +126,8 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class RobotStopped(msgspec.Struct, frozen=True):
-    """The graphs that a Stop of a robot concerns: this runner's runs, and graphs that others
-    started."""
+    """The targets of a Stop of a robot: the ids of this runner's runs, and the names of graphs that
+    others started."""
 
     runs: list[str]
     graphs: list[str]
@@ -277,7 +277,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
         responses={200: answer(UmrfGraph)},
     )
     async def held(name: str, graph: str) -> Response[bytes]:
-        """The graph comes without its run state: one that carries a state must not be sent
+        """Return the held graph without its run state, since a graph with a state must not be sent
         again."""
         return await _umrf(services, services.control.robots.held_graph(name, graph))
 

@@ -45,8 +45,8 @@ _Asking = Request[Any, Any, Any]
 
 
 class StopBody(msgspec.Struct, frozen=True):
-    """The body of a Stop. The page makes `stop_id` once per press; the same press may arrive by
-    several ways."""
+    """The body of a Stop. The page makes one `stop_id` for each press, since one press may arrive
+    on several ways."""
 
     stop_id: str = ""
 
@@ -287,8 +287,8 @@ def _live(services: RunnerServices) -> ControllerRouterHandler:
 
 
 async def _require_command_role(services: RunnerServices, run: str, request: _Asking) -> None:
-    """Require the role that may command this run: a run on a robot needs more than a simulated one.
-    Raises Forbidden, NotFound."""
+    """Check the role for a command to this run: a run on a robot needs more than a simulated one.
+    Raise Forbidden if it is too low, NotFound if there is no such run."""
     if not await services.control.simulates(run):
         require(request, "operate")
 
@@ -314,7 +314,7 @@ async def _run_view(services: RunnerServices, run: Run) -> views.RunShown:
 
 
 def _states(asked: str | None) -> tuple[str, ...]:
-    """Split states at commas. Raises BadInput for one that does not exist."""
+    """Split states at commas. Raise BadInput for an unknown state."""
     states = tuple(each.strip() for each in (asked or "").split(",") if each.strip())
     if unknown := [each for each in states if each not in get_args(State)]:
         raise BadInput(f"No run is ever {unknown[0]!r}.", where={"path": "/state"})
@@ -336,7 +336,8 @@ def _last_event_id(request: _Asking) -> int:
 
 
 async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator[bytes]:
-    """Yield stored events as an event stream, then those that follow, until the run is over."""
+    """Yield stored events as an event stream, then later ones as they are stored, until the run is
+    over."""
     while True:
         opened = services.control.open.get(run)
         revision = opened.revision if opened is not None else 0

@@ -45,7 +45,8 @@ class Journaled(SnapshotJournal, Protocol):
 
     async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
         """Record that a stream is kept elsewhere from now on, and return the position of that
-        record. `also` makes events to store with it. Raises Conflict, Unavailable."""
+        record. `also` makes events to store with it, given that position. Raise Conflict if the
+        stream has another end, Unavailable if the journal cannot be written."""
         ...
 
     async def delete_some(self, stream: str, by: int) -> bool:
@@ -54,8 +55,7 @@ class Journaled(SnapshotJournal, Protocol):
 
 
 class ArchiveStore:
-    """Reads a run from its archive in `folder` once it was archived. All other calls go to the
-    journal."""
+    """Reads archived runs from their files in `folder`. All other calls go to the journal."""
 
     def __init__(self, journal: SnapshotJournal, folder: Path, run_in_worker: RunInWorker) -> None:
         self.folder = folder
@@ -66,11 +66,11 @@ class ArchiveStore:
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Append to the journal, as `Journal.append`."""
+        """Append to the journal, as `Journal.append` does."""
         return await self._journal.append(stream, drafts, expected=expected)
 
     async def newest(self, stream: str) -> int:
-        """Return the last seq of a stream; the journal knows it for archived ones, too."""
+        """Return the last seq of a stream, also of an archived one."""
         return await self._journal.newest(stream)
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
@@ -91,8 +91,8 @@ class ArchiveStore:
     async def read(
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
-        """Return events of a stream, `after` < seq ≤ `upto`, in order. Raises Archived when its
-        archive is not here, Damaged."""
+        """Return events of a stream, `after` < seq ≤ `upto`, in order. Raise Archived if its
+        archive file is missing, Damaged if it is damaged."""
         place = await self.place(stream)
         if place is None:
             return await self._journal.read(stream, after=after, upto=upto, limit=limit)
@@ -107,7 +107,7 @@ class ArchiveStore:
         return bare(await self.read(stream, after=after, upto=upto), usual)
 
     async def place(self, stream: str) -> Row[Any] | None:
-        """Return number, time and file of an archived run; None when its events are in the
+        """Return number, archiving time and file of an archived run; None if its events are in the
         journal."""
         if not stream.startswith(_PREFIX):
             return None

@@ -48,7 +48,7 @@ def read(text: bytes) -> tuple[Requested, tuple[Draft, ...]]:
 
 
 def numbered(first: Requested, number: int) -> Draft:
-    """Return the first event as it is stored here, under this run number."""
+    """Return the first event of an example as it is stored on this runner, with this run number."""
     here = msgspec.structs.replace(
         first, number=number, simulated=True, graph=None, request_id=f"example/{first.run}"
     )

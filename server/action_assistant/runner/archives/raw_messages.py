@@ -12,7 +12,7 @@ from action_assistant.runner.runs.run import Run
 
 
 class RawArchived(msgspec.Struct, frozen=True):
-    """An hour of raw messages of a robot was put into an archive and deleted here."""
+    """An hour of raw messages of a robot was moved to an archive."""
 
     kind: ClassVar[str] = "raw.archived.v1"
 
@@ -40,8 +40,8 @@ class RawHour(msgspec.Struct, frozen=True):
 
 
 class RawMessages(msgspec.Struct, frozen=True):
-    """The raw messages of `robot` from the hours of a run, the oldest first. `text`: a note about
-    them for people, "" where all are here."""
+    """The raw messages of `robot` from the hours of a run, oldest first. `text`: a note for people
+    about missing ones, "" if all are on this computer."""
 
     robot: str
     hours: list[RawHour]
@@ -51,9 +51,9 @@ class RawMessages(msgspec.Struct, frozen=True):
 def raw_of(
     run: Run, here: Sequence[Recording], gone: Iterable[RawArchived], until: int
 ) -> RawMessages:
-    """Return the raw messages of a run. `here`: recordings of its robot from its time; `gone`: what
-    was archived of its robot, from any time; `until`: microseconds UTC at which the run ends, or
-    now."""
+    """Return the raw messages of a run. `here`: recordings of its robot from the run's time;
+    `gone`: archived hours of its robot, from any time; `until`: the end of the run, or now, in
+    microseconds UTC."""
     if run.simulated:
         return RawMessages(run.engine, [], "A simulated engine sends no messages.")
     first, last = hours(run.started_at or run.requested_at, until)

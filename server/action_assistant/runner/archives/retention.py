@@ -42,8 +42,8 @@ _AT_ONCE: Final = 20
 
 
 class SweepResult(msgspec.Struct, frozen=True, kw_only=True):
-    """The result of a sweep: how many runs and hours of raw messages were archived; `more`: others
-    are due; `problems`: what stays here, and why."""
+    """The result of a sweep: numbers of archived runs and hours of raw messages. `more`: others are
+    due; `problems`: what could not be archived, and why."""
 
     runs: int = 0
     raw: int = 0
@@ -52,7 +52,7 @@ class SweepResult(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Retention:
-    """Archives what is old. It waits for no run, and no run waits for it."""
+    """Archives old runs and raw messages. It never blocks a run."""
 
     def __init__(
         self,
@@ -74,7 +74,7 @@ class Retention:
         self._may_be_unfinished = True  # an earlier process may have ended between two steps
 
     async def run(self) -> None:
-        """Sweep every hour until cancelled, and at once again while there is more."""
+        """Sweep every hour until cancelled, and again at once while more is due."""
         while True:
             try:
                 swept = await self.sweep(self.keep.runs, self.keep.raw)
@@ -115,7 +115,8 @@ class Retention:
             return SweepResult(runs=done, raw=found.raw, more=more, problems=problems)
 
     async def _archive_run(self, row: Row[Any]) -> None:
-        """Archive one run. Raises Refused, OSError; then its events are here as before."""
+        """Archive one run. Raise Refused or OSError if that fails; its events then stay in the
+        journal."""
         stream = stream_of(row.id)
         end = await self._journal.end(stream)
         place = _place(row)
@@ -196,7 +197,8 @@ class Retention:
 
 
 def _due(before: int, most: int) -> Select[Any]:
-    """Select runs that ended before this moment, are summed up and not pinned; the oldest first."""
+    """Return the query for runs that ended before this time, are summed up and not pinned; oldest
+    first."""
     return (
         select(run)
         .join(review, review.c.run == run.c.id)

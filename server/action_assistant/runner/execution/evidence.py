@@ -16,11 +16,11 @@ from action_assistant.umrf.triggers import NEVER_BEGAN
 
 
 def newer_than_answers(run: Run, snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:
-    """Return the snapshots of feedback, oldest first, that are newer than what an answer has shown.
+    """Return those snapshots of feedback, oldest first, that are newer than the last answer.
 
-    The engine sends what happened in the last half second, and an answer may have told the end of that
-    already: the older states would look like further visits that never were. In a loop a state that looks
-    older may be a new lap; it is left for the next answer to tell.
+    Feedback covers the last half second, and an answer may have shown an end already; older states
+    would then look like further visits. In a loop, a state that looks older may be a new lap; the
+    next answer decides that.
     """
     known: dict[str, int] = {}
     for i, shown in enumerate(snapshots):
@@ -34,7 +34,8 @@ def newer_than_answers(run: Run, snapshots: Sequence[Snapshot]) -> tuple[Snapsho
 
 
 def _is_overtaken(run: Run, shown: Snapshot) -> bool:
-    """Return whether no action in a snapshot is further than it is known to be, and one is less far."""
+    """Return whether a snapshot shows at least one action less far than it is known to be, and none
+    further."""
     less = False
     for node, state in shown.nodes.items():
         action = run.actions.get(key_of(run, shown.graph, node))
@@ -46,20 +47,19 @@ def _is_overtaken(run: Run, shown: Snapshot) -> bool:
 
 
 class LastLook(NamedTuple):
-    """The time of one answer: when it came, and when it had been asked for (µs UTC); None where there was
-    no answer."""
+    """The times of one answer: when it came, and when it was requested (µs UTC); None without an
+    answer."""
 
     at: int | None = None
     asked: int | None = None
 
 
 class SubGraphs:
-    """Tells, look by look, which sub-graphs of an answer belong to a run.
+    """Decides for each answer which of its sub-graphs belong to a run.
 
-    Sub-graphs carry no mark, and outlast their run: one runs as `GRAPH__NAME__ID`, for the node `NAME_ID`
-    of the graph GRAPH, and keeps that name until the node begins again, which puts another one in its
-    place. A look at a sub-graph of which it is not known whose it is proves nothing, so it is no proof
-    either that its actions had not begun by then.
+    Sub-graphs carry no run id and outlast their run: one runs as `GRAPH__NAME__ID`, for the node
+    `NAME_ID` of the graph GRAPH, until that node begins again and replaces it. While its owner is
+    unknown, a sub-graph in an answer proves nothing, not even that its actions had not begun.
     """
 
     def __init__(self) -> None:
@@ -70,8 +70,8 @@ class SubGraphs:
         ] = {}  # the newest look before those that were left out
 
     def ours(self, own: Snapshot, parts: Sequence[Snapshot]) -> list[Snapshot]:
-        """Return those of `parts` that this run has begun, outer ones first. The others count where it is
-        asked whether anything moves; they are no part of the run's history."""
+        """Return those of `parts` that this run has begun, outer ones first. The others count for
+        whether anything moves, but not for the run's history."""
         held = {own.graph: own}
         for part in sorted(parts, key=lambda each: len(each.graph)):
             whose = self._whose(part, held)
@@ -85,8 +85,8 @@ class SubGraphs:
         return list(held.values())[1:]
 
     def last_look(self, part: str, usual: LastLook) -> LastLook:
-        """Return the newest look that proves anything of a part that is noted now; `usual` is the one that
-        proves something of the whole run."""
+        """Return the newest answer before this one that proves anything about the sub-graph `part`;
+        by default `usual`, the newest for the whole run."""
         return self._passed_over.pop(part, usual)
 
     def _whose(
@@ -111,14 +111,14 @@ class SubGraphs:
 
 
 def differs(sent: str, text: str) -> str:
-    """Return the `difference` between the text that was sent and the one that an engine wrote. For
-    workers."""
+    """Return the `difference` between the graph text that was sent and the text that an engine
+    wrote. For workers."""
     return difference(codec.read(sent).graph, text)
 
 
 def difference(sent: Graph, text: str) -> str:
-    """Return in words how a graph as an engine wrote it differs from the one that was sent; "" when it is
-    the same. See docs/umrf-and-the-engine.md 1.4."""
+    """Return in words how the graph that an engine wrote differs from the one that was sent; "" if
+    they are equal. See docs/umrf-and-the-engine.md 1.4."""
     try:
         seen = codec.read(text).graph
     except codec.Unreadable as wrong:

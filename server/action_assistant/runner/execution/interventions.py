@@ -28,7 +28,7 @@ _MOVING: Final = frozenset({"running", "paused"})
 
 class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Another version of the graph of a run, by value. `continue_from`: the full name of an action
-    that shall be started when the graph goes on."""
+    to start when the graph continues."""
 
     version: str
     digest: str
@@ -139,7 +139,7 @@ async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInW
 
 
 class RestRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A person's statement that a run is at rest. `how` says by what the person saw that."""
+    """A person's statement that a run is at rest. `how`: how the person saw that."""
 
     how: Annotated[str, msgspec.Meta(min_length=3, max_length=500)]
 

@@ -50,8 +50,8 @@ _NO_PROOF: Final = "{doubt}, so that no answer proves anything"
 
 
 class Finding(NamedTuple):
-    """The result of a job beside the looks: an alarm, "" for none. `only_open`: it is nothing to a run
-    that is over. `asks`: the engine is to be asked again, since more is known now."""
+    """The result of a background job: an alarm, "" for none. `only_open`: it does not concern a run
+    that is over. `asks`: the engine should be asked again, since more is known now."""
 
     code: str = ""
     text: str = ""
@@ -64,8 +64,8 @@ Job: TypeAlias = Callable[[RunInWorker], Awaitable[Finding]]
 
 
 class EngineQuery(NamedTuple):
-    """One look at the engine: its place in the order of everything that is sent and asked, and when it
-    began, in seconds of the event loop's clock."""
+    """One get: its number in the order of everything that is sent, and its time in seconds of the
+    event loop's clock."""
 
     order: int
     began: float
@@ -74,14 +74,13 @@ class EngineQuery(NamedTuple):
 class Monitor:
     """Decides what the messages and answers of an engine mean for one run.
 
-    Each method that takes one in adds the changes that follow from it to those of the run; so they are
-    told even if a fault keeps it from drawing further conclusions. It collects jobs that are worked on
-    beside the looks.
+    Each method that processes one adds the resulting changes to those of the run, so that they are
+    kept even if an exception prevents further conclusions. Slow jobs are collected, to be run in
+    the background.
 
-    `trouble` says why the Stop of the run is not proven yet. `seen_at` is when the engine last showed the
-    run (µs UTC). `umrf` is the graph that the engine was given last, if that is known. `rested_at` is when
-    the run was last seen to be over, for a run that moves again. `exact` stands for an engine whose
-    answers show everything.
+    `trouble`: why the Stop of the run is not proven yet. `seen_at`: when the engine last showed the
+    run (µs UTC). `umrf`: the last graph that was sent, if known. `rested_at`: when the run was last
+    seen to be over, for a run that moves again. `exact`: the engine's answers show everything.
     """
 
     def __init__(
@@ -128,18 +127,17 @@ class Monitor:
     # --- what is sent -------------------------------------------------------------------------
 
     def starts(self, umrf: str, process: EngineProcess | None) -> None:
-        """Note that this graph is being started, now, in this process: the engine's log may tell what
-        becomes of it."""
+        """Note that this graph is sent now, to this process; from now on the engine's log may
+        report a refusal."""
         self._start.begins()
         self._threads.starts(process)
         self.sends(umrf)
 
     def sends(self, umrf: str, *, beside: bool = False) -> None:
-        """Note that the runner now sends this graph (its UMRF text) to the engine, so that the
-        engine's next answer is compared with it.
+        """Note that the runner sends this graph (UMRF text) now, so that the engine's next answer
+        is compared with it.
 
-        `beside`: the graph runs already, and one of its actions is started while other actions go
-        on.
+        `beside`: the graph runs already, and one of its actions is started while others run.
         """
         self._loading.sends(umrf, beside=beside)
         if beside:  # what begins when that arrives has no thread yet
@@ -158,13 +156,12 @@ class Monitor:
             self._stop_sent = next(self._order)
 
     def started_by_others(self) -> None:
-        """Note that what the engine's log says of a start may be about a start of somebody else."""
+        """Note that the engine's log lines about a start may concern a start of somebody else."""
         self._start.doubt()
 
     def disturbed(self, *, meddles: bool) -> None:
-        """Note that somebody else may just have set the graph going: an answer that was asked for before
-        proves nothing any more. `meddles`: it may be this very graph that goes on, with other arrows or
-        from elsewhere."""
+        """Note that somebody else may just have started the graph: an answer requested before this
+        proves nothing. `meddles`: the graph may go on with other arrows, or from another action."""
         self._disturbed = next(self._order)
         self._rest.forget()
         if meddles:
@@ -186,8 +183,8 @@ class Monitor:
         ours: tuple[Snapshot, ...],
         parts: tuple[Snapshot, ...] = (),
     ) -> None:
-        """Take in feedback of this run, oldest first, and of graphs that have the names of its sub-graphs.
-        Feedback of others says nothing about an answer to us."""
+        """Process feedback, oldest first: `ours` are snapshots of this run, `parts` those of graphs
+        with the names of its sub-graphs."""
         run = changes.run
         if self._is_alone(run, standing):
             self._loading.see((*ours, *parts))
@@ -202,9 +199,9 @@ class Monitor:
             changes.observe(tuple(replace(each, since_asked=asked) for each in news))
 
     def _is_alone(self, run: Run, standing: Standing) -> bool:
-        """Return whether one engine alone can have taken up starts, in the life that the run was sent to.
-        If not, nobody knows who sent feedback, now or before discovery showed it: all of it is
-        forgotten."""
+        """Return whether only one engine can have received starts, in the life that the run was
+        sent to. If not, the sender of earlier feedback is unknown, so observations of loading
+        are forgotten."""
         lives = {run.incarnation, standing.incarnation} - {None, ""}
         if not standing.doubt and len(lives) <= 1:
             return True
@@ -229,14 +226,14 @@ class Monitor:
         return jobs
 
     def unanswered(self, changes: RunChanges, standing: Standing, why: str) -> None:
-        """Take in that the engine has not answered, and why, if that is known."""
+        """Note that the engine has not answered, and why, if known."""
         self._is_alone(changes.run, standing)
         self._hear_nothing(changes, why)
 
     def answered(
         self, changes: RunChanges, standing: Standing, answer: Answer, look: EngineQuery
     ) -> None:
-        """Take in the answer to one look, and `standing` as it is after that."""
+        """Process the answer to one get; `standing`: the engine's standing after it."""
         self._take(changes, standing, answer, look)
         self._compare(changes.run, answer, look.order)
 
@@ -250,7 +247,7 @@ class Monitor:
     def _take(
         self, changes: RunChanges, standing: Standing, answer: Answer, look: EngineQuery
     ) -> None:
-        """Draw the conclusions that one answer allows, and no others."""
+        """Draw all conclusions that one answer allows."""
         run = changes.run
         name = run.graph_name
         if len({run.incarnation, answer.incarnation} - {None, ""}) > 1:
@@ -285,8 +282,8 @@ class Monitor:
             self._conclude(changes, shown, ours, answer, look)
 
     def _compare(self, run: Run, answer: Answer, order: int) -> None:
-        """Have the engine's graph compared with what was sent, once. The engine is never stopped for a
-        difference by itself."""
+        """Start one comparison of the engine's graph with the sent one. A difference alone never
+        stops the engine."""
         sent, text = self._sent, answer.texts.get(run.graph_name)
         if sent is None or text is None or run.graph_state is None:
             return
@@ -302,7 +299,7 @@ class Monitor:
         self._jobs.append(compare)
 
     def _note(self, changes: RunChanges, shown: list[Snapshot]) -> None:
-        """Add what an answer shows beyond what is known already."""
+        """Add what an answer shows and was not known."""
         usual = LastLook(self._seen_wall, self._seen_asked)
         self._seen_wall, self._seen_asked = shown[0].at, shown[0].asked_at
         looks = {each.graph: self._parts.last_look(each.graph, usual) for each in shown}
@@ -317,8 +314,8 @@ class Monitor:
     def _missing(
         self, changes: RunChanges, standing: Standing, other: Snapshot | None, answer: Answer
     ) -> None:
-        """Draw the conclusions that an answer allows which does not show this run; `other` is the graph
-        of its name that the answer shows."""
+        """Draw the conclusions from an answer that does not show this run; `other`: a graph of the
+        same name in the answer."""
         self._rest.forget()
         run = changes.run
         if run.graph_state is not None:
@@ -343,8 +340,8 @@ class Monitor:
             changes.tell(Silent(answer.at, since, "The engine answers but does not show this run."))
 
     def _refused_and_absent(self, standing: Standing) -> bool:
-        """Return whether the engine has taken the start in, has refused it, and has not held it for a
-        while since: then nothing of it has begun, and nothing of it is left that could begin."""
+        """Return whether the engine has received the start, has refused it, and has not held it for
+        a while since: then no part of it has begun or can begin."""
         if not self._start.words or standing.doubt:
             self._absent = None
             return False
@@ -359,8 +356,8 @@ class Monitor:
         answer: Answer,
         look: EngineQuery,
     ) -> None:
-        """Decide whether the run is over, or why that is not proven. `shown`: the graph and all that may
-        be sub-graphs of it; `ours`: those that it has begun."""
+        """Decide whether the run is over, or why that is not proven. `shown`: the graph and its
+        possible sub-graphs; `ours`: the graph and the sub-graphs that it has begun."""
         if look.order < self._disturbed:
             return
         own, at_rest = shown[0], self._rest.seen(shown, look.began)
@@ -411,10 +408,11 @@ class Monitor:
             self.trouble = f"{', '.join(run.active) or own.graph} has not stopped yet"
 
     def _threads_explain(self, ours: Sequence[Snapshot], process: EngineProcess | None) -> bool:
-        """Return whether the threads of the engine show that the code of all doubtful actions has ended.
+        """Return whether the threads of the engine prove that the code of all doubtful actions has
+        ended.
 
-        They show it for the graphs that this run has begun. A graph of an earlier run may be shown as well,
-        and its hanging thread began before the start of this one.
+        That holds only for graphs that this run has begun: a hanging thread of an earlier run's
+        graph began before this start.
         """
         begun = {each.graph for each in ours}
         return self._doubts.open_graphs <= begun and self._threads.have_ended(process)
@@ -422,8 +420,8 @@ class Monitor:
     def _still_loading(
         self, changes: RunChanges, ours: list[Snapshot], answer: Answer
     ) -> tuple[LoadingAction, ...]:
-        """Return the actions that may still be loading where nothing moves, and tell of them when it stays
-        so."""
+        """Return the actions that may still be loading in a graph at rest, and report them if that
+        lasts."""
         if self._exact:
             return ()
         if not self._rest.pending:
@@ -449,8 +447,8 @@ class Monitor:
     def _tell_loading(
         self, changes: RunChanges, actions: Sequence[LoadingAction], waited_s: float
     ) -> None:
-        """Add that these actions may still be loading, for so long by now, or, of none, that this is over.
-        The time is told again each time that it has doubled."""
+        """Report that these actions may be loading since `waited_s` seconds or, if there are none,
+        that loading is over. The time is reported again each time it has doubled."""
         run = changes.run
         why, known = in_words(actions), run.loading
         if not why and not known:
@@ -479,8 +477,8 @@ class Monitor:
         return Finding(asks=True)
 
     def _why_unbegun(self, run: Run) -> str:
-        """Return why the run was not begun. An engine calls a graph running before the first answer after
-        its start, so one that it holds and does not call so would begin by another start only."""
+        """Return why the run has not begun. A started graph is RUNNING in the first answer after
+        its start, so a held graph in another state would need another start to begin."""
         words = self._start.words
         if words:
             return f"{refusals.why_refused(run.engine, words)} It has begun none of it."
@@ -501,7 +499,7 @@ class Monitor:
         return Finding(stall.STALLED, text, only_open=True)
 
     def _look_for_trouble(self, changes: RunChanges, shown: list[Snapshot], asked: float) -> None:
-        """Look for a fault of a run that goes on, as far as the engine says."""
+        """Check an open run for faults that the answer shows, and report them."""
         run, own = changes.run, shown[0]
         if self._start.words and not _never_began(own):
             text = (
@@ -516,12 +514,12 @@ class Monitor:
 
 
 def _has_begun(run: Run) -> bool:
-    """Return whether an action of the run was ever seen to begin: somebody may have played its start
-    again."""
+    """Return whether an action of the run was ever seen to begin, perhaps by a start that somebody
+    else repeated."""
     return any(action.visits for action in run.actions.values())
 
 
 def _never_began(own: Snapshot) -> bool:
-    """Return whether an engine holds a graph of which it has begun nothing. Unlike a graph that has ended
-    it was not even tried: no state of an action can hide that one ran."""
+    """Return whether an engine holds a graph of which nothing has begun. All its states show that,
+    unlike those of a graph that has ended."""
     return NEVER_BEGAN.issuperset({own.state, *own.nodes.values()})

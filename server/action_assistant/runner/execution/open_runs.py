@@ -22,8 +22,8 @@ from action_assistant.web.workers.lanes import RunInWorker
 
 
 class OpenRuns:
-    """Opens runs and drives each in a task until it is over and stored. `by_id` holds those that are not
-    left yet; `late_activity` reopens a run that was over and moves again."""
+    """Opens runs and drives each in a task until it is over and stored. `by_id`: the runs that are
+    still driven; `late_activity` reopens a run that was over and moves again."""
 
     def __init__(
         self,
@@ -80,8 +80,8 @@ class OpenRuns:
         return opened
 
     def drive(self, opened: OpenRun, order: Order | None = None, incarnation: str = "") -> None:
-        """Drive an open run in a task of its own. With an order it is started first, exactly once, in
-        this life (`incarnation`) of the engine; without one it is followed from where it stands."""
+        """Drive an open run in a task of its own. With an order, first start it, exactly once, in
+        the life `incarnation` of the engine; without one, continue from its present state."""
         self._tasks.start_soon(self._drive, opened, order, incarnation)
 
     async def _drive(self, opened: OpenRun, order: Order | None, incarnation: str) -> None:
@@ -105,7 +105,7 @@ class OpenRuns:
         self._watchers.append(watcher)
 
     async def change(self, run: str, revision: int) -> None:
-        """Wait until an open run has another revision than this one, or is over and stored."""
+        """Wait until an open run has another revision than `revision`, or is over and stored."""
         while run in self.by_id and self.by_id[run].revision == revision:
             await self._news.wait()
 
@@ -130,26 +130,26 @@ class OpenRuns:
         return opened.run if opened is not None else await self._history.run(run)
 
     def on(self, engine: str) -> dict[str, OpenRun]:
-        """Return the runs on an engine that have no end yet, by id. A graph that carries the id of any
-        other run was sent by somebody else."""
+        """Return the runs on an engine without an end, by id. A graph with the id of any other run
+        was sent by somebody else."""
         found = self.by_id.items()
         return {
             run: each for run, each in found if each.run.engine == engine and each.run.end is None
         }
 
     def occupying(self, engine: str, graph_name: str = "") -> Run | None:
-        """Return the run that keeps an engine from a start of a graph of this name; None when it is free.
-        Of several, a run that moves comes before one that may only be loading, and then one of this
-        graph name before others."""
+        """Return the run that prevents a start of a graph of this name on an engine; None if it is
+        free. A moving run comes before one that may only be loading, then one of this graph name
+        before others."""
         runs = (each.run for each in self.on(engine).values())
         return min(
             runs, key=lambda run: (bool(run.loading), run.graph_name != graph_name), default=None
         )
 
     def settled_on(self, engine: str) -> tuple[Settled, ...]:
-        """Return the runs that ended on an engine since this process began because they were seen at rest, by
-        a person or by the end of their code. A run whose start
-        message somebody else sent again is left out: what it does now was not seen."""
+        """Return the runs on an engine that ended since this process began because they were at
+        rest, by a person's word or the end of their code. Runs whose start message somebody else
+        has sent again are left out."""
         found = (each for each in self._settled.values() if each.engine == engine)
         is_of_others = self.late_activity.is_of_others
         return tuple(each for each in found if not is_of_others(engine, each.run))

@@ -59,7 +59,7 @@ class RunChanges:
         self._changes.append(RunChange(event, author, self.run))
 
     def observe(self, seen: tuple[Seen, ...]) -> None:
-        """Add what was seen of the engine, and an alarm for each hazard that people must know of."""
+        """Add observations of the engine, and an alarm for each hazard that people must know."""
         self.tell(Observed(self._clock_us(), thin(self.run, seen)))
         for item in seen:
             if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _TOLD):
@@ -67,7 +67,7 @@ class RunChanges:
                 self.alarm(item.code, f"{item.code}{place}: {item.message or item.effect}")
 
     def alarm(self, code: str, text: str) -> None:
-        """Add an alarm, unless the run has one of this code and text already."""
+        """Add an alarm, unless the run has one with this code and text."""
         if all((alarm.code, alarm.text) != (code, text) for alarm in self.run.alarms):
             self.tell(AlarmRaised(self._clock_us(), code, text))
 
@@ -77,8 +77,8 @@ class RunChanges:
             self.tell(Ended(self._clock_us(), state, self._result(), detail))
 
     def lose(self, why: str) -> None:
-        """Note that the engine does not hold the run any more, so that nobody knows whether its code
-        has ended. A simulated run ends by that."""
+        """Note that the engine does not hold the run any more, so that it is unknown whether its
+        code has ended. A simulated run ends then."""
         if self.run.simulated:
             self.end("lost", why)
         elif self.run.lost != why:
@@ -91,7 +91,7 @@ class RunChanges:
         self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {LOOK_AT_IT}")
 
     def engine_ended(self) -> None:
-        """End the run because the engine's process has ended, and the code of every action with it."""
+        """End the run, since the engine's process, and with it the code of every action, has ended."""
         process = self.run.process
         how = (
             "The simulated engine was switched off."
@@ -101,7 +101,7 @@ class RunChanges:
         self._rests_by_itself(how)
 
     def threads_ended(self) -> None:
-        """End the run because no thread is left that the engine began for it."""
+        """End the run, since no thread that the engine began for it is left."""
         process = self.run.process
         where = f"process {process.pid} on this computer" if process else "the engine's process"
         self._rests_by_itself(f"No thread that the engine began for this run is left in {where}.")

@@ -74,8 +74,8 @@ _LONGEST_LINE: Final = 2_000  # characters
 
 
 class OpenRun:
-    """A run that is not over. `changed` is called after every change of what people see, and changes no
-    run itself."""
+    """A run that is not over. `changed` is called after every visible change, and must not change a
+    run."""
 
     def __init__(
         self,
@@ -127,7 +127,8 @@ class OpenRun:
 
     @property
     def failed(self) -> frozenset[tuple[str, str]]:
-        """The actions that the engine calls ERROR, as pairs of the graph's running name and the full name."""
+        """The actions that the engine shows in ERROR, as pairs of the graph's running name and the
+        full name."""
         return self._doubts.places
 
     async def pause(self, author: Author) -> None:
@@ -195,7 +196,7 @@ class OpenRun:
         return self._link.pauses
 
     def hear_of(self, command: ForeignCommand) -> None:
-        """Take in a command that somebody else has sent to the robot of this run."""
+        """Process a command that somebody else has sent to the robot of this run."""
         if self._is_ours(command.graph):
             self._doubts.reach()
         if command.command in SET_GOING and command.graph == self.run.graph_name:
@@ -222,8 +223,7 @@ class OpenRun:
 
     @contextmanager
     def _changing(self) -> Iterator[RunChanges]:
-        """Collect changes and apply them at the end, also when a fault ends the block: what an engine has
-        shown is told first."""
+        """Collect changes, and apply them at the end of the block, also after an exception in it."""
         changes = self._changes()
         try:
             yield changes
@@ -231,7 +231,7 @@ class OpenRun:
             self._apply(changes)
 
     def _apply(self, changes: RunChanges) -> None:
-        """Show and store changes that were made of the run as it is now."""
+        """Apply and store changes that were derived from the present state of the run."""
         for event, author, self.run in changes:
             self.recorder.put(event, author or self.run.engine)
             if self.run.end is not None:
@@ -247,8 +247,8 @@ class OpenRun:
         self._changed(self)
 
     async def drive(self, order: Order | None, incarnation: str = "") -> None:
-        """Drive the run until it is over and stored. With an order it is started first, exactly once; without
-        one it is followed from where it stands."""
+        """Drive the run until it is over and stored. With an order, first start it, exactly once;
+        without one, continue from its present state."""
         async with anyio.create_task_group() as outer:
             outer.start_soon(self.recorder.run)
             if order is None:
@@ -266,8 +266,8 @@ class OpenRun:
             outer.cancel_scope.cancel()
 
     async def _recall(self) -> None:
-        """Give the monitor the graph that an earlier process has sent. Nothing waits for that, since it is needed
-        only to name what the run waits for."""
+        """Give the monitor the graph that an earlier process has sent, in the background: it is
+        needed only to name what the run waits for."""
         try:
             umrf = await sent_of(self._store, self.run)
         except (Refused, msgspec.DecodeError):
@@ -277,8 +277,8 @@ class OpenRun:
                 self.watch.recalls(umrf)
 
     def moves_again(self, event: MovesAgain) -> bool:
-        """Open the run again, since it had ended and moves. Return False when its end is stored and nobody drives
-        it any more."""
+        """Reopen the run, which had ended and moves. Return False if its end is stored and its task
+        has ended."""
         if self._is_left or self.run.end is None:
             return not self._is_left
         umrf, self.watch = self.watch.umrf, self._watched()
@@ -347,8 +347,8 @@ class OpenRun:
         self._asks.set()
 
     async def _ask(self) -> None:
-        """Ask the engine until cancelled: each second, sooner when there is news, ten times as often for a
-        stop. What takes longer is worked on beside it, so that no proof waits for that."""
+        """Ask the engine until cancelled: each second, sooner after news, ten times as often during
+        a Stop. Slow jobs run beside it, so that no proof waits for them."""
         async with anyio.create_task_group() as beside:
             wait = 0.0
             while True:
@@ -388,8 +388,8 @@ class OpenRun:
             self.look()
 
     async def _steadily(self, work: Callable[[], Awaitable[None]]) -> None:
-        """Run `work` until it returns, and again after each exception, so that a fault ends neither this task nor
-        the others."""
+        """Run `work` until it returns; run it again after each exception, so that a fault ends no
+        task."""
         told = False
         while True:
             try:
@@ -403,7 +403,7 @@ class OpenRun:
                 await anyio.sleep(0.2)
 
     async def _publish(self, order: Order, incarnation: str) -> None:
-        """Send the one start message. Whatever happens, it is never sent again."""
+        """Send the start message, once; it is never repeated, whatever happens."""
         if self.run.end is not None:  # refused after it was stored
             return
         at = self._clock_us()
@@ -441,7 +441,8 @@ class OpenRun:
         return Published(at, incarnation, now.process if now.incarnation == incarnation else None)
 
     def _let_early_ones_in(self) -> None:
-        """Take in the reports that came while the start was handed over, so that they follow it in the history."""
+        """Process the reports that arrived while the start was sent, so that they follow it in the
+        history."""
         self.published.set()
         early, self._early = self._early, []
         for report in early:
@@ -488,8 +489,7 @@ class OpenRun:
     # --- without a proof ----------------------------------------------------------------------
 
     def lose(self, why: str) -> None:
-        """Note that nobody knows whether the code of the run has ended, and for which reason
-        (`why`)."""
+        """Note that it is unknown whether the code of the run has ended; `why`: the reason."""
         changes = self._changes()
         changes.lose(why)
         self._apply(changes)
@@ -509,7 +509,7 @@ class OpenRun:
         self._apply(changes)
 
     def alarm(self, code: str, text: str) -> None:
-        """Raise an alarm that people must see now, unless the run has the same alarm already."""
+        """Raise an alarm for people, unless the run has the same alarm already."""
         changes = self._changes()
         changes.alarm(code, text)
         self._apply(changes)

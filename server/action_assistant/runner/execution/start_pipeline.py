@@ -71,8 +71,8 @@ CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[
 
 
 class StartSources(msgspec.Struct, frozen=True):
-    """The sources of what robots do not tell and starts need: the folder of Python `behaviours`, the check of
-    expected `courses`, and the folders that robots index, by the names of the robots."""
+    """Further sources that a start needs: the folder of Python `behaviours`, the check of expected
+    `courses`, and the index folders by robot."""
 
     behaviours: BehaviourFolder | None = None
     courses: CoursesOf | None = None
@@ -83,8 +83,8 @@ NO_SOURCES: Final = StartSources()
 
 
 class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
-    """A start that nothing stands in the way of. It goes over `link`, which the run owns when it is
-    simulated, to the life `incarnation` of the engine. `despite`: problems that a person overrides."""
+    """A start that nothing prevents. It goes over `link`, which the run owns if simulated, to the
+    life `incarnation` of the engine. `despite`: problems that a person overrides."""
 
     request: StartRequest
     prepared: Prepared
@@ -116,8 +116,8 @@ class Grouped(msgspec.Struct, frozen=True):
 
 
 class StartPipeline:
-    """Carries out starts and pre-flights. `stops` tells which Stops were pressed since a start was
-    asked for; `turns` of robots are shared with whatever must not happen during a start."""
+    """Carries out starts and pre-flights. `stops`: knows the Stops pressed since a start was
+    requested; `turns`: the lock of each robot, also held by work that must not overlap a start."""
 
     def __init__(
         self,
@@ -205,7 +205,8 @@ class StartPipeline:
     # --- claim --------------------------------------------------------------------------------
 
     def turn(self, engine: str) -> anyio.Lock:
-        """Return the lock of a robot: one start at a time, and none while it is registered anew."""
+        """Return the lock of a robot, which allows one start at a time, and none during a new
+        registration."""
         return self._turns.setdefault(engine, anyio.Lock())
 
     def is_under_way(self, request_id: str) -> bool:
@@ -375,9 +376,10 @@ class StartPipeline:
     async def _store_and_hand_over(
         self, accepted: AcceptedStart, author: Author, stops: int, group: str | None = None
     ) -> Run:
-        """Store a start, then have its run send the one message; wait until it has left. A Stop that was
-        pressed after the first `stops` ones is in force before anything is sent. Raises Conflict,
-        Unavailable; then nothing was sent."""
+        """Store a start, then let its run send the message, and wait until it has left. A Stop
+        pressed after the first `stops` ones takes effect before anything is sent. Raise Conflict
+        or Unavailable, before anything is sent, if the robot is occupied or the start cannot be
+        stored."""
         number, at = self._runs.next_number(), self._clock_us()
         requested, order = _to_store(accepted, author, at=at, number=number, group=group)
         engine, name = accepted.request.engine, accepted.prepared.name
@@ -398,7 +400,8 @@ class StartPipeline:
     async def _hand_over_group(
         self, starts: Sequence[AcceptedStart], author: Author, stops: int
     ) -> Grouped:
-        """Store and hand over accepted starts one after the other; one that fails leaves the others."""
+        """Store and send accepted starts one after the other; the failure of one does not affect
+        the others."""
         group = random_id()
         runs: list[Run] = []
         failed: dict[str, str] = {}
@@ -412,7 +415,8 @@ class StartPipeline:
     # --- pre-flight -----------------------------------------------------------------------------
 
     async def _look(self, request: StartRequest, starter: str) -> Preflight:
-        """Return the items of one engine; a stage that refuses becomes an item, and the next one goes on."""
+        """Return the pre-flight items of one engine. A refusal of one stage becomes an item, and
+        the next stage runs all the same."""
         items: list[Item] = []
         robot: KnownEngine | None = None
         ready: Prepared | None = None
@@ -509,7 +513,8 @@ def _to_store(
 
 
 def _overridden(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:
-    """Return the problems that a person overrides: those of the graph, and those that block on the robot."""
+    """Return the problems that a person overrides: errors of the graph, and those that block it on
+    the robot."""
     problems = [each for each in ready.problems if each.severity == "error"]
     found: list[Overridden] = []
     for item in items:

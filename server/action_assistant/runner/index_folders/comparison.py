@@ -31,7 +31,7 @@ class Lacking(msgspec.Struct, frozen=True):
 
 
 class Differing(msgspec.Struct, frozen=True):
-    """This one file defines another graph of that name, or one that no engine reads."""
+    """One file in the folder defines another graph of that name, or a graph that no engine reads."""
 
     file: DefiningFile
 
@@ -58,8 +58,8 @@ class WritableGraph(msgspec.Struct, frozen=True):
 
 class IndexFolderState(msgspec.Struct, frozen=True, kw_only=True):
     """The folder that the robot's engine indexes, as the runner sees it. `writable`: graphs that
-    can be written there; `waiting`: graphs that are there already, and that the engine has not
-    indexed yet; `hindered`: why others cannot be written, as sentences by graph."""
+    can be written there; `waiting`: graphs whose file exists and that the engine has not indexed
+    yet; `hindered`: why other graphs cannot be written, as sentences by graph."""
 
     path: str
     writable: tuple[WritableGraph, ...] = ()
@@ -80,8 +80,7 @@ def file_state(
     actions: Collection[str],
     graphs: Mapping[str, Graph],
 ) -> FileState:
-    """Return the state of one graph's file. `actions`, `graphs`: those that the engine itself has
-    named."""
+    """Return the state of one graph's file. `actions`, `graphs`: those in the engine's own index."""
     name = graph.name
     if defining := files.actions.get(name, ()):
         return Hindered(

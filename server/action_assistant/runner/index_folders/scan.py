@@ -22,8 +22,8 @@ _BOM: Final = b"\xef\xbb\xbf"
 
 
 class DefiningFile(msgspec.Struct, frozen=True):
-    """A file that defines a name. `path` is relative to the folder; `linked`: a link leads
-    there."""
+    """A file that defines a name. `path`: relative to the folder; `linked`: the path leads through
+    a symbolic link."""
 
     path: str
     linked: bool
@@ -78,7 +78,8 @@ def scanned(folder: Path, names: Collection[str]) -> IndexedFiles:
 
 
 def _marked(folder: Path, unread: list[str]) -> Iterator[tuple[str, bool]]:
-    """Yield the paths of files that an engine would read, and whether a link leads there."""
+    """Yield the paths of files that an engine would read, and whether a symbolic link leads to
+    them."""
     left, seen = [("", False, 0)], 0
     while left:
         below, linked, depth = left.pop()
@@ -134,7 +135,7 @@ def _text(path: Path) -> bytes:
 
 
 def _names(text: bytes) -> _NamedText:
-    """Return the names in a text; none where it is no JSON object, which engines skip, too."""
+    """Return the names in a JSON text; no names for any other text, which engines skip, too."""
     try:
         return msgspec.json.decode(text.removeprefix(_BOM), type=_NamedText)
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):

@@ -24,8 +24,8 @@ _KEPT_NAME: Final = 120  # bytes of the old name in that of a file that was move
 
 
 class NewFile(msgspec.Struct, frozen=True):
-    """The file of a graph. `replaces`: the path of the file that it replaces, "" for none; `old`:
-    the SHA-256 of that one's contents, in hex."""
+    """The new file of a graph. `replaces`: the path of the file that it replaces, "" for none;
+    `old`: the SHA-256 of that file, in hex."""
 
     graph: str
     text: bytes
@@ -64,7 +64,8 @@ class _Changed(Exception):
 
 
 def write(folder: Path, files: Sequence[NewFile]) -> WritingOutcome:
-    """Write all files: each is on the disk before the first of them gets its name. Never raises."""
+    """Write all files: all contents are on the disk before the first file gets its name. Never
+    raises."""
     written: list[WrittenFile] = []
     place = str(folder)
     try:
@@ -172,7 +173,7 @@ def _added(each: _Prepared) -> WrittenFile:
 
 
 def _replaced(each: _Prepared) -> WrittenFile:
-    """Put a new file in the place of one that still has the old contents."""
+    """Replace a file that still has the old contents by its new one."""
     path, folder = each.file.replaces, each.folder
     name, above = _base(path), path[: len(path) - len(_base(path))]
     kept = (
@@ -210,8 +211,8 @@ def _require_same(folder: int, name: str, old: str, changed: str) -> None:
 
 
 def _put_back(folder: int, kept: str, name: str) -> bool:
-    """Give a file that was moved away its name back; return False where another file has the name
-    by now."""
+    """Give a file that was moved away its old name; return False if another file has that name by
+    now."""
     try:
         _link(folder, kept, name)
         os.unlink(kept, dir_fd=folder)

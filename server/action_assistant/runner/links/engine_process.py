@@ -28,8 +28,8 @@ class Thread(msgspec.Struct, frozen=True):
 
 
 class EngineProcess(msgspec.Struct, frozen=True):
-    """One process. `boot` is the kernel's boot id, `namespace` that of process ids, `started` is in clock ticks
-    after boot: together with `pid` they never name another process."""
+    """One process. `boot`: the kernel's boot id; `namespace`: that of process ids; `started`: clock
+    ticks after boot. Together with `pid` they identify it for ever."""
 
     boot: str
     namespace: str
@@ -38,7 +38,7 @@ class EngineProcess(msgspec.Struct, frozen=True):
 
 
 def process(pid: int) -> EngineProcess | None:
-    """Return the process with this id; None when there is none or the kernel does not tell."""
+    """Return the process with this id; None if there is none or the kernel does not show it."""
     try:
         started = _started(pid)
         return None if started is None else EngineProcess(*_here(), pid, started)
@@ -47,8 +47,8 @@ def process(pid: int) -> EngineProcess | None:
 
 
 def has_ended(known: EngineProcess) -> bool:
-    """Return whether a process has certainly ended: it is the same boot and namespace, and the process is not
-    there any more."""
+    """Return whether a process has certainly ended: this is the same boot and namespace, and the
+    process does not exist."""
     try:
         if _here() != (known.boot, known.namespace):
             return False
@@ -58,12 +58,13 @@ def has_ended(known: EngineProcess) -> bool:
 
 
 def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProcess | None:
-    """Return the process behind a DDS participant when it certainly is one of this computer, else None.
+    """Return the process behind a DDS participant if it certainly runs on this computer, else None.
 
-    `prefix` and `ours` are GUID prefixes in hex, of the engine and of this process. Fast DDS puts two
-    bytes of the host and the low two of the process id into them. Containers on one network share the
-    former and count processes anew, so the process must also hold a port of that domain and have been
-    started with the engine's name. For every other middleware the result is None.
+    `prefix` and `ours`: GUID prefixes in hex, of the engine and of this process. Fast DDS puts two
+    bytes of the host and the low two bytes of the process id into them. Containers on one network
+    share the host bytes and have process ids of their own, so the process must also hold a port of
+    that domain and have the engine's name in its command line. For every other middleware the
+    result is None.
     """
     if len(prefix) < 24 or prefix[:8] != ours[:8] or not prefix.startswith(_FAST_DDS):
         return None
@@ -80,12 +81,11 @@ def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProc
 
 
 def threads(known: EngineProcess) -> frozenset[Thread] | None:
-    """Return the threads of the process of an engine's own node; None if they are not known.
+    """Return the threads of the process of an engine's own node; None if unknown.
 
-    They are not known when the process has ended, is on another computer or runs another program, which
-    may not begin a thread for each action. Nor are they when a thread ends in each of the looks: it may
-    have begun another one that the kernel did not list any more, and the kernel ends its list early at a
-    thread that ends right then.
+    They are unknown if the process has ended, is on another computer, or runs another program,
+    which may not begin a thread for each action; also if a thread ends during each attempt: the
+    kernel's list is incomplete then.
     """
     folder = _PROC / str(known.pid)
     try:
@@ -99,8 +99,8 @@ def threads(known: EngineProcess) -> frozenset[Thread] | None:
 
 
 def _listed(tasks: Path) -> frozenset[Thread] | None:
-    """Return the threads in a `task` folder of /proc; None if one of them ended meanwhile, or if the kernel
-    counts more of them than it has listed."""
+    """Return the threads in a `task` folder of /proc; None if one ended meanwhile, or the kernel
+    counts more threads than it has listed."""
     found = {each.name: _began(each) for each in tasks.iterdir()}
     listed = [Thread(int(name), began) for name, began in found.items() if began is not None]
     counted = int(_fields(tasks.parent)[_NUM_THREADS])
@@ -113,8 +113,8 @@ def _here() -> tuple[str, str]:
 
 
 def _started(pid: int) -> int | None:
-    """Return when a process began, in clock ticks after boot; None when it has ended, also when its parent has
-    not waited for it yet."""
+    """Return when a process began, in clock ticks after boot; None if it has ended, also if its
+    parent has not waited for it yet."""
     folder = _PROC / str(pid)
     try:
         fields = _fields(folder)

@@ -125,7 +125,7 @@ def snapshot(
 
 
 def name_of(text: str) -> str:
-    """Return the name inside a graph's text; "" where there is none."""
+    """Return the name inside a graph's text; "" if it has none."""
     try:
         return _NAMED.decode(text).graph_name
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -133,8 +133,7 @@ def name_of(text: str) -> str:
 
 
 def run_in(text: str) -> str | None:
-    """Return the id of the run that is written into the actions of a graph that somebody sent; None where there
-    is none."""
+    """Return the id of the run in the actions of a sent graph; None if there is none."""
     try:
         return _run(_SENT.decode(text).actions)
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -142,8 +141,8 @@ def run_in(text: str) -> str | None:
 
 
 def _run(actions: tuple[_Action, ...] | tuple[_Marked, ...]) -> str | None:
-    """Return the id of the run that every action carries; None when they differ, as in a graph that was put
-    together from others."""
+    """Return the id of the run that every action carries; None if they differ, as in a graph
+    combined from others."""
     marks = {_mark(each) for each in actions}
     return marks.pop() if len(marks) == 1 else None
 
@@ -164,8 +163,9 @@ def _messages(action: _Action) -> tuple[str, ...]:
 
 
 def _stoppable(text: str, failed: frozenset[str]) -> frozenset[str]:
-    """Return the nodes that their graph itself may stop or pause: by a response of a relation, or because a
-    spontaneous action leads to them. Return all of `failed` when the text cannot be read."""
+    """Return those `failed` nodes that their graph itself may stop or pause: by a response of a
+    relation, or since a spontaneous action leads to them. Return all of them if the text cannot
+    be read."""
     try:
         actions = _RELATED.decode(text).actions
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -188,8 +188,8 @@ def _stoppable(text: str, failed: frozenset[str]) -> frozenset[str]:
 
 
 def _inputs(nodes: Mapping[str, _Action]) -> dict[str, Values]:
-    """Return the input values of the actions that move, by full name; the engine drops them when an action
-    ends."""
+    """Return the input values of moving actions, by full name; the engine drops the values when an
+    action ends."""
     found: dict[str, Values] = {}
     for name, each in nodes.items():
         if each.state in ACTIVE and (values := reported(bytes(each.input_parameters))) is not None:

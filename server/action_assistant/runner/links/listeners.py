@@ -14,7 +14,8 @@ class Listeners(Generic[_News]):
         self._all: list[Callable[[_News], None]] = []
 
     def tell(self, news: _News) -> None:
-        """Call every listener that is there now, also one that another listener removes meanwhile."""
+        """Call every listener that is registered now, also one that another listener removes
+        meanwhile."""
         for hear in tuple(self._all):
             hear(news)
 

@@ -37,7 +37,7 @@ class EngineRefused(Exception):
 
 
 class NoAnswer(Exception):
-    """The engine did not answer a get in time, or cannot; the text says what is known."""
+    """The engine did not answer a get in time, or cannot; the text gives the known reason."""
 
 
 class GraphOutline(msgspec.Struct, frozen=True):
@@ -56,9 +56,9 @@ def graph_outline(graph: Graph | GraphOutline) -> GraphOutline:
 
 
 class Order(msgspec.Struct, frozen=True, kw_only=True):
-    """One start of a graph. `umrf` is its text, which carries the id of the run; `graph` is the graph or its
-    outline. `targets` are the names of the engines that it is for; `inside` are the texts of all its
-    sub-graphs, for an engine that has no index of its own."""
+    """One start of a graph. `umrf`: its text with the id of the run; `graph`: the graph or its
+    outline. `targets`: the names of the engines that should run it; `inside`: the texts of all
+    its sub-graphs, for an engine without an index."""
 
     run: str
     graph: Graph | GraphOutline
@@ -68,11 +68,11 @@ class Order(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Answer(msgspec.Struct, frozen=True, kw_only=True):
-    """The answer of an engine to one get: every graph that it holds, ended ones too.
+    """The answer of an engine to one get: every graph that it holds, also ended ones.
 
-    `asked_at` and `at` are microseconds UTC; `incarnation` changes when the engine is restarted.
-    `texts` are those graphs as the engine wrote them, by running name. `known_actions` and
-    `known_graphs` are the UMRF texts of its index, as it wrote them.
+    `asked_at` and `at`: microseconds UTC; `incarnation` changes when the engine is restarted.
+    `texts`: the graphs as the engine wrote them, by running name. `known_actions`, `known_graphs`:
+    the UMRF texts of its index.
     """
 
     asked_at: int
@@ -85,14 +85,13 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Standing(msgspec.Struct, frozen=True, kw_only=True):
-    """The standing of an engine at this moment, as far as it is known without asking the engine.
+    """The present state of an engine, as far as it is known without asking the engine.
 
-    `servers`: how many answer on the path of its get; only one of them makes answers a proof.
-    `newcomers`: names of nodes that hear starts and may be a second engine of this path, which does
-    not serve its get yet.
-    `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: publishers of starts
-    that are not ours. `actor`: what its feedback calls itself, "" until it said something.
-    `process`: of the engine, where it is one of this computer.
+    `servers`: how many answer on the path of its get; with exactly one, answers are a proof.
+    `newcomers`: names of nodes that receive starts and may be a second engine, which does not serve
+    its get yet. `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: other
+    publishers of starts. `actor`: the name in its feedback, "" before any. `process`: the engine's,
+    if on this computer.
     """
 
     state: EngineState
@@ -123,7 +122,7 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Transitions(msgspec.Struct, frozen=True, kw_only=True):
-    """Exact changes of one run, oldest first. Only the simulator can tell them."""
+    """Exact changes of one run, oldest first, which only the simulator reports."""
 
     run: str
     changes: tuple[Exact, ...]
@@ -145,7 +144,7 @@ class EngineLog(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class EngineChanged(msgspec.Struct, frozen=True, kw_only=True):
-    """A report that the engine came, went, or is another one than before; `why` is for people."""
+    """A report that the engine appeared, disappeared, or was replaced; `why` is for people."""
 
     at: int
     state: EngineState
@@ -172,7 +171,7 @@ Leaves: TypeAlias = Callable[[], None]
 
 
 def unwatched() -> None:
-    """Do nothing, for a message of which nobody needs to know when it leaves."""
+    """Do nothing: the default for `leaves`, for callers that need not know when a message leaves."""
 
 
 class Link(Protocol):
@@ -229,8 +228,8 @@ class Link(Protocol):
         ...
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Call `hear` with every report of the engine until the end of the block, on the event loop and in
-        order: a report that came before an answer is passed on before `get` returns."""
+        """Call `hear` with every report of the engine until the end of the block, on the event loop
+        and in order: a report that came before an answer is passed on before `get` returns."""
         ...
 
     async def aclose(self) -> None:
@@ -250,8 +249,8 @@ class Registration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class Candidate(msgspec.Struct, frozen=True, kw_only=True):
-    """An engine that discovery shows. One at rest does not say its name: `actor` is "" until its
-    feedback was heard, and a person has to know the name."""
+    """An engine that discovery shows. `actor`: "" until its feedback was heard, since an engine
+    without a running graph does not say its name; a person has to know it then."""
 
     domain: int
     rmw: str
@@ -263,15 +262,15 @@ class Candidate(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Sighting(msgspec.Struct, frozen=True):
-    """Engines that are seen at this moment. `left_s`: seconds for which others may still come into sight,
-    since discovery goes on; 0 where all that answer are seen."""
+    """The engines that are seen now. `left_s`: seconds during which discovery may still find
+    others; 0 when it is complete."""
 
     engines: tuple[Candidate, ...]
     left_s: float
 
 
 class Reach(Protocol):
-    """Makes links to robots, and owns what they share. There is one in a process."""
+    """Makes links to robots, and owns what they share; one per process."""
 
     @property
     def rmw(self) -> str:

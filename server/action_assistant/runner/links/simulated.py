@@ -95,7 +95,7 @@ class Simulators:
         return link
 
     async def take(self, report: Callable[[], None]) -> None:
-        """Call `report` in turn with those of other runs, then wait for three times as long as it took."""
+        """Call `report` while no other run reports, then wait for three times as long as it took."""
         async with self._turn:
             began = time.perf_counter()
             report()
@@ -330,7 +330,7 @@ async def _serve(
             writer.write(_framed((0, part)))
 
     async def live() -> None:
-        """Let the engine run no faster than the runner reads, so that what waits in between is bounded."""
+        """Run the engine no faster than the runner reads, so that unread output is bounded."""
         await link.run(writer.drain)
 
     async def obey() -> None:
@@ -349,7 +349,7 @@ async def _serve(
 
 
 def _woken(loop: asyncio.AbstractEventLoop, link: SimulatorLink) -> None:
-    """Wake the engine from a thread of a behaviour, since a call has ended."""
+    """Wake the engine from the thread of a behaviour whose call has ended."""
     with suppress(RuntimeError):  # the loop has ended, and the engine with it
         loop.call_soon_threadsafe(link.wake)
 

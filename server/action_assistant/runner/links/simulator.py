@@ -66,8 +66,8 @@ class Simulator(Protocol):
         clock_us: Callable[[], int],
         behaviours: BehaviourFolder | None = None,
     ) -> Link:
-        """Return a link to an engine with these facts. It follows a script (JSON; "" for none), and for actions
-        that have one the behaviour instead."""
+        """Return a link to an engine with these facts. Its actions follow the script (JSON; "" for
+        none), or their behaviour if they have one."""
 
 
 def in_this_process(
@@ -92,8 +92,8 @@ def engine_of(
 
 
 class SimulatorLink:
-    """The link to a simulated engine in this process. `clock_us` gives microseconds UTC. `performer` runs its
-    behaviours, if it has any; they need real time."""
+    """The link to a simulated engine in this process. `clock_us`: gives microseconds UTC.
+    `performer`: runs its behaviours, if any, in real time."""
 
     simulated: Final = True
 
@@ -219,7 +219,7 @@ class SimulatorLink:
             await anyio.to_thread.run_sync(self._performer.end, abandon_on_cancel=True)
 
     def wake(self) -> None:
-        """Look again at what is due; called on the thread of the event loop."""
+        """Process what is due; called on the thread of the event loop."""
         self._wake.set()
 
     def _now(self) -> float:
@@ -277,8 +277,8 @@ class SimulatorLink:
         return found
 
     def _fail(self, hazard: semantics.HazardEvent) -> None:
-        """Let the engine answer nothing any more after a crash or a hang, as a real one; tell listeners that it is
-        gone (crash) or busy (hang)."""
+        """Stop answering after a crash or a hang, as a real engine does; report it as gone (crash)
+        or busy (hang)."""
         what = "has crashed" if hazard.effect == "crash" else "hangs"
         why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
         self._dead = why
@@ -291,8 +291,8 @@ class SimulatorLink:
         return self._origin_wall + round(t_ms * 1000)
 
     def _run_of(self, graph: str) -> str | None:
-        """Return the run that a graph belongs to. Sub-graphs run as `GRAPH__NAME__ID` and belong to the run of the
-        longest known beginning."""
+        """Return the run to which a graph belongs. A sub-graph `GRAPH__NAME__ID` belongs to the run
+        of the longest known prefix."""
         if graph in self._runs:
             return self._runs[graph]
         owners = [name for name in self._runs if graph.startswith(f"{name}__")]

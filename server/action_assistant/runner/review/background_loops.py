@@ -62,7 +62,7 @@ class SumUpLoop:
             self._ended.set()
 
     async def run(self) -> None:
-        """Sum up runs that have ended, those of earlier processes too, until cancelled."""
+        """Sum up ended runs, also those of earlier processes, until cancelled."""
         while True:
             ended, self._ended = self._ended, anyio.Event()
             try:
@@ -114,9 +114,9 @@ class SumUpLoop:
 
 
 def due_after(stored: int) -> int:
-    """Return how many keyframes a run has to have until they are stored again, after `stored` of
-    them. All are written each time, so the longer a run, the later the next time: 100,000 events
-    write some 70 MB in all, not 200."""
+    """Return the number of keyframes at which a run's keyframes are stored again, after `stored` of
+    them. All are written each time, so the interval grows: 100,000 events write some 70 MB in
+    all, not 200."""
     return stored + max(1, stored // _UNKEPT_PART)
 
 
@@ -167,8 +167,8 @@ class Deriving(Protocol):
 
 
 async def index_words(journal: Deriving) -> None:
-    """Index the words of runs of earlier versions, some at a time, until all are indexed. Raises
-    nothing: a search reads runs that are not in the index."""
+    """Index the words of old runs, in batches, until all are indexed. Raises nothing, since a
+    search reads unindexed runs."""
     while True:
         try:
             if not await journal.derive(partial(index_some, most=_INDEXED_AT_ONCE)):

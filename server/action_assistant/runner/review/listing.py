@@ -15,7 +15,7 @@ _PAGE: Final = 500  # events read at once
 
 
 class HistoryEvent(msgspec.Struct, frozen=True):
-    """One stored event, as programs that follow a run read it."""
+    """One stored event, for programs that follow a run."""
 
     seq: int
     kind: str
@@ -47,8 +47,7 @@ async def listed(
 async def numbers_with(
     text: str, rows: Callable[[Select[Any]], Awaitable[Sequence[Row[Any]]]]
 ) -> set[int] | None:
-    """Return the numbers of all runs in which a text may be found; None where these may be very
-    many."""
+    """Return the numbers of all runs that may contain a text; None if there may be very many."""
     pieces = word_index.pieces(text)
     late = await rows(word_index.unindexed()) if pieces else []
     for piece in pieces if len(late) <= word_index.MOST else []:

@@ -30,7 +30,7 @@ class OngoingRuns(Protocol):
         ...
 
     def next_number(self) -> int:
-        """Return the number of one more run."""
+        """Return a new run number."""
         ...
 
     def watch(self, watcher: Callable[[OngoingRun], None]) -> None:

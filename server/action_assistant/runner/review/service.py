@@ -63,8 +63,8 @@ class RunMarks(msgspec.Struct, frozen=True):
 
 
 class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
-    """One cause in a sentence, with its evidence: the moment, the event `seq` by which it had been
-    seen, the action, and the words that were said there."""
+    """One cause in a sentence, with its evidence: the time, the event `seq` by which it was seen,
+    the action, and a quoted text."""
 
     kind: str
     text: str
@@ -84,13 +84,13 @@ class ReviewQueries(Protocol):
         *args: P.args,
         **kw: P.kwargs,
     ) -> T:
-        """Return what the method returns."""
+        """Return the result of a method of ReviewService, called in a worker."""
         ...
 
 
 class ReviewService:
-    """Answers questions about runs and stores what people note. It commands no robot. With `asked`,
-    what is expensive is asked of a worker; the worker has a service of its own over the same file,
+    """Answers questions about runs, and stores notes of people. It sends no commands. With `asked`,
+    expensive questions go to a worker, which has a service of its own over the same file,
     without open runs."""
 
     def __init__(
@@ -122,7 +122,7 @@ class ReviewService:
         *args: P.args,
         **kw: P.kwargs,
     ) -> T:
-        """Return what a method returns, computed in a worker where there is one."""
+        """Return the result of a method, computed in a worker if there is one."""
         if self._asked is None:
             return await question(self, *args, **kw)
         return await self._asked.value(question, *args, **kw)
@@ -305,8 +305,8 @@ class ReviewService:
     async def script(
         self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None
     ) -> expected_runs.Recorded:
-        """Return the run as a script, for its own graph or for another version of it. Raises
-        NotFound, BadInput, NotUmrf, TooLarge."""
+        """Return the run as a script, for its own graph or for another version of it. Raise
+        NotFound for an unknown run; BadInput, NotUmrf or TooLarge for a bad fault or graph."""
         found = await self.known(run_id)
         if fault is not None and fault[0] not in found.actions:
             raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
@@ -337,8 +337,8 @@ class ReviewService:
             return None
 
     async def take_in(self, texts: Sequence[bytes], author: Author) -> list[str]:
-        """Import recorded runs as examples, each once; return their ids. Raises BadInput,
-        Unavailable."""
+        """Import recorded runs as examples, each once; return their ids. Raise BadInput if a text
+        is no recorded run, Unavailable if the journal cannot be written."""
         imported: list[str] = []
         for text in texts:
             first, rest = examples.read(text)
@@ -360,8 +360,8 @@ class ReviewService:
     async def expect(
         self, wanted: expected_runs.Expect, author: Author
     ) -> expected_runs.Expectation:
-        """Save an expected course. Raises NotFound, BadInput, NotUmrf, TooLarge, Conflict when the
-        simulator does not take the same course as the run."""
+        """Save an expected course. Raise NotFound for an unknown run; BadInput, NotUmrf or TooLarge
+        for a bad request; Conflict if the simulator takes another course than the run."""
         name = expected_runs.name_of(wanted.name)
         now = self._clock_us()
         opened = self._control.open.get(wanted.run)
@@ -398,8 +398,8 @@ class ReviewService:
     async def checked_courses(
         self, graph: str, umrf: bytes, subgraphs: Sequence[SentSubgraph] = ()
     ) -> CheckedCourses:
-        """Check the expected courses of a graph against this text of it. Raises BadInput, NotUmrf,
-        TooLarge."""
+        """Check the expected courses of a graph against this text of it. Raise BadInput, NotUmrf or
+        TooLarge if the text cannot be read."""
         saved = await self._all_saved(expectation.c.graph == graph)
         return await self._run_in_worker(lambda: check_courses(saved, umrf, subgraphs=subgraphs))
 

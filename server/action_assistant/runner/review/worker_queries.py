@@ -40,8 +40,8 @@ class StoragePaths(msgspec.Struct, frozen=True):
 
 
 class WorkerQueries:
-    """Asks questions in a worker. `opened` are the open runs, once they are known. Snapshots that
-    the worker made are stored in `tasks`, after the answer was given."""
+    """Answers questions in a worker. `opened`: the open runs, once known. Snapshots that the worker
+    made are stored by `tasks` afterwards."""
 
     def __init__(
         self,
@@ -62,8 +62,8 @@ class WorkerQueries:
         *args: P.args,
         **kw: P.kwargs,
     ) -> T:
-        """Return what a method of `ReviewService` returns. Raises what that raises, Unavailable,
-        TooMany."""
+        """Return the result of a method of `ReviewService`, called in a worker. Raise its errors;
+        Unavailable or TooMany if no worker can answer."""
         await self._settled(args)
         found, snapshots = await self._run_in_worker(
             answered, self._paths, partial(question, **kw) if kw else question, args
@@ -183,7 +183,7 @@ class _ReadOnlyJournal(FileJournalReader):
 
 
 class _NoOngoingRuns:
-    """The open runs in a worker: there are none, everything is stored."""
+    """The open runs in a worker: none, since everything is stored."""
 
     def __init__(self, journal: RunnerJournal) -> None:
         self.open: Mapping[str, OngoingRun] = {}
@@ -194,4 +194,4 @@ class _NoOngoingRuns:
         raise NotImplementedError
 
     def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
-        """Do nothing: no run changes here."""
+        """Do nothing, since no run changes in a worker."""

@@ -65,12 +65,12 @@ class EngineIndex(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class KnownEngine:
-    """Watches an engine from `watch` on, until that is cancelled.
+    """Watches an engine while `watch` runs.
 
-    `changed` is called whenever people would see another state; `foreign` with each command of
-    somebody else; `became` when the engine has changed its state; `shows` with all graphs that an
-    answer or feedback shows. `indexes`: the runner writes into the folder that the engine indexes,
-    so that the engine indexes while it runs.
+    `changed` is called after each visible change; `foreign` with each command of somebody else;
+    `became` when the engine has changed its state; `shows` with all graphs that an answer or
+    feedback shows. `indexes`: the runner writes into the folder that the engine indexes while it
+    runs.
     """
 
     def __init__(
@@ -117,7 +117,7 @@ class KnownEngine:
 
     @property
     def simulated(self) -> bool:
-        """True where no robot moves."""
+        """True for a simulated engine, which moves no robot."""
         return self._link.simulated
 
     @property
@@ -127,7 +127,7 @@ class KnownEngine:
 
     @property
     def standing(self) -> Standing:
-        """The facts that the link knows of the engine without asking it."""
+        """The present state of the engine, as far as the link knows it without asking."""
         return self._link.standing
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
@@ -244,16 +244,16 @@ class KnownEngine:
                 await anyio.sleep(0.5)
 
     def look_closely(self) -> None:
-        """Ask the engine more often for a while, because a run has ended there or somebody else has
-        sent the engine a command."""
+        """Ask the engine more often for a while, since a run has ended or somebody else has sent a
+        command."""
         now = _now()
         if now >= self._close_until:
             self._look.set()
         self._close_until = now + _AFTERWARDS_S
 
     def let_index(self) -> None:
-        """Let the engine read what was just written into its index folder, and ask it again only
-        after that. Gets of runs and of Stops go on meanwhile."""
+        """Delay the next regular get until the engine has read what was just written into its index
+        folder. Gets of runs and of Stops continue."""
         self._indexing_until = _now() + _INDEXES_S
         self._look.set()
 
@@ -353,11 +353,11 @@ def read_index(actions: tuple[str, ...], graphs: tuple[str, ...]) -> EngineIndex
 
 
 def foreign_graphs(answer: Answer, own_runs: Collection[str]) -> list[str]:
-    """Return the names of the graphs on an engine that somebody else has started. `own_runs` are
-    the ids of this runner's runs.
+    """Return the names of the graphs on an engine that somebody else has started. `own_runs`: the
+    ids of this runner's runs.
 
-    A graph counts as running also before its first action and between two actions. For a running
-    sub-graph the graph around it is named.
+    A graph counts as running also before its first action and between two actions. A running
+    sub-graph counts as its top graph.
     """
     held = {each.graph for each in answer.graphs}
     tops = {

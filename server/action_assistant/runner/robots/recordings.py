@@ -33,8 +33,8 @@ _ENDING: Final = ".jsonl.gz"
 
 
 class GetLine(msgspec.Struct, frozen=True, omit_defaults=True, tag="get", tag_field="kind"):
-    """An answer: graphs that have changed, as the engine wrote them, and the names of those that
-    have gone."""
+    """An answer: changed graphs as the engine wrote them, and the names of graphs that it does not
+    hold any more."""
 
     at: int
     asked_at: int
@@ -169,8 +169,7 @@ def hours(since: int, until: int) -> tuple[str, str]:
 
 
 def _hour_of(path: Path) -> datetime | None:
-    """Return the hour of a file; None for a file that was not written here and must not be
-    removed."""
+    """Return the hour of a recording; None for any other file, which must not be removed."""
     try:
         return datetime.strptime(path.name, f"%Y-%m-%dT%H{_ENDING}").replace(tzinfo=UTC)
     except ValueError:

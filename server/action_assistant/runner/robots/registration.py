@@ -48,10 +48,8 @@ class RobotRemoved(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class HeldGraph(msgspec.Struct, frozen=True, kw_only=True):
-    """A graph that an engine holds, ended ones too. `run`: the id of this runner's run that it is.
-
-    `stopping`: why a Stop of it is not proven yet, "" at first; None when no Stop of it is wanted.
-    """
+    """A graph that an engine holds, also an ended one. `run`: the id of this runner's run, if it is
+    one. `stopping`: why a Stop of it is not proven yet, "" at first; None without a Stop."""
 
     graph: str
     state: str
@@ -61,11 +59,11 @@ class HeldGraph(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Robot(msgspec.Struct, frozen=True, kw_only=True):
-    """An engine as people see it. `why` explains any state but `answering`.
+    """An engine as people see it. `why`: explains any state but `answering`.
 
     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
-    besides this runner. `actions`, `graphs`: how many it has indexed; None before its first answer.
-    `pauses`: whether pausing is safe there.
+    besides this runner. `actions`, `graphs`: the size of its index; None before its first answer.
+    `pauses`: pausing is safe on it.
     """
 
     name: str

@@ -54,8 +54,8 @@ _TOLD: Final = 500  # newest entries of a flight record
 
 
 class ForeignStops(Protocol):
-    """The part of `ForeignStopLoop` that the registry uses: it stops graphs that were not started
-    from here."""
+    """The part of `ForeignStopLoop` that the registry uses: it stops graphs that others have
+    started."""
 
     def trouble(self, robot: str, graph: str) -> str | None:
         """Return why a Stop of this graph is not proven yet; "" as long as no reason is known, None
@@ -84,7 +84,7 @@ class ForeignStops(Protocol):
         ...
 
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
-        """Note a command of somebody else, which may have set the graph going again."""
+        """Note a command of somebody else that may have started the graph again."""
         ...
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
@@ -97,9 +97,9 @@ Present: TypeAlias = Callable[[str], KnownEngine | None]
 
 
 class RegistryContext(msgspec.Struct, frozen=True):
-    """The services that the registry uses. `foreign` is called with each command of somebody else
-    and returns its event; `shows` with all graphs that an engine shows; `stops` makes the object
-    that stops foreign graphs."""
+    """The services that the registry uses. `foreign`: called with each command of somebody else,
+    returns its event; `shows`: called with all graphs that an engine shows; `stops`: makes the
+    object that stops foreign graphs."""
 
     journal: RunnerJournal
     tasks: BackgroundTasks
@@ -303,7 +303,7 @@ class Robots:
         return with_engine(plain, engine, self.foreign_stops.trouble)
 
     def unheard(self) -> dict[str, str]:
-        """Return the robots of which nobody knows at present what they run: name → reason."""
+        """Return the robots whose running graphs are unknown now: name → reason."""
         found: dict[str, str] = {}
         for name in self.names:
             engine = self._engines.get(name)
@@ -408,7 +408,7 @@ class Robots:
 
     @property
     def no_reach(self) -> str:
-        """The reason why no robot can be reached; "" when some can."""
+        """The reason why no robot can be reached; "" if robots can be reached."""
         return self._reach if isinstance(self._reach, str) else ""
 
     # --- the flight recorder ------------------------------------------------------------------
@@ -433,7 +433,7 @@ class Robots:
 
     @property
     def robot_log(self) -> RobotLog:
-        """The log of what others told the robots."""
+        """The log of commands that others sent to the robots."""
         if self._robot_log is None:
             raise RuntimeError("the registry is not open")
         return self._robot_log

@@ -58,8 +58,8 @@ class EngineBecame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
 
 
 class StopAsked(msgspec.Struct, frozen=True, kw_only=True):
-    """A person wants a graph stopped that was not started from here. `life`: the incarnation of the
-    engine that ran it, "" where that was not known."""
+    """A person requested a Stop of a graph that others started. `life`: the incarnation of the
+    engine that ran it, "" if unknown."""
 
     kind: ClassVar[str] = "robot.stop_asked.v1"
 
@@ -121,7 +121,7 @@ class GraphFile(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class IndexWritten(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """These files were written. `why` says why the others were not, "" if all were."""
+    """These files were written. `why`: why the other files were not, "" if all were."""
 
     kind: ClassVar[str] = "robot.index_written.v1"
 
@@ -242,8 +242,8 @@ class RobotLog:
         return sum(each.waiting for each in self._appenders.values())
 
     async def newest(self, robot: str, most: int) -> list[tuple[int, RobotEvent]]:
-        """Return the newest events of a robot with their seqs, oldest first, `most` of them at
-        most. Raise Unavailable if the journal cannot be read."""
+        """Return the newest `most` events of a robot with their seqs, oldest first. Raise
+        Unavailable if the journal cannot be read."""
         stream = stream_of_robot(robot)
         end = await self._journal.newest(stream)
         stored = await self._journal.read(stream, after=max(0, end - most))
@@ -251,8 +251,8 @@ class RobotLog:
         return [(seq, event) for seq, event in read if event is not None]
 
     async def graph(self, robot: str, seq: int) -> str:
-        """Return the text of the graph in a recorded command. Raise NotFound if no graph was
-        recorded there, Unavailable if the journal cannot be read."""
+        """Return the text of the graph in a recorded command. Raise NotFound if the event has no
+        graph, Unavailable if the journal cannot be read."""
         stored = await self._journal.read(stream_of_robot(robot), after=seq - 1, limit=1)
         event = event_of(stored[0]) if stored and stored[0].seq == seq else None
         if not isinstance(event, Commanded) or not event.umrf:

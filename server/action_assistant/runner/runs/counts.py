@@ -19,8 +19,8 @@ from action_assistant.umrf.laps import Laps
 
 
 class VisitCount(msgspec.Struct, frozen=True):
-    """An action ran `least` times, with `at_least` perhaps more often. `seen` of these visits are
-    known one by one."""
+    """An action ran `least` times, with `at_least` perhaps more often. `seen`: the number of visits
+    with times of their own."""
 
     least: int
     at_least: bool

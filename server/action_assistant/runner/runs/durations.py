@@ -17,15 +17,14 @@ _EXACT_S: Final = 0.001
 
 
 class DurationBounds(msgspec.Struct, frozen=True, kw_only=True):
-    """A duration in seconds: at least `least` and at most `most`; None: nothing bounds it from
-    above."""
+    """A duration in seconds, between `least` and `most`; `most` is None without an upper bound."""
 
     least: float
     most: float | None
 
     @property
     def exact(self) -> float | None:
-        """The one value where both bounds lie within a millisecond; None otherwise."""
+        """The value, if both bounds differ by less than a millisecond; else None."""
         known = self.most is not None and self.most - self.least <= _EXACT_S
         return self.most if known else None
 
@@ -42,9 +41,9 @@ def of_visit(visit: Visit) -> DurationBounds | None:
 
 
 def of_run(run: Run) -> DurationBounds | None:
-    """Return the time from the start until nothing of the run moved any more, whenever that was
-    proven; None for a run that was never started. It has no upper bound while the run is open or
-    lost, or while an action may still go on."""
+    """Return the time from the start until nothing of the run moved, whenever that was proven; None
+    for a run that was never started. It has no upper bound while the run is open or lost, or
+    while an action may still run."""
     if run.started_at is None or run.end == "refused":
         return None
     visits = [visit for action in run.actions.values() for visit in action.visits]
@@ -57,8 +56,8 @@ def of_run(run: Run) -> DurationBounds | None:
 
 
 def at_rank(spans: Sequence[DurationBounds], share: float) -> DurationBounds | None:
-    """Return the smallest duration that at least `share` of them do not exceed, each bound taken by
-    itself; None without durations."""
+    """Return the smallest duration that at least `share` of these do not exceed, each bound taken
+    separately; None without durations."""
     if not spans:
         return None
     place = max(0, math.ceil(share * len(spans)) - 1)

@@ -114,8 +114,7 @@ def begin(event: Requested) -> Run:
 
 
 def _laps(umrf: str) -> Laps:
-    """Derive which actions run once from the graph, for runs from before this was stored with
-    them."""
+    """Derive from the graph which actions run once, for old runs that did not store this."""
     try:
         return laps(codec.read(umrf.encode()).graph)
     except codec.Unreadable:
@@ -205,7 +204,7 @@ def _with_intervention(
     event: PauseRequested | ResumeRequested | StopRequested | ModifyRequested,
     kind: Literal["stop", "pause", "resume", "modify"],
 ) -> Run:
-    """Note a command of a person together with what was known of the run at that moment."""
+    """Add a command of a person, with the state of the run that was known at that time."""
     asked = Intervention(
         kind=kind, at=event.at, by=event.author, state=run.state, active=run.active
     )
@@ -255,9 +254,8 @@ def is_news(run: Run, shown: Snapshot) -> bool:
 
 
 def thin(run: Run, seen: Iterable[Seen]) -> tuple[Seen, ...]:
-    """Drop from snapshots what is known already, with the same fold as before. An engine repeats
-    its whole graph after every change; storing that each time would grow with the square of its
-    size."""
+    """Drop known facts from snapshots, without a change of the fold. An engine repeats its whole
+    graph after every change; storing it each time would grow with the square of its size."""
     thinned: list[Seen] = []
     for item in seen:
         less = _thin(run, item) if isinstance(item, Snapshot) and not item.same else item
@@ -317,8 +315,7 @@ def _unmodified(run: Run, event: ModifyRefused) -> Run:
 
 
 def _reopen(run: Run, event: MovesAgain) -> Run:
-    """Fold motion after the end: the proof does not count any more, but what people wanted last
-    still does."""
+    """Fold motion after the end: the proof is void, but the last wish of people still counts."""
     alarm = Alarm("moves_again", event.at, event.text)
     return replace(
         run,
@@ -398,8 +395,8 @@ def _state_of(run: Run, graph: str, state: str) -> Run:
 
 
 def _after_snapshot(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> Run:
-    """Fold a snapshot into the actions of its graph. Failures and sub-graphs are noted first, since
-    they change what is known of the other actions in the same snapshot."""
+    """Fold a snapshot into the actions of its graph. Failures and sub-graphs come first, since they
+    affect the other actions of the same snapshot."""
     own = item.graph == run.graph_name
     failed = run.failed or not own or "ERROR" in item.nodes.values()
     looked = max(run.looked.get(item.graph, 0), _before(item))
@@ -424,15 +421,15 @@ def _after_snapshot(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> 
 
 
 def _looked_at(run: Run, looked: int) -> Run:
-    """Note that answers asked for until `looked` showed the run as it was known."""
+    """Note that answers requested until `looked` showed the run in its known state."""
     if run.over_at is not None or looked <= max(run.going_at, run.reopened_at):
         return run
     return replace(run, going_at=looked)
 
 
 def _timed(run: Run, at: int, asked: int | None) -> Run:
-    """Note since when the run is over, as far as that was seen. All actions are only examined when
-    the graph's own state is a final one."""
+    """Note since when the run is over, as far as that was seen. All actions are examined only if
+    the graph's state is final."""
     if run.graph_state in TERMINAL and run.apparent_end is not None:
         return run if run.over_at is not None else replace(run, over_at=at)
     if run.over_at is None and (asked is None or asked <= run.going_at):
@@ -442,7 +439,7 @@ def _timed(run: Run, at: int, asked: int | None) -> Run:
 
 
 def names_all(run: Run, item: Snapshot) -> bool:
-    """Return whether a snapshot names every action that is known of its graph."""
+    """Return whether a snapshot names every known action of its graph."""
     return all(name in item.nodes for name in _known_of(run, item.graph))
 
 
@@ -460,15 +457,15 @@ def key_of(run: Run, graph: str, node: str) -> str:
 
 
 def _asked_at(item: Snapshot) -> int | None:
-    """Return a moment before which the snapshot was not taken: when its answer was asked for. None
-    for feedback, which may be of any age."""
+    """Return the request time of a snapshot's answer: it was taken after that. None for feedback,
+    which may be of any age."""
     if item.source == "feedback":
         return None
     return item.asked_at if item.asked_at is not None else item.at - _ASKED_US
 
 
 def _before(item: Snapshot) -> int:
-    """Return when the answer before this snapshot was asked for. Older streams only have the time
+    """Return the request time of the answer before this snapshot. Older streams only have the time
     at which it came."""
     if item.since_asked is not None:
         return item.since_asked

@@ -29,7 +29,7 @@ Past: TypeAlias = Callable[[str, bool], Awaitable[tuple[Run, int]]]
 
 
 class RunHistory:
-    """Reads runs. `past` reads those that are over in a worker; without it they are folded here.
+    """Reads runs. `past`: reads ended runs in a worker; without it they are folded in this process.
     Raises Unavailable while the journal cannot be read."""
 
     def __init__(self, journal: RunnerJournal, past: Past | None = None) -> None:
@@ -44,15 +44,15 @@ class RunHistory:
         return await self.replayed(run)
 
     async def replayed(self, run: str) -> tuple[Run | None, int]:
-        """Fold a run here, without a worker, and return it with the seq of its last event: used
-        before the runner takes requests."""
+        """Fold a run in this process and return it with the seq of its last event; for use before
+        the runner accepts requests."""
         events = await self._journal.read(stream_of(run))
         found = replay(decode(each.kind, each.body) for each in events)
         return found, events[-1].seq if events else 0
 
     async def left(self, run: str) -> tuple[Run | None, int, bool]:
-        """Return a run that an earlier process left, the seq of its last event, and whether all
-        events could be read; damaged ones are skipped."""
+        """Return a run that an earlier process left open, the seq of its last event, and whether
+        all events could be read; damaged events are skipped."""
         events = await self._journal.read(stream_of(run))
         read = [_decoded(each) for each in events]
         events_read = [event for event in read if event is not None]

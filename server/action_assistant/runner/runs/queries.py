@@ -42,22 +42,22 @@ def of_run(run_id: str) -> Select[Any]:
 
 
 def by_request(request_id: str) -> Select[Any]:
-    """Select the run that a request has become: id, digest, engine, tree_digest."""
+    """Return the query for the run that a request has become: id, digest, engine, tree_digest."""
     fields = (run.c.id, run.c.digest, run.c.engine, run.c.tree_digest)
     return select(*fields).where(run.c.request_id == request_id)
 
 
 def of_start(request_id: str) -> Select[Any]:
-    """Select the ids of the runs that a start has become. A start on several robots has a request
-    each, whose id begins with that of their group."""
+    """Return the query for the ids of the runs that a start has become. In a start on several
+    robots the request id of each begins with the id of the group."""
     group = and_(run.c.request_id > f"{request_id}/", run.c.request_id < f"{request_id}0")
     return select(run.c.id).where(or_(run.c.request_id == request_id, group)).order_by(run.c.number)
 
 
 class Filter(msgspec.Struct, frozen=True, kw_only=True):
-    """The runs that are wanted; None means all. `failed`: refused, lost, halted, or ended in error;
-    false: over otherwise. `graph` is an id or a name, `person` an id or a part of a name, `text` a
-    part of a name or of what was said, `before` the id of a run."""
+    """The wanted runs; None in a field means any. `failed`: true for runs that were refused, lost,
+    halted, or ended in error; false for other ended runs. `graph`: id or name; `person`: id or
+    part of a name; `text`: part of a name or message; `before`: the id of a run."""
 
     graph: str | None = None
     engine: str | None = None
@@ -74,9 +74,9 @@ class Filter(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def listed(wanted: Filter, limit: int, among: Iterable[int] | None = None) -> Select[Any]:
-    """Select runs with their marks, newest first, at most `limit`. `among`: numbers of the only
-    runs that can match. The table does not know the states of open runs, so that `states` selects
-    all open ones as well."""
+    """Return the query for at most `limit` runs with their marks, newest first. `among`: the
+    numbers of the only possible runs. The table lacks the states of open runs, so `states`
+    selects all open ones, too."""
     query = select(run, review.c.pinned, review.c.note)
     query = query.outerjoin(review, review.c.run == run.c.id)
     if among is not None:

@@ -50,8 +50,8 @@ def stream_of(run: str) -> str:
 
 
 class StreamAppender:
-    """Appends to a stream that ends at `seq`, which is negative while that is not known. `changed`
-    is called after each change of `seq` or `recorded`."""
+    """Appends to a stream that ends at `seq`, negative while unknown. `changed` is called after
+    each change of `seq` or `recorded`."""
 
     def __init__(
         self, store: Store, stream: str, seq: int, changed: Callable[[], None] = lambda: None
@@ -72,7 +72,7 @@ class StreamAppender:
 
     @property
     def idle(self) -> bool:
-        """True while every event that was added is stored."""
+        """True if every added event is stored."""
         return not self._waiting
 
     @property
@@ -114,7 +114,7 @@ class StreamAppender:
             raise
 
     async def _write_all(self) -> None:
-        """Write all waiting events, with retries until the journal takes them."""
+        """Write all waiting events, with retries until the journal stores them."""
         if self.seq < 0:
             await self.find_end()
         failures = 0
@@ -126,8 +126,8 @@ class StreamAppender:
                 failures += 1
 
     async def _write(self) -> bool:
-        """Store one batch in a transaction; return whether it is stored. `expected` prevents that a
-        commit whose answer got lost is repeated."""
+        """Store one batch in a transaction; return whether it is stored. `expected` prevents a
+        second commit if the result of the first got lost."""
         batch = [self._waiting[i] for i in range(min(len(self._waiting), _BATCH))]
         try:
             try:

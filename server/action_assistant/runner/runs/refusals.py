@@ -30,11 +30,11 @@ _LONGEST: Final = 300  # characters of the engine's words in a sentence
 
 
 class StartLog:
-    """Follows the engine's lines about the one start of `run`, from when it is handed over.
+    """Follows the engine's log lines about the start of `run`, after it is sent.
 
-    `words`: the engine's reason for a refusal; "" while it has not refused, or where the start may
-    have been somebody else's. After a restart the runner has not heard every line, so that none
-    proves anything; a refusal that was proven before is an alarm of the run.
+    `words`: the engine's reason for a refusal; "" without a refusal, or if the start may have been
+    somebody else's. After a restart of the runner, lines are missing and prove nothing; an earlier
+    proven refusal is an alarm of the run.
     """
 
     def __init__(self, run: Run) -> None:
@@ -46,11 +46,11 @@ class StartLog:
         self.words = "" if alarm is None or others else _between_quotes(alarm.text)
 
     def begins(self) -> None:
-        """Take the start as handed over: lines from here on may be about it."""
+        """Note that the start is sent: later lines may concern it."""
         self._over = False
 
     def hear(self, text: str) -> bool:
-        """Read one more line; return whether it says that the start was refused."""
+        """Read one more line; return whether it reports that the start was refused."""
         if self._over or _OF_OTHERS.fullmatch(text):
             return False
         if not self._next:
@@ -62,8 +62,7 @@ class StartLog:
         return bool(self.words)
 
     def doubt(self) -> None:
-        """Ignore all lines: somebody else has started a graph there, too, and they may be about
-        that one."""
+        """Ignore all lines, since they may concern a graph that somebody else has started."""
         self._over, self.words = True, ""
 
 

@@ -47,8 +47,8 @@ class Alarm(msgspec.Struct, frozen=True):
 
 
 class Intervention(msgspec.Struct, frozen=True, kw_only=True):
-    """A command of a person to the run at `at`. `state` and `active` are what was known at that
-    moment: the state of the run, and the actions that had been seen running and not seen to end."""
+    """A command of a person to the run at `at`. `state`, `active`: what was known at that time, the
+    state of the run and the actions that were seen running."""
 
     kind: Literal["stop", "pause", "resume", "modify"]
     at: int
@@ -138,7 +138,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def doubt(self) -> str:
-        """The reason why no answer of the engine shows rest now; "" where one can."""
+        """The reason why no answer of the engine can prove rest now; "" if one can."""
         return self.unconfirmed or self.loading
 
     @property

@@ -41,8 +41,8 @@ def counted(body: bytes) -> int:
 
 
 def read_sent(umrf: bytes) -> tuple[bytes, codec.Reading]:
-    """Return the text of a graph, byte for byte as it was meant, and the reading of it. For
-    workers. Raises BadInput, NotUmrf with the place, TooLarge."""
+    """Return the exact text of a sent graph, and its reading. For workers. Raise BadInput, NotUmrf
+    or TooLarge, with the place, if it cannot be read."""
     text = _text_of(umrf)
     if len(text) > MOST_BYTES:
         raise TooLarge(
@@ -69,8 +69,8 @@ def _text_of(umrf: bytes) -> bytes:
 
 
 class SentSubgraph(msgspec.Struct, frozen=True, kw_only=True):
-    """A graph inside of the one that is sent. `name` is that of the actions that stand for it;
-    `version` and `graph`: where it comes from."""
+    """A graph inside of the sent one. `name`: of the actions that stand for it; `version`, `graph`:
+    its source."""
 
     name: str
     digest: str = ""
@@ -90,9 +90,9 @@ def read_inside(
     approved: bool = True,
 ) -> tuple[tuple[RunSubgraph, ...], dict[str, Graph]]:
     """Return the graphs inside as they are recorded, and their readings by name. `own`: the digest
-    of the graph around them; `tree`: of all together, None or "" if it is not known. Before a graph
-    is `approved` digests may be left out. For workers. Raises BadInput, NotUmrf, TooLarge, Conflict
-    with the place."""
+    of the graph around them; `tree`: of all together, None or "" if unknown. Unless the graph is
+    `approved`, digests may be missing. For workers. Raise BadInput, NotUmrf, TooLarge or
+    Conflict, with the place, if one is wrong."""
     if len(sent) > MOST_INSIDE:
         raise TooLarge(f"A graph that is sent has at most {MOST_INSIDE} graphs inside.")
     recorded: list[RunSubgraph] = []
@@ -128,7 +128,7 @@ def graphs_in(subgraphs: Sequence[RunSubgraph]) -> dict[str, Graph]:
 
 
 def tree_of(own: str, subgraphs: Sequence[RunSubgraph]) -> str:
-    """Return the digest of a graph together with those inside of it."""
+    """Return the digest of a graph together with all graphs inside."""
     return tree_digest(own, ((each.name, each.digest) for each in subgraphs))
 
 
@@ -154,8 +154,8 @@ def _require_tree(recorded: Sequence[RunSubgraph], own: str, tree: str | None) -
 
 
 class SubgraphShown(msgspec.Struct, frozen=True):
-    """A graph inside of the one that was started, as it was sent along. `name` is that of the
-    actions that stand for it; `graph`: its id; `version`: of it, where there was one."""
+    """A graph inside of the started one, as it was sent along. `name`: of the actions that stand
+    for it; `graph`: its id; `version`: its version, null without one."""
 
     name: str
     version: str | None
@@ -165,7 +165,7 @@ class SubgraphShown(msgspec.Struct, frozen=True):
 
 
 class Sent(msgspec.Struct, frozen=True):
-    """A graph as it was sent, the values of its actions (by full name and flat name, as texts), and
+    """A graph that was sent, the values of its actions (by full name and flat name, as texts), and
     the graphs inside."""
 
     umrf: str
@@ -180,7 +180,7 @@ def sent_of(start: Requested) -> Sent:
 
 
 def subgraphs_shown(start: Sent) -> list[SubgraphShown]:
-    """Return the graphs inside as answers show them."""
+    """Return the graphs inside for the API."""
     return [
         SubgraphShown(
             each.name, each.version, each.digest, msgspec.Raw(each.umrf.encode()), each.graph

@@ -49,8 +49,9 @@ class ForParent(msgspec.Struct, frozen=True, tag="parent", tag_field="for"):
 
 
 class ForInput(msgspec.Struct, frozen=True, tag="input", tag_field="for"):
-    """`action` has no value for a required input, and no action that has ended gives one. The end
-    of a graph (None) needs an output of `giver`, the last action that leads to it."""
+    """The action `action` has no value for a required input, and no ended action gives one. If
+    `action` is None, the end of the graph needs an output of `giver`, the last action that leads
+    to it."""
 
     action: str | None
     input: str
@@ -58,8 +59,9 @@ class ForInput(msgspec.Struct, frozen=True, tag="input", tag_field="for"):
 
 
 class ForOutcome(msgspec.Struct, frozen=True, tag="outcome", tag_field="for"):
-    """`parent` has ended, and its arrow to `action` responds with `response` instead of running it.
-    `certain`: for every outcome; else it depends on an outcome that the engine does not tell."""
+    """The action `parent` has ended, and its arrow to `action` responds with `response` instead of
+    running it. `certain`: for every outcome; else it depends on an outcome that the engine does
+    not report."""
 
     action: str | None
     parent: str
@@ -68,8 +70,8 @@ class ForOutcome(msgspec.Struct, frozen=True, tag="outcome", tag_field="for"):
 
 
 class ForPart(msgspec.Struct, frozen=True, tag="part", tag_field="for"):
-    """`action` is a sub-graph in which nothing moves. `state`: of the sub-graph, "" for a moment in
-    the past."""
+    """The action `action` is a sub-graph in which nothing moves. `state`: of the sub-graph, "" for
+    a time in the past."""
 
     action: str
     state: str
@@ -79,7 +81,7 @@ Wait: TypeAlias = ForParent | ForInput | ForOutcome | ForPart
 
 
 class Standstill:
-    """Decides from several looks whether a graph that is running stands still."""
+    """Decides from several answers whether a running graph stands still."""
 
     def __init__(self) -> None:
         self._since: float | None = None
@@ -91,12 +93,12 @@ class Standstill:
 
     @property
     def lasts(self) -> bool:
-        """True while the last look showed a standstill."""
+        """True if the last answer showed a standstill."""
         return self._since is not None
 
     def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
-        """Note one more look, asked for at `asked` (seconds), at a graph and then its sub-graphs;
-        return whether it has stood still for so long that a person must know."""
+        """Process one more answer, requested at `asked` (seconds), about a graph and its
+        sub-graphs; return whether it has stood still for so long that people must know."""
         if shown[0].state != "RUNNING" or moves(shown):
             self.forget()
             return False
@@ -116,7 +118,7 @@ def packed(run: Run) -> bytes:
 
 
 def packed_alarm_text(run: bytes, umrf: str | None) -> str:
-    """Return the alarm text of a packed run and its graph as it was sent. For workers."""
+    """Return the alarm text for an encoded run and the graph that was sent. For workers."""
     return alarm_text(msgspec.msgpack.decode(run, type=Run), None if umrf is None else _read(umrf))
 
 
@@ -179,8 +181,7 @@ def waits(run: Run, graph: Graph, moment: int | None = None) -> tuple[Wait, ...]
 
 
 class _Stalled:
-    """The arrows of a graph against what was seen of its run, at present or at a moment in the
-    past."""
+    """Compares the arrows of a graph with what was seen of its run, now or at a time in the past."""
 
     def __init__(self, run: Run, graph: Graph, moment: int | None) -> None:
         self._run = run
@@ -202,8 +203,8 @@ class _Stalled:
                 yield ForPart(name, part if self._moment is None else "")
 
     def waits_of(self, action: Action | None) -> list[Wait]:
-        """Return what one action waits for, or the end of the graph (None); empty where no arrow
-        has reached it."""
+        """Return what one action waits for, or the end of the graph (None); empty if no arrow has
+        reached it."""
         key = EXIT if action is None else action.key
         name = None if action is None else action.full_name
         arrows = [each for each in self._graph.relations if each.child == key]
@@ -262,7 +263,7 @@ class _Stalled:
                 yield ForOutcome(name, self._name(arrow.parent), said, certain=True)
 
     def _lacking(self, action: Action | None, fired: list[Relation]) -> Iterator[ForInput]:
-        """Yield required inputs that no parent that has ended gives."""
+        """Yield required inputs that no ended parent gives."""
         giver = self._last_exit() if action is None else None
         if action is None and giver is None:
             return

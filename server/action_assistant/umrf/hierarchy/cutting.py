@@ -151,8 +151,8 @@ def ways_in_differ(selection: Selection) -> Iterator[FlatteningReason]:
 
 
 def _answers_into(selection: Selection, key: Key) -> dict[Key, tuple[Conditions | None, bool]]:
-    """Return the conditions, and whether it is required, of each arrow from outside to a chosen
-    action."""
+    """Return the conditions of each arrow from outside to a chosen action, and whether it is
+    required, by parent."""
     ways = (r for r in selection.into if r.child == key)
     return {
         r.parent: (None, True) if r.parent == ENTRY else (r.conditions, r.required) for r in ways
@@ -160,8 +160,8 @@ def _answers_into(selection: Selection, key: Key) -> dict[Key, tuple[Conditions 
 
 
 def ways_out_differ(selection: Selection) -> Iterator[FlatteningReason]:
-    """Yield the reasons for which ends cannot be ends of one sub-graph: actions outside see the
-    outcome only, not who ended."""
+    """Yield the reasons for which several ends cannot be ends of one sub-graph: actions outside see
+    its outcome only, not which action ended."""
     differing: dict[tuple[Key, Key], list[Precondition]] = {}
     for outcome in PRECONDITIONS:
         known: tuple[Key, dict[Key, Response]] | None = None
@@ -199,9 +199,8 @@ def ends_within(selection: Selection, *, closing: bool, gives: bool) -> dict[Key
     """Return the chosen actions that end the sub-graph, with the conditions of their arrows to its
     exit.
 
-    `closing`: also actions end it after which nothing follows, since a graph would be HALTED there
-    and nobody would notice in a sub-graph; not for an outcome after which something follows
-    elsewhere. `gives`: the exit waits for values.
+    `closing`: an outcome that no action responds to also ends the sub-graph; otherwise it would
+    stay HALTED, which nobody would notice. `gives`: the exit waits for values.
     """
     free = [o for o in OUTCOMES if not any(selection.answers(key, o) for key in selection.chosen)]
     found: dict[Key, Conditions] = {}
@@ -227,8 +226,8 @@ class CutPlan(NamedTuple):
 
 
 class CutGraphs(NamedTuple):
-    """The graph inside, the graph around it, and the action in the latter that stands for the
-    former."""
+    """The inner graph, the outer graph, and the action of the outer graph that stands for the inner
+    one."""
 
     inner: Graph
     outer: Graph
@@ -323,8 +322,8 @@ def _entries(selection: Selection) -> Iterator[Relation]:
 
 
 def _exits(selection: Selection, plan: CutPlan, *, gives: bool) -> Iterator[Relation]:
-    """Yield the arrows to the exit. An action that hands values over outside comes last: its
-    outputs become those of the graph."""
+    """Yield the arrows to the exit. Actions that give values to actions outside come last, since
+    the graph gets their outputs."""
     ends = ends_within(selection, closing=plan.closing, gives=gives)
     handing = {r.parent for r in selection.out if _gives(selection, r)}
     leading = {r.parent for r in selection.out}
@@ -394,7 +393,7 @@ def middle_of(places: Iterator[Position | None]) -> Position | None:
 def _into(
     selection: Selection, action: Action, against: list[FlatteningReason]
 ) -> Iterator[Relation]:
-    """Yield for each action outside one arrow in place of its arrows to all entries."""
+    """Yield, for each action outside, one arrow that replaces its arrows to all entries."""
     by_parent: dict[Key, list[Relation]] = {}
     for relation in selection.into:
         by_parent.setdefault(relation.parent, []).append(relation)
@@ -423,7 +422,7 @@ def _into(
 def _out(
     selection: Selection, action: Action, against: list[FlatteningReason]
 ) -> Iterator[Relation]:
-    """Yield for each action outside one arrow in place of the arrows from all ends to it."""
+    """Yield, for each action outside, one arrow that replaces the arrows from all ends to it."""
     by_child: dict[Key, list[Relation]] = {}
     for relation in selection.out:
         by_child.setdefault(relation.child, []).append(relation)

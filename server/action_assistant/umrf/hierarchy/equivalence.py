@@ -84,8 +84,8 @@ def _parameter(parameter: Parameter) -> tuple[str, object]:
 def _arrows(graph: Graph) -> dict[tuple[Key, Key], _ArrowMeaning]:
     """Return the effects of arrows by parent and child.
 
-    An arrow that is not waited for and answers nothing has no effect, and whether a child waits for
-    its only parent makes no difference.
+    An arrow that is not required and has no response has no effect; whether a child waits for its
+    only parent makes no difference.
     """
     relations = [r for r in graph.relations if not _is_idle(r)]
     parents = Counter(r.child for r in relations)

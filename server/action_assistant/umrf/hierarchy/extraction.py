@@ -33,11 +33,9 @@ _RESERVED: Final = frozenset({"graph_entry", "graph_exit"})
 
 
 class Extracted(msgspec.Struct, frozen=True, tag="extracted", tag_field="kind"):
-    """The new graph, and the old one in which the action `key` stands for it.
-
-    `differences`: how the two may behave otherwise than the graph did; without any they do the
-    same.
-    """
+    """The new graph `inner`, and the old one, `outer`, in which the action `key` stands for it.
+    `differences`: ways in which the two may behave differently from the old graph; if empty,
+    they behave the same."""
 
     inner: Graph
     outer: Graph
@@ -55,8 +53,8 @@ Extraction: TypeAlias = Extracted | Unextractable
 
 
 def extracted(graph: Graph, chosen: Collection[Key], name: str, key: Key) -> Extraction:
-    """Make these actions a graph of this name. `key`: the key of the action that will stand for
-    it."""
+    """Move the `chosen` actions into a new graph of this name. `key`: the key of the action that
+    will stand for it."""
     reasons = [*_unfit_names(graph, name), *_unfit(graph, chosen)]
     selection = selection_of(graph, chosen)
     if selection.chosen:
@@ -120,7 +118,7 @@ def _plans(selection: Selection) -> Iterator[CutPlan]:
 
 
 def _differences(graph: Graph, found: CutGraphs) -> tuple[FlatteningReason, ...]:
-    """Return how the two graphs may behave otherwise than the one."""
+    """Return the ways in which both new graphs may behave differently from the old graph."""
     flat = flattened(found.outer, {found.inner.name: found.inner})
     if not isinstance(flat, Flattened):
         return flat.reasons

@@ -164,8 +164,8 @@ class FlatOrigin(msgspec.Struct, frozen=True):
 
 
 class LeftOut(msgspec.Struct, frozen=True):
-    """The description and unknown fields of an action that was a sub-graph, or of that graph, which
-    nothing in the flat graph has."""
+    """The description and unknown fields, of an action that was a sub-graph or of that graph, that
+    the flat graph lacks."""
 
     levels: LevelPath
     fields: tuple[str, ...]
@@ -253,8 +253,8 @@ class _Hierarchy:
     def actions_of(self, graph: Graph) -> int:
         """Return how many actions the flat graph would have.
 
-        They are counted before anything is made, since the number may double with each level. A
-        graph that contains itself or lies too deep counts once and is refused elsewhere.
+        This is computed before any graph is made, since the number may double with each level. A
+        graph that contains itself or lies too deep counts once and is refused later.
         """
         counts: dict[str, int] = {}
 
@@ -324,7 +324,8 @@ class _Hierarchy:
         given: frozenset[str],
         reasons: list[FlatteningReason],
     ) -> _Found:
-        """Put all sub-graphs of a graph in their places, unless a reason is found against it."""
+        """Replace each action that stands for a sub-graph by the flat sub-graph, unless there is a
+        reason against it."""
         kept = {a.full_name for a in graph.actions if a.key not in flats}
         flat = _Flat(graph, dict(_origins(graph, flats)), seen.results, _unknown(graph, flats))
         for key, inner in flats.items():

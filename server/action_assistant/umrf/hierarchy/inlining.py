@@ -196,10 +196,10 @@ def inlined(
     kept: set[str],
     room: Room = "always",
 ) -> Inlined:
-    """Return the graph with the actions of `inside` in the place of the action `own`.
+    """Return the graph `around` with the actions of `inside` in place of the action `own`.
 
-    `kept`: full names that no moved action may get. `room`: whether the graph around is moved away
-    even where there is room.
+    `kept`: full names that no moved action may get. `room`: move the actions of `around` away
+    always, or only if something would overlap.
     """
     action = next(a for a in around.actions if a.key == own)
     taken = {a.key for a in around.actions}
@@ -317,7 +317,7 @@ def _instead(arrow: JoinedArrow, order: Callable[[Relation], _Order]) -> _Order:
 
 
 def _ranked(arrows: Iterable[_Arrow]) -> Iterator[Relation]:
-    """The relations with places 0, 1, 2 … as orders."""
+    """Yield the relations with new order numbers 0, 1, 2 … at parent and child."""
     listed = list(arrows)
     by_parent: dict[Key, list[_Arrow]] = {}
     by_child: dict[Key, list[_Arrow]] = {}

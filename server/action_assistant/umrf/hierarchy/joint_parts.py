@@ -38,8 +38,8 @@ def refuse(code: FlatteningCode, message: str) -> None:
 
 
 class JoinedArrow(NamedTuple):
-    """An arrow into or out of a sub-graph. `instead`: the arrow of the graph around that it stands
-    for; `place`: its number among the arrows that stand for that one."""
+    """An arrow into or out of a sub-graph. `instead`: the arrow of the outer graph that it
+    replaces; `place`: its number among the replacements of that arrow."""
 
     relation: Relation
     instead: Relation
@@ -47,12 +47,12 @@ class JoinedArrow(NamedTuple):
 
 
 class SubGraphPlace(NamedTuple):
-    """A sub-graph at its place. `around`: the graph, in which other sub-graphs are in place
-    already.
+    """A sub-graph `inside`, its `action`, and the graph `around`, in which other sub-graphs are
+    inlined already.
 
-    `given`: inputs that `around` takes from the graph around it. `lacks`: inputs can be missing
-    when everything else that the action waits for is there. `bypassed`: the outcomes by which the
-    action can be bypassed.
+    `given`: inputs that `around` gets from its own outer graph. `lacks`: an input can be missing
+    when the action's parents have all ended. `bypassed`: outcomes by which the action can be
+    bypassed.
     """
 
     around: Graph

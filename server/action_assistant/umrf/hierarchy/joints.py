@@ -112,8 +112,8 @@ def _may_go_on(exits: Sequence[Relation]) -> bool:
 
 
 def _composed(end: Conditions, following: Conditions) -> Conditions:
-    """Return the conditions of what follows the sub-graph, as conditions of the action that ends
-    it."""
+    """Return the conditions of an arrow that follows the sub-graph, as conditions of an arrow from
+    the action that ends it."""
     answers = {
         outcome: following.answer(outcome) if end.answer(outcome) != "ignore" else "ignore"
         for outcome in PRECONDITIONS
@@ -217,8 +217,7 @@ def _got(parts: Iterator[_Part], against: list[JoinRefused]) -> Iterator[_Part]:
 
 
 def _lets_through(inside: Graph, outcome: Precondition) -> bool:
-    """Return whether a bypass of the entry leads to the exit by bypasses, one after the other, and
-    nowhere else."""
+    """Return whether a bypass of the entry passes through to the exit by bypasses alone."""
     entries, exits = ends_of(inside)
     if len(entries) != 1 or (len(exits) > 1 and any(r.required for r in exits)):
         return False

@@ -18,10 +18,10 @@ from action_assistant.umrf.model import Action, Graph, Key
 
 
 class Unpacked(msgspec.Struct, frozen=True, tag="unpacked", tag_field="kind"):
-    """The graph with the actions `keys` in the place of one.
+    """The graph with the actions `keys` in place of one action.
 
-    `differences`: how it may behave otherwise than the hierarchy did; without any it does the same.
-    `left_out`: fields of the replaced action that no action has now.
+    `differences`: ways in which it may behave differently; if empty, it behaves the same.
+    `left_out`: fields of the replaced action that are lost.
     """
 
     graph: Graph

@@ -31,8 +31,8 @@ class UnfinishedFile(msgspec.Struct, frozen=True):
 
 
 class GenerationBase(msgspec.Struct, frozen=True):
-    """Generated texts by path below the package. `unfinished` is set while a call writes, or if the
-    call was killed."""
+    """The generated texts by path below the package. `unfinished`: files that a running or killed
+    call is writing."""
 
     files: dict[str, bytes] = {}
     unfinished: dict[str, UnfinishedFile] = {}

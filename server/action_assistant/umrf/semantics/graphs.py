@@ -65,7 +65,7 @@ class Graphs(Core):
             command()
 
     def _free(self) -> None:
-        """Run the commands that wait, since the command that kept the engine busy is done."""
+        """Run the waiting commands, since the command that kept the engine busy is done."""
         self._busy = False
         while self._waiting and not self._busy and not self.crashed and not self.locked:
             try:
@@ -169,7 +169,7 @@ class Graphs(Core):
         self._graph_state(old, "UNINITIALIZED")
 
     def _again(self, old: Running, new: Running, *, matched: bool) -> None:
-        """Start a graph whose name the engine already holds."""
+        """Start a graph although the engine holds one of that name."""
         if any(node.holds_thread(self.now) for node in old.nodes.values()):
             self._command(partial(self._replace, old, new, matched))
             return

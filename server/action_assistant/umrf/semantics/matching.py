@@ -17,7 +17,7 @@ BUDGET: Final = 20_000
 
 
 class Unresolved(msgspec.Struct, frozen=True):
-    """A sub-graph that the engine does not look for. `name`: the sub-graph; `action`: the action of
+    """A sub-graph that the engine does not look up. `name`: the sub-graph; `action`: the action of
     the top graph that leads to it.
 
     `recursion`: it is one of the graphs around it. `again`: the engine has used it already, in the

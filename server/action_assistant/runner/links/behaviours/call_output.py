@@ -82,7 +82,7 @@ class LineReader:
 
 
 class CallOutput:
-    """The checked output of one call. `types` are the types of the action's outputs, by flat name."""
+    """The checked output of one call. `types`: the types of the action's outputs, by flat name."""
 
     def __init__(self, types: dict[str, str]) -> None:
         self._types = types
@@ -107,7 +107,7 @@ class CallOutput:
                 self.done = self.done or said
 
     def take_printed(self, line: bytes) -> None:
-        """Take in one line that the behaviour has printed."""
+        """Add one line that the behaviour has printed."""
         self._printed.add(line.decode(errors="replace"))
 
     def text(self, *more: str) -> str | None:
@@ -127,7 +127,7 @@ class CallOutput:
 
 
 class _Kept:
-    """Keeps the first lines, and counts the others."""
+    """Keeps the first lines, and counts the omitted ones."""
 
     def __init__(self) -> None:
         self._lines: list[str] = []
@@ -146,8 +146,8 @@ class _Kept:
 
 
 def value_of(kind: str, value: Any) -> Any:
-    """Return a value as an engine holds one of this type, numbers as floats. A type that is not native may have
-    any value. Raises ValueError, OverflowError."""
+    """Return a value as an engine holds it for this type, numbers as floats; any value for a type
+    that is not native. Raise ValueError or OverflowError if it does not have the type."""
     if kind.endswith("s") and (one := kind[:-1]) in _NATIVE:
         if not isinstance(value, list):
             raise ValueError

@@ -25,8 +25,8 @@ _PENDING: Final = 65_536  # bytes of commands that wait; further ones are droppe
 
 
 class CallProcess:
-    """A call of a behaviour that goes on. `ended` is called once, on another thread, when every process of the
-    call has ended."""
+    """A running call of a behaviour. `ended` is called once, on another thread, when every process
+    of the call has ended."""
 
     def __init__(
         self, folder: BehaviourFolder, call: Call, ended: Callable[[Returned], None]
@@ -96,8 +96,8 @@ class CallProcess:
         )
 
     def _run(self) -> str:
-        """Start the process, read its output and wait for its end; return what went wrong, or "". Raises OSError,
-        Unusable."""
+        """Start the process, read its output and wait for its end; return what went wrong, or "".
+        Raise OSError if it cannot be started, Unusable if the behaviour cannot be read."""
         source = self._folder.source(self._call.name)
         order = {
             "kind": "run",
@@ -140,7 +140,8 @@ class CallProcess:
             self._take(lines.end)
 
     def _write_on(self, supervisor: Supervisor, selector: selectors.BaseSelector) -> None:
-        """Write as much to the behaviour as it takes, and have the selector report when it takes more."""
+        """Write as much to the behaviour as it accepts, and let the selector report when it accepts
+        more."""
         if self._order:
             self._order = self._order[supervisor.write(self._order) :]
         with self._lock:

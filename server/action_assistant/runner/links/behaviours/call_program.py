@@ -49,8 +49,8 @@ class PerformedAction:
         return self._stopped
 
     def sleep(self, seconds: float) -> bool:
-        """Wait for so many seconds; a pause does not count. Returns False at once when the action was told to
-        stop: then `run` should return soon."""
+        """Wait for so many seconds, not counting a pause. Return False at once if the action is
+        told to stop; `run` should return soon then."""
         left = float(seconds)
         with self._changed:
             while not self._stopped and (self._paused or left > 0):

@@ -25,8 +25,9 @@ class Unusable(Exception):
 
 
 class BehaviourList(msgspec.Struct, frozen=True):
-    """The list of behaviours in a folder. `names` are in snake case, as the files without `.py`; `refused` are
-    those that cannot be run, with the reason; `problem` is why the folder cannot be read, "" if it can."""
+    """The behaviours in a folder. `names`: in snake case, as the files without `.py`; `refused`:
+    those that cannot be run, with the reason; `problem`: why the folder cannot be read, "" if it
+    can."""
 
     names: tuple[str, ...] = ()
     refused: dict[str, str] = {}
@@ -34,13 +35,15 @@ class BehaviourList(msgspec.Struct, frozen=True):
 
 
 class BehaviourFolder(msgspec.Struct, frozen=True):
-    """A folder with one Python file for each action that has a behaviour; the administrator names it."""
+    """A folder with one Python file for each action that has a behaviour, named by the
+    administrator."""
 
     path: Path
 
     @classmethod
     def opened(cls, path: Path) -> "BehaviourFolder":
-        """Return the folder at `path`. Raises CannotStart when there is none, and outside of Linux."""
+        """Return the folder at `path`. Raise CannotStart if it does not exist, or the system is not
+        Linux."""
         if sys.platform != "linux":
             raise CannotStart("Behaviours need Linux, which ends their processes for certain.")
         found = cls(path.absolute())
@@ -53,7 +56,7 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
         return found
 
     def has(self, name: str) -> bool:
-        """Return whether there is a file for actions of this name, usable or not."""
+        """Return whether a file for actions of this name exists, usable or not."""
         if (file := file_of(name)) is None:
             return False
         try:
@@ -114,7 +117,8 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
 
 
 def file_of(name: str) -> str | None:
-    """Return the file name for an action of this name; None for names that no action package can have."""
+    """Return the file name for an action of this name; None for a name that no action package can
+    have."""
     return None if check_name(name) else f"{snake_case(name)}.py"
 
 

@@ -26,8 +26,8 @@ _ARENA_MAX: Final = -8  # M_ARENA_MAX of glibc
 
 
 def bound_address_space() -> None:
-    """Save address space in a process that has little: threads get small stacks and share one heap (glibc would
-    reserve 64 MB for each thread)."""
+    """Save address space: threads get small stacks and share one heap (glibc would reserve 64 MB
+    for each thread)."""
     threading.stack_size(_STACK)
     if mallopt := getattr(ctypes.CDLL(None), "mallopt", None):
         mallopt(_ARENA_MAX, 1)
@@ -46,12 +46,12 @@ class BehaviourPerformer:
 
     @property
     def is_killing(self) -> bool:
-        """True while a call that was given up may still run."""
+        """True while a killed call may still run."""
         with self._lock:
             return bool(self._given_up)
 
     def performs(self, name: str) -> bool:
-        """Return whether there is a file for actions of this name, usable or not."""
+        """Return whether a file for actions of this name exists, usable or not."""
         return self._folder.has(name)
 
     def begin(self, call: Call) -> None:
@@ -83,7 +83,7 @@ class BehaviourPerformer:
         self._tell(number, "resume")
 
     def give_up(self, number: int) -> str | None:
-        """Kill a call; return its messages so far, None when it has ended already."""
+        """Kill a call; return its messages so far, None if it has ended already."""
         with self._lock:
             process = self._calls.get(number)
             if process is None:
@@ -100,7 +100,7 @@ class BehaviourPerformer:
 
     @property
     def is_busy(self) -> bool:
-        """True while a call goes on, or `taken` has a result."""
+        """True while a call runs, or `taken` has a result."""
         with self._lock:
             return bool(self._calls or self._returned)
 
@@ -110,7 +110,7 @@ class BehaviourPerformer:
         return bool(self._returned)
 
     def kill_all(self) -> list[CallProcess]:
-        """Kill all calls; return those that were going on."""
+        """Kill all calls; return those that were running."""
         with self._lock:
             going = list(self._calls.values())
         for process in going:

@@ -73,7 +73,7 @@ def _next(
     now: float,
     graph: Graph,
 ) -> list[Trace]:
-    """Carry out what is due at `now` (ms): commands, results of behaviours, steps of the engine."""
+    """Process what is due at `now` (ms): commands, results of behaviours, steps of the engine."""
     traces: list[Trace] = []
     while pending and pending[0][0] <= now:
         at_ms, verb, name = pending.pop(0)

@@ -93,7 +93,8 @@ class Supervisor:
 
     @property
     def patience(self) -> float | None:
-        """Seconds after which `is_over` has to be asked again although nothing was read; None for never."""
+        """The seconds after which `is_over` has to be called again even without output; None for
+        never."""
         return None if self._let_go is None else _AGAIN_S
 
     def let_go(self) -> None:

@@ -19,10 +19,11 @@ _MAKE: Final = "`make ros` in a checkout, or `source` the ROS 2 workspace before
 def ros2_reach(
     clock_us: Callable[[], int], environ: Mapping[str, str] = os.environ
 ) -> "Reach | str":
-    """Return a reach over ROS 2, or one sentence that says why this process can have none.
+    """Return a reach over ROS 2, or one sentence why this process can have none. `clock_us`: gives
+    microseconds UTC.
 
-    `clock_us` gives microseconds UTC. rclpy is imported here and not before: an editor's computer has
-    none, and its wheels start their interpreter anew.
+    rclpy is imported only here, since an editor's computer has none, and its wheels restart their
+    interpreter.
     """
     missing = why_not(environ)
     if missing:

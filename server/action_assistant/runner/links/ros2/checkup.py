@@ -43,8 +43,8 @@ async def look(
     clock_us: Callable[[], int],
     environ: Mapping[str, str] = os.environ,
 ) -> list[Diagnostic]:
-    """Return all findings, those about the environment first. Takes some seconds; a fault of ROS 2 is a finding
-    and raises nothing."""
+    """Return all findings, those about the environment first. This takes some seconds; a fault of
+    ROS 2 is a finding and not raised."""
     seen = [*_sourced(environ), *_domain(environ)]
     reach = ros2_reach(clock_us, environ)
     if isinstance(reach, str):
@@ -140,8 +140,8 @@ def _domain(environ: Mapping[str, str]) -> list[Diagnostic]:
 
 
 def shared_memory(environ: Mapping[str, str]) -> list[Diagnostic]:
-    """Return what keeps nodes of this computer from sharing memory with this process. Missing shared memory is
-    another check's."""
+    """Return the reasons that keep nodes of this computer from sharing memory with this process.
+    Another check reports missing shared memory."""
     if not sys.platform.startswith("linux") or _SAYS_FASTRTPS in environ:
         return []
     seen: list[Diagnostic] = []
@@ -180,7 +180,7 @@ def _is_private() -> bool:
 
 
 def _owners() -> set[int]:
-    """Return the ids of the users whose nodes have shared memory here. Files may vanish meanwhile."""
+    """Return the ids of the users whose nodes have shared memory on this computer."""
     found: set[int] = set()
     for each in _SHM.glob("fastrtps_*"):
         with suppress(OSError):
@@ -233,8 +233,8 @@ async def _answering(link: Link) -> None:
 def _likely(
     unseen: Sequence[Registration], strangers: Sequence[Candidate]
 ) -> dict[str, list[Candidate]]:
-    """Return the engines on another domain that may be a robot, by its name: those that say that name, and,
-    if one robot alone is missing, those that say none."""
+    """Return, by robot, the engines on other domains that may be the robot's: those with its name
+    and, if it is the only missing robot, those without a name."""
     nameless = len(unseen) == 1
     found = {
         robot.name: [
@@ -274,7 +274,8 @@ def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidat
 
 
 def _silent(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
-    """Return the finding for a robot that does not answer, with the reason as far as it can be seen from here."""
+    """Return the finding for a robot that does not answer, with the reason, if it is visible from
+    this computer."""
     if "RMW_IMPLEMENTATION" in standing.why:
         return found(
             "robot-middleware",
@@ -313,8 +314,9 @@ def _engines(
     strangers: Sequence[Candidate],
     unseen: Sequence[Registration],
 ) -> list[Diagnostic]:
-    """Return findings for engines that nobody registered, and for faults of any engine. `unseen` are robots of
-    which no engine is seen; an engine that says no name may be any of them, which is said with the engine."""
+    """Return findings for unregistered engines, and for faults of any engine. `unseen`: robots
+    whose engine is not seen; an engine without a name may be any of them, which the finding
+    says."""
     seen: list[Diagnostic] = []
     for each in candidates:
         place = f"{each.get_service}, domain {each.domain}"

@@ -177,8 +177,8 @@ class Domain:
         return tuple(name for name, kinds in found if _KIND in kinds and self.servers(name))
 
     def bystanders(self, path: str) -> frozenset[str]:
-        """Return the processes that do what no engine of a path does while it comes up: they serve
-        another path, publish starts, or hear feedback."""
+        """Return the processes that do what no engine of a path does while it starts up: serve
+        another path, publish starts, or receive feedback."""
         own = _absolute(path)
         ends = [*self.publishers(self.topics.start), *self.listeners(self.topics.feedback)]
         for each in self.paths():
@@ -239,8 +239,8 @@ class Domain:
         self._node.create_subscription(kind, topic, heard, qos(50))
 
     def _sender(self, topic: str) -> str:
-        """Return the logger name of the one publisher on a topic; "" when there are several, since the
-        middleware does not say which one has sent a message."""
+        """Return the logger name of the only publisher on a topic; "" if there are several, since
+        the middleware does not identify the sender."""
         loggers = {each.logger for each in self.publishers(topic)}
         return loggers.pop() if len(loggers) == 1 else ""
 
@@ -308,8 +308,8 @@ def _endpoint(info: TopicEndpointInfo) -> Endpoint:
 
 
 def _named(message: Message) -> tuple[str, str]:
-    """Return the name of the graph that a command is about, as engines see it, and the text of the graph. A
-    name inside the text counts more than the one beside it."""
+    """Return the name of the graph that a command concerns, as engines see it, and the text of the
+    graph. A name inside the text overrides the one beside it."""
     match message:
         case UmrfGraphStart(umrf_graph_json=text) | UmrfGraphModify(modified_graph=text):
             return (
@@ -320,8 +320,8 @@ def _named(message: Message) -> tuple[str, str]:
 
 
 def _read(response: UmrfGraphGet.Response, asked_at: int, at: int) -> GetResult:
-    """Decode an answer. Raises NotAGraph for any graph in it that cannot be read: an answer that is not wholly
-    understood proves nothing."""
+    """Decode an answer. Raise NotAGraph if any graph in it cannot be read, since an answer that is
+    not completely understood proves nothing."""
     texts, graphs = {}, []
     for text in response.graph_jsons_running:
         shown = snapshot(text, at=at, source="get", asked_at=asked_at)

@@ -117,8 +117,8 @@ class Ros2Link:
         await domain.outlets.send_start(self._name, order.run, message, leaves)
 
     async def stop(self, graph_name: str) -> None:
-        """Publish one stop message, also when nobody seems to listen, since discovery lags behind. Raises
-        NotSent, after the message has left where only the listener is missing."""
+        """Publish one stop message, also if no listener is visible, since discovery lags behind.
+        Raise NotSent if it could not be sent, or, after it was sent, if no listener is known."""
         domain = self._joined()
         with _sent_or_not():
             await domain.outlets.send_stop(graph_name, self._name)
@@ -210,7 +210,8 @@ class Ros2Link:
     # --- life ---------------------------------------------------------------------------------
 
     async def run(self) -> None:
-        """Join the domain, look every second who is there, and send a get when there was none for 10 s."""
+        """Join the domain, examine discovery every second, and send a get if there was none for 10
+        s."""
         domain = await self._joining()
         domain.client(self._path)
         self._domain = domain
@@ -335,7 +336,7 @@ class Ros2Link:
             )
 
     def _actor(self, domain: Domain) -> str:
-        """Return the name that this robot's feedback carries; "" where that cannot be told."""
+        """Return the name that this robot's feedback carries; "" if unknown."""
         if self._name in domain.actors:
             return self._name
         alone = len(domain.actors) == 1 and self._alone(domain)
@@ -373,8 +374,8 @@ class Ros2Link:
                 assert_never(value)
 
     def _hear_feedback(self, value: Feedback) -> None:
-        """Report feedback of this robot. With several engines on a domain the name inside tells them apart;
-        snapshots that carry a run of this link are reported under any name."""
+        """Report feedback of this robot. On a domain with several engines the actor name decides;
+        snapshots with a run of this link are reported under any name."""
         domain = self._domain
         if domain is None:
             return
@@ -387,7 +388,8 @@ class Ros2Link:
         self._subscribers.tell(value)
 
     def _said(self, logger: str) -> bool:
-        """Return whether a log line can only be from this engine; nodes of one name cannot be told apart."""
+        """Return whether a log line certainly comes from this engine; nodes of equal names cannot
+        be distinguished."""
         domain = self._domain
         if domain is None:
             return False
@@ -403,8 +405,8 @@ class Ros2Link:
 
 @contextmanager
 def _sent_or_not() -> Iterator[None]:
-    """Turn an error of the middleware into NotSent. Not for starts: one that failed may have left all the
-    same."""
+    """Turn an error of the middleware into NotSent. Not for starts, since a failed one may have
+    been sent."""
     try:
         yield
     except RuntimeError as error:

@@ -16,14 +16,13 @@ _NAMELESS: Final = "_NODE_NAME_UNKNOWN_"
 
 
 class Newcomers:
-    """Tells which listeners to starts may be a second engine of one path.
+    """Decides which listeners to starts may be a second engine of one path.
 
-    A listener is known to be something else when its process is shown doing what an engine that comes up
-    does not do (`others`). One of another node name than the engine's is also taken for something else
-    while an engine serves the path and the listener has served no get for 10 s. One of the engine's own
-    node name, or of a name that is not known yet, never is: no time tells how long an engine takes to
-    come up. The name counts only beside an engine that serves, whose name is known, so it is judged anew
-    each time.
+    A listener is certainly no engine if its process does what a starting engine does not do
+    (`others`). A listener with another node name than the engine's is also dismissed if an engine
+    serves the path and the listener has served no get for 10 s. One with the engine's node name, or
+    without a known name, is never dismissed, since an engine may take any time to start. Names
+    count only while an engine with a known name serves, so they are judged again each time.
     """
 
     def __init__(self) -> None:
@@ -39,9 +38,9 @@ class Newcomers:
     ) -> tuple[str, ...]:
         """Return the names of the nodes among `listeners` that may be a second engine.
 
-        `servers` serve the path. `others` gives the processes that serve another path, publish starts
-        or hear feedback; it is called only where there is a listener to be judged. `at` is now, in
-        seconds of a clock that never goes back.
+        `servers`: serve the path. `others`: returns the processes that serve another path, publish
+        starts or receive feedback; called only if needed. `at`: now, in seconds of a monotonic
+        clock.
         """
         present = {each.gid for each in listeners}
         self._known &= present

@@ -90,8 +90,9 @@ class Outlet(Generic[M]):
                 self._free_at = time.monotonic() + GAP_S
 
     def sent(self, message: Message, stamp: int | None) -> bool:
-        """Return whether a message on this topic is one of this process: the same text, and stamped by its
-        sender (nanoseconds UTC) while this process was publishing it. Called on any thread."""
+        """Return whether a message on this topic was sent by this process: the same text, with a
+        time stamp (nanoseconds UTC) from while this process was publishing it. Called on any
+        thread."""
         horizon = time.time_ns() - int(_ECHO_S * 1e9)
         return any(
             mark.since >= horizon
@@ -135,7 +136,7 @@ class Outlets:
             await self.start.send(leaving)
 
     def shown(self, graphs: Iterable[Snapshot]) -> None:
-        """Note which graphs engines show: the start of one of them was taken in."""
+        """Note the graphs that engines show: a start whose run is among them was received."""
         last = self._untaken
         if last is not None and any(each.run == last.run for each in graphs):
             last.taken.set()
@@ -147,8 +148,8 @@ class Outlets:
             last.taken.set()
 
     async def send_stop(self, graph: str, target: str) -> None:
-        """Publish a stop. Stops of one graph that wait for their turn leave as one message, with every robot
-        as a target; if that message cannot be published, each of the calls raises."""
+        """Publish a stop. Waiting stops of one graph are sent as one message, with every robot as a
+        target; if it cannot be published, each call raises."""
         stops = self._stopping.setdefault(graph, _Stops())
         stops.targets.append(target)
 
@@ -178,7 +179,7 @@ class Outlets:
 
 
 class _Untaken:
-    """A start that has left and is not known yet to have been taken in."""
+    """A start that was sent and is not yet known to be received."""
 
     def __init__(self, robot: str, run: str, receipt: str) -> None:
         self.robot, self.run = robot, run
@@ -188,7 +189,7 @@ class _Untaken:
 
 
 class _Stops:
-    """The stops of one graph that wait to leave as one message."""
+    """The waiting stops of one graph, which are sent as one message."""
 
     def __init__(self) -> None:
         self.targets: list[str] = []

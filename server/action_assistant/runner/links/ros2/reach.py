@@ -21,8 +21,8 @@ from action_assistant.umrf.facts import PINNED, EngineFacts
 
 
 class Ros2:
-    """Makes links, and holds the domains that they share. There is one in a process, since a process has one
-    middleware, chosen by RMW_IMPLEMENTATION at its start."""
+    """Makes links, and holds the domains that they share. There is one per process, since a process
+    has one middleware, chosen by RMW_IMPLEMENTATION at its start."""
 
     def __init__(self, clock_us: Callable[[], int], home: int) -> None:
         self._clock_us = clock_us

@@ -22,8 +22,9 @@ _GRAPH: Final = re.compile(
 
 
 class Endpoint(msgspec.Struct, frozen=True):
-    """A publisher, subscription or server on a domain. `gid` changes with every restart; `process` is the part
-    of it that all endpoints of one process share. `logger` is the name under which the node logs."""
+    """A publisher, subscription or server on a domain. `gid` changes with every restart; `process`:
+    its part that all endpoints of one process share. `logger`: the name under which the node
+    logs."""
 
     gid: str
     process: str
@@ -32,7 +33,7 @@ class Endpoint(msgspec.Struct, frozen=True):
 
 
 class OverheardCommand(msgspec.Struct, frozen=True, kw_only=True):
-    """A command that somebody else published. `graph` is the name that engines go by."""
+    """A command that somebody else published. `graph`: the name that engines use."""
 
     command: Command
     graph: str
@@ -58,8 +59,8 @@ RosValue: TypeAlias = Feedback | OverheardCommand | LogLine
 
 
 class GetResult(msgspec.Struct, frozen=True, kw_only=True):
-    """The answer of a server. `graphs` and `texts` (by running name) are those that it runs or has run; the
-    others are the UMRF texts of its index."""
+    """The answer of a server. `graphs` and `texts` (by running name): those that it runs or has
+    run; the other fields: the UMRF texts of its index."""
 
     graphs: tuple[Snapshot, ...]
     texts: dict[str, str]
