@@ -45,7 +45,7 @@ HISTORIES = int(os.environ.get("TEST_HISTORIES", "10"))
 #: that a graph with a loading action had finished; a start of ours that somebody played again while the
 #: last answer of the proof was on its way; a start that had waited for the graph of its name to end, of
 #: which the emulated robot showed the old actions' states then.
-KNOWN = (601, 621, 3378, 43518)
+KNOWN = (601, 621, 3378, 43518, 103804)
 FIRST = int(os.environ.get("TEST_HISTORIES_FROM", "0"))
 #: For how long an engine that comes up later hears starts before it serves its get.
 GAPS_S = (0.0, 0.0, 0.3, 3.0, 8.0)
@@ -278,12 +278,14 @@ class Story:
             for node in [each for each in self.network.nodes if not each.robot.gone][:-1]:
                 self.network.kill(node)
             control.stop_all(BEN)
-            for _ in range(2):  # feedback that nobody can contradict opens one again for a moment
+            for turn in range(4):  # feedback that nobody can contradict opens one again for a moment
                 with anyio.move_on_after(60):
                     while control.open:
                         await anyio.sleep(0.5)
                         self.look_at_robots(control)
                 await anyio.sleep(5)
+                if turn and not control.open:
+                    break
             moving = self.moving()
             names = self.names()
             for run, opened in control.open.items():  # it does not obey, or is blocked for ever
