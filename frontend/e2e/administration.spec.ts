@@ -29,7 +29,7 @@ test("an owner sees both processes, and what doctor finds, without a mouse", asy
   await expect(page.getByRole("region", { name: "Backups" })).toContainText("none was made");
   const doctor = page.getByRole("region", { name: "Doctor" });
   await doctor.getByRole("button", { name: "Look for faults" }).press("Enter");
-  await expect(doctor.getByRole("status")).toContainText("Looking");
+  await expect(doctor.getByRole("status")).toContainText("Checking");
   await expect(doctor.getByRole("button", { name: "Look again" })).toBeEnabled({ timeout: 90_000 });
   await expect(doctor.getByRole("status")).toContainText(/Nothing is wrong|wrong|matter/);
   for (const colorScheme of ["light", "dark"] as const) {

@@ -202,7 +202,7 @@ test("keys walk the graph, open menus, find commands and copy links", async ({ b
   await expect(card(mari.page, "Wait", 2)).toHaveClass(/selected/);
   await expect(card(mari.page, "Wait", 2)).toBeInViewport();
   await mari.page.goto(`${product.url}/graphs/${id}?action=AAAAAAAAAAAA&problem=H8`);
-  await expect(mari.page.getByText("not in this graph any more")).toBeVisible();
+  await expect(mari.page.getByText("no longer in this graph")).toBeVisible();
   await expect(mari.page.getByRole("tab", { name: /^Problems/ })).toHaveAttribute(
     "aria-selected",
     "true",
@@ -243,7 +243,7 @@ test("a dry-run is played by keys and records nothing", async ({ browser }) => {
   // One fault: it never ends; and Stop is pressed.
   await bar.getByRole("button", { name: "Fault" }).click();
   await page.getByRole("menuitem", { name: "Never ends" }).click();
-  await expect(bar).toContainText("This never ends by itself");
+  await expect(bar).toContainText("The running actions never end on their own");
   await bar.getByRole("button", { name: /Never ends/ }).click();
   await page.getByRole("menuitem", { name: "Stop is pressed now" }).click();
   await expect(bar).toContainText("Wait 2 is asked to stop");

@@ -230,7 +230,7 @@ test("files of actions are imported into the library, many at once", async ({ br
   ]);
   await expect(list(page).getByRole("link", { name: /WatchHatch/ })).toBeVisible();
   await expect(page.getByText("d.json:")).toBeVisible();
-  await page.getByRole("button", { name: "Make them what the files say" }).click();
+  await page.getByRole("button", { name: "Replace them by the files" }).click();
   await list(page)
     .getByRole("link", { name: /OpenHatch/ })
     .click();

@@ -299,7 +299,9 @@ test.describe("where the proxy is not as it should be", () => {
     const change = (text: string) => text.replace("location /temoto/runner/", "location /nowhere/");
     await through(change, async (proxy) => {
       const { page, context } = await arrive(browser, proxy);
-      await expect(alert(page)).toContainText("it has to lead it to the runner");
+      await expect(alert(page)).toContainText(
+        "the proxy has to forward this address to the runner",
+      );
       await context.close();
     });
   });

@@ -221,7 +221,7 @@ test("a run that failed opens as a dry-run at any of its moments, and goes on ot
   await expect(card(page, "Wait").getByText("true")).toBeVisible(); // as it was then
   await expect(bar.getByText(`in run ${bad.number}`)).toHaveText(/error/);
   await bar.getByRole("button", { name: new RegExp(`^From run ${bad.number}`) }).click();
-  await expect(page.getByText("With which values 2 of 2 actions ran was not seen")).toBeVisible();
+  await expect(page.getByText("The values of 2 of 2 actions were not seen")).toBeVisible();
   await page.keyboard.press("Escape");
   await bar.getByRole("group").getByRole("button", { name: /true/ }).click();
   await expect(card(page, "Wait", 1).getByText("true")).toBeVisible();

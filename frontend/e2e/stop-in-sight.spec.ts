@@ -207,7 +207,7 @@ test("whichever component throws, STOP stands and stops, and the page says what 
   const parts = /\/assets\/(page|ui)-.*\.js/;
   await page.route(parts, (route) => route.abort());
   await page.goto(`${product.url}/runs/${run}`);
-  await expect(broken).toContainText("did not arrive");
+  await expect(broken).toContainText("did not load");
   await expect(stopOf(page)).toContainText("1 run");
   await page.unroute(parts);
   await page.route(parts, (route) => route.fulfill({ contentType: "text/javascript", body: "?" }));

@@ -25,7 +25,7 @@ const sends = (method: string, body: string) => ({
 });
 
 const problems = (page: Page) =>
-  page.getByRole("button", { name: /this keeps it from starting|1 wrong/ });
+  page.getByRole("button", { name: /this prevents a start|1 wrong/ });
 
 test.beforeAll(async ({ browser }) => {
   await product.start();

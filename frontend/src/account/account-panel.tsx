@@ -127,8 +127,8 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
         )}
         {!window.isSecureContext && (
           <Text size="sm" c="dimmed">
-            This page came without TLS: reading the clipboard by a button, and opening without a
-            server, need <code>--tls</code>.
+            This page was loaded without TLS. Pasting with a button, and opening the page while the
+            server is off, need <code>--tls</code>.
           </Text>
         )}
         <Appearance />

@@ -47,8 +47,8 @@ function Where({ secure, proxied, reached }: Record<"secure" | "proxied" | "reac
       <p className={style.where} data-tone="off">
         <IconPlugConnectedX size={18} aria-hidden />
         <span>
-          <b>Only this computer reaches this server.</b> Stop it and start it again with{" "}
-          <code>action-assistant serve --share</code>; links that you make now work then.
+          <b>Only this computer reaches this server.</b> Restart the server with{" "}
+          <code>action-assistant serve --share</code>. Links that you make now work after that.
         </span>
       </p>
     );
@@ -62,8 +62,8 @@ function Where({ secure, proxied, reached }: Record<"secure" | "proxied" | "reac
           "The proxy in front of this server has the certificate."
         ) : (
           <>
-            Browsers warn others until they trust this server’s authority, the file{" "}
-            <code>tls/ca.pem</code> in its data folder.
+            Browsers of others show a warning until they trust this server’s certificate authority,
+            the file <code>tls/ca.pem</code> in its data folder.
           </>
         )}
       </span>
@@ -107,7 +107,7 @@ function NewLink() {
         onChange={setRole}
       />
       <Text size="sm" c="dimmed">
-        Whoever has the link may {ROLE_WORDS[role]}.
+        Everybody who has the link may {ROLE_WORDS[role]}.
       </Text>
       <Group wrap="nowrap" align="end" gap="sm">
         <TextInput
@@ -213,7 +213,7 @@ const MOST_GUESTS = 6;
 
 /** Return one sentence about the people who came in by a link. */
 export function guestWords(guests: Invitation["guests"]): string {
-  if (guests.length === 0) return "Nobody came in by it yet";
+  if (guests.length === 0) return "Not used yet";
   const names = guests.slice(0, MOST_GUESTS).map(({ person }) => person.name || "Guest");
   const more = guests.length - names.length;
   return `${names.map(isolated).join(", ")}${more > 0 ? ` and ${more} more` : ""} came in`;
@@ -297,7 +297,7 @@ export function ShareLink({ invitation, origin, revoke }: ShareLinkProps) {
       </div>
       {asking && (
         <div className={style.ask} role="alert">
-          <span>Everybody who came in by it is put out at once, everywhere.</span>
+          <span>Everybody who signed in with this link is signed out at once, on all devices.</span>
           <Button size="compact-sm" onClick={() => setAsking(false)}>
             Keep
           </Button>

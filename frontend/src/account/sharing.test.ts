@@ -36,7 +36,7 @@ test("links begin with the place where the owner has the page, unless others can
 });
 
 test("who came in is said by name, and many as a number", () => {
-  expect(guestWords([])).toBe("Nobody came in by it yet");
+  expect(guestWords([])).toBe("Not used yet");
   expect(guestWords([guest("Ada"), guest("")])).toBe("Ada, Guest came in");
   const many = Array.from({ length: 9 }, (_, i) => guest(`P${i}`));
   expect(guestWords(many)).toBe("P0, P1, P2, P3, P4, P5 and 3 more came in");

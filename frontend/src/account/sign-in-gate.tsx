@@ -63,7 +63,9 @@ async function knock(): Promise<Gate> {
     const strange = refused && key?.kind === "token";
     return {
       at: "outside",
-      why: strange ? "The link is of another server, or of an older start." : errorText(error),
+      why: strange
+        ? "This link belongs to another server, or to an earlier start of this server."
+        : errorText(error),
     };
   }
 }
@@ -231,7 +233,7 @@ function OfflineBar() {
     <p className={style.bar} role="status">
       <IconPlugConnectedX size={18} aria-hidden />
       <span>
-        <b>Offline: this is what this device keeps.</b> Robots cannot be started or stopped from
+        <b>Offline: you see the copy on this device.</b> Robots cannot be started or stopped from
         here now; use the hardware stop. Edits wait on this device until the server answers.
       </span>
     </p>

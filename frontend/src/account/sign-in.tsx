@@ -54,8 +54,8 @@ export function SignIn({ why, onOpen }: Props) {
           </Button>
         </form>
         <Text size="xs" c="dimmed" mt="lg">
-          It is your server and you lost the link? Its token is the content of the file{" "}
-          <code>token</code> in its data folder.
+          Is this your server, and you lost the link? Paste its token instead: the content of the
+          file <code>token</code> in the server’s data folder.
         </Text>
       </Paper>
     </main>

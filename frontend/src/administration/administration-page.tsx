@@ -38,7 +38,7 @@ export function AdministrationPage() {
           <Inside />
         ) : (
           <Empty icon={<IconServerCog size={22} />} title="For owners only">
-            Who has the token of this server sees here how its processes are.
+            Only a person who has the token of this server sees the state of its processes here.
           </Empty>
         )}
       </div>
@@ -61,7 +61,7 @@ function factsOf(backups: Backups, now: number): StatusFact[] {
   if (failed_why) facts.push({ name: "Failed since", value: failed_why, isBad: true });
   facts.push({ name: "Last tried", value: proven === null ? "never" : ago(proven, now) });
   if (unsound) facts.push({ name: "The last trial", value: unsound, isBad: true });
-  const due = next === null ? "nobody makes them by a timetable" : span(next - now);
+  const due = next === null ? "no backup is scheduled" : span(next - now);
   facts.push({ name: "The next one", value: next === null ? due : `in ${due}` });
   if (keep) facts.push({ name: "Kept", value: keep });
   return facts;
@@ -79,7 +79,7 @@ export function BackupsCard({ backups, at }: { backups: Backups | null; at: stri
         )}
       </div>
       {backups === null ? (
-        <p className={style.version}>What is known of them cannot be read.</p>
+        <p className={style.version}>The state of the backups cannot be read.</p>
       ) : (
         <Facts facts={factsOf(backups, Date.parse(at))} />
       )}

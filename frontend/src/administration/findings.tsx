@@ -47,7 +47,7 @@ function Looking({ last, seconds }: { last: LastExamination | undefined; seconds
     last?.took_s == null ? "about ten" : `${Math.max(1, Math.round(last.took_s))} last time`;
   return (
     <p className={style.looking} role="status">
-      <Loader size="xs" /> Looking at disks, databases, ports, the clock and ROS 2, for{" "}
+      <Loader size="xs" /> Checking disks, databases, ports, the clock and ROS 2, for{" "}
       {Math.floor(seconds)} s. It takes {usual}.
     </p>
   );
@@ -87,7 +87,7 @@ export function Findings() {
       )}
       {found == null && running === null && !error && (
         <p className={style.version}>
-          The same as <code>action-assistant doctor</code> on the computer of the editor.
+          Runs the checks of <code>action-assistant doctor</code> on the computer of the editor.
         </p>
       )}
       {found != null && (

@@ -116,7 +116,7 @@ export function ProcessCard({ title, asked: { data, error } }: Props) {
       {error && (
         <p className={style.refused} role="alert">
           {errorText(error)}
-          {data && ` What stands below was so ${ago(instant(data.at) ?? 0, serverNow())}.`}
+          {data && ` The figures below are from ${ago(instant(data.at) ?? 0, serverNow())}.`}
         </p>
       )}
       {data && <Lacking status={data} />}

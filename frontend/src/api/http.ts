@@ -82,9 +82,9 @@ function isIdle(url: string, ask: RequestOptions): boolean {
 /** HTTP status codes that only a proxy answers. */
 const BY_PROXIES: ReadonlyMap<number, string> = new Map([
   [413, "Too large for the proxy in front of the server (nginx: client_max_body_size 10m)."],
-  [502, "The proxy in front of the server does not reach it (502)."],
-  [503, "The proxy in front of the server does not reach it (503)."],
-  [504, "The server did not answer the proxy in front of it in time (504)."],
+  [502, "The proxy in front of the server cannot reach the server (502)."],
+  [503, "The proxy in front of the server cannot reach the server (503)."],
+  [504, "The server did not answer its proxy in time (504)."],
 ]);
 
 async function problemOf(response: Response): Promise<ProblemDetails> {

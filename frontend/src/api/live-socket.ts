@@ -503,7 +503,7 @@ function blockedByBrowser(runner: string): UnreachableReason | null {
   if (!encrypted || !runner.startsWith("http:")) return null;
   return {
     kind: "strange",
-    why: `This page came encrypted, and browsers keep it from the runner at ${runner}, which is not. A proxy has to show both: start the server with --public-url ${pageUrl()}/ and lead what is below runner/ to the runner’s port.`,
+    why: `This page is encrypted and the runner at ${runner} is not, so the browser blocks the connection. A proxy has to serve both: start the server with --public-url ${pageUrl()}/ and forward everything below runner/ to the runner’s port.`,
   };
 }
 
@@ -518,7 +518,7 @@ async function findUnreachableReason(runner: string): Promise<UnreachableReason>
   }
   return {
     kind: "mute",
-    why: "The runner answers, but no live connection to it opens: a proxy in between has to pass WebSockets on (nginx: proxy_http_version 1.1, and the headers Upgrade and Connection).",
+    why: "The runner answers, but a live connection to it cannot be opened: a proxy in between has to pass WebSockets on (nginx: proxy_http_version 1.1, and the headers Upgrade and Connection).",
   };
 }
 
@@ -533,7 +533,7 @@ async function unknownTo(runner: string): Promise<UnreachableReason> {
   const here = known === "yes" ? ", though the editor does" : "";
   return {
     kind: "strange",
-    why: `The runner at ${runner} does not know your session${here}. It needs the editor’s token, and the address of this page: --public-url where a proxy stands before them.`,
+    why: `The runner at ${runner} does not know your session${here}. The runner needs the editor’s token and the address of this page (behind a proxy: --public-url).`,
   };
 }
 
@@ -541,7 +541,7 @@ async function astray(runner: string, answer: Response): Promise<string> {
   const problem: unknown = await answer.json().catch(() => null);
   const detail = (problem as { detail?: unknown } | null)?.detail;
   if (typeof detail === "string") return detail;
-  return `What answers at ${runner} is not the runner (${answer.status}): the proxy has to lead it to the runner’s port.`;
+  return `The program that answers at ${runner} is not the runner (${answer.status}): the proxy has to forward this address to the runner’s port.`;
 }
 
 /** A server that was told another host takes this page for one of that host. */
@@ -549,5 +549,5 @@ function stray(runner: string): string {
   const { hostname } = new URL(runner);
   const own = globalThis.location?.hostname ?? hostname;
   if (own === hostname) return "";
-  return ` The server says that it is at ${hostname}, and this page is at ${own}: a proxy before it has to pass on the Host header, and the server needs --public-url ${pageUrl()}/.`;
+  return ` The server says that it is at ${hostname}, and this page is at ${own}: the proxy has to pass on the Host header, and the server needs --public-url ${pageUrl()}/.`;
 }

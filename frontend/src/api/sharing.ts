@@ -15,7 +15,7 @@ export type Sharing = EditorApi["Sharing"];
 
 const KEY = ["invitations"] as const;
 const NOT_AT_THE_RUNNER =
-  "The link is revoked at the editor. A runner with a data folder of its own was not told:";
+  "The link is revoked at the editor. A runner with a data folder of its own was not notified:";
 const LOOK = 4_000; // ms: who came in is seen soon
 
 export function useSharing() {

@@ -37,7 +37,7 @@ const RecordDryRun = lazyPart(() =>
 const NAMED_MS = 3_000;
 
 function unnamed(): never {
-  throw new Error("The editor has not named the moment on screen. Nothing was started.");
+  throw new Error("The editor did not say in time which moment is on screen. Nothing was started.");
 }
 
 interface RunHere {
@@ -246,7 +246,7 @@ function TitledBar(props: { id: string } & Parameters<typeof PageBar>[0]) {
 function Gone() {
   return (
     <Nowhere crumb="Gone" title="There is no such graph">
-      It was deleted, or the address is of another server.
+      It was deleted, or the address belongs to another server.
     </Nowhere>
   );
 }

@@ -23,7 +23,7 @@ export function KeptGraphs() {
             <Link to={`/graphs/${graph}`}>{name || "Untitled"}</Link>
             <span>
               {waiting > 0 && `${waiting === 1 ? "1 change waits" : `${waiting} changes wait`} · `}
-              as it was here on{" "}
+              last seen here on{" "}
               {new Date(usedAt).toLocaleString([], { dateStyle: "medium", timeStyle: "short" })}
             </span>
           </li>

@@ -23,7 +23,7 @@ if (person !== null && credentialIn(location.hash) === null) pageLink.enter(iden
 const isDrawn = () => document.querySelector("#root > .unloaded") === null;
 
 document.getElementById("page-script")?.addEventListener("error", () => {
-  pageError.set("Its parts did not arrive: the server does not answer, or it was updated.");
+  pageError.set("Parts of the page did not load: the server does not answer, or it was updated.");
 });
 window.addEventListener("error", ({ message }) => {
   if (!isDrawn()) pageError.set(message);

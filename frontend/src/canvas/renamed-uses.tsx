@@ -52,8 +52,8 @@ export function RenamedUses({ graph, before, name, uses, onClose }: Props) {
       <Stack gap="sm">
         <p>
           <bdi>“{before}”</bdi> is called <bdi>“{name}”</bdi> now. Actions called{" "}
-          <bdi>“{before}”</bdi> stand for it in {counted(uses.length, "graph")}; if you leave them
-          as they are, they stand for no graph any more.
+          <bdi>“{before}”</bdi> stand for this graph in {counted(uses.length, "graph")}. If you do
+          not rename them, they stand for no graph any more.
         </p>
         {uses.map((use) => (
           <Checkbox

@@ -66,7 +66,7 @@ function Proof() {
     <Tooltip
       width={260}
       onFocus
-      label="A comment carries the name that its page wrote. The history shows who stored each change; that the server vouches for."
+      label="The browser of its author wrote the name on a comment, and the server did not check it. The history shows who stored each change: the server has checked these names."
     >
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: so that the words can be had by keyboard */}
       <p className={style.proof} tabIndex={0}>

@@ -48,7 +48,7 @@ function Covered({ found: { coverage, courses } }: { found: CheckedCourses }) {
     <div className={style.covered}>
       <Progress value={(100 * taken) / arrows} aria-label="Outcomes that are taken" />
       <p>
-        {taken} of {arrows} outcomes of its arrows are taken
+        {taken} of {arrows} outcomes of arrows are taken
       </p>
     </div>
   );
@@ -58,10 +58,12 @@ function Nothing({ context }: { context: EditorContext }) {
   return (
     <div className={style.nothing}>
       <p>
-        An expected course says how this graph has to go. It is held against every later version, at
-        each start and without a robot.
+        An expected course says how this graph has to run. Every later version is checked against
+        it, at each start and without a robot.
       </p>
-      <p>Make one of a dry-run here, or of a run that went well: Run again, Expect this course.</p>
+      <p>
+        Make one from a dry-run here, or from a run that went well: Run again, Expect this course.
+      </p>
       <Button
         size="compact-sm"
         variant="light"
@@ -149,7 +151,7 @@ const SIGNS = { same: "✓", other: "✗", unknown: "?" } as const;
 const READ = {
   same: "as expected",
   other: "goes another way",
-  unknown: "not looked at in time",
+  unknown: "not checked in time",
 } as const;
 
 interface CourseRowProps {

@@ -13,7 +13,7 @@ interface ToldProps {
 
 function Told({ found, error }: ToldProps) {
   if (error) return <p className={style.told}>Expected courses: {errorText(error)}</p>;
-  if (found === undefined) return <p className={style.told}>Expected courses are tried …</p>;
+  if (found === undefined) return <p className={style.told}>Checking the expected courses …</p>;
   const { courses } = found;
   if (courses.length === 0) return null;
   const other = courses.filter(({ same }) => same === false);
@@ -46,7 +46,7 @@ function Told({ found, error }: ToldProps) {
         ))}
         {other.length > MOST && <li>and {other.length - MOST} more</li>}
       </ul>
-      {unknown > 0 && <p>{unknown} could not be looked at in time.</p>}
+      {unknown > 0 && <p>{unknown} could not be checked in time.</p>}
     </div>
   );
 }

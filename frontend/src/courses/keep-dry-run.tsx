@@ -17,7 +17,7 @@ import style from "./courses.module.css";
 /** Return why a dry-run cannot become an expected course; null if it can. */
 function obstacleOf(run: DryRun): string | null {
   if (run.moments.length === 0) return "nothing happens in it";
-  return commandsOf(run.decided).length === 0 ? null : "somebody presses Stop in it";
+  return commandsOf(run.decided).length === 0 ? null : "somebody presses Stop in this dry-run";
 }
 
 export function KeepDryRun({ run }: { run: DryRun }) {
@@ -34,7 +34,7 @@ export function KeepDryRun({ run }: { run: DryRun }) {
     setPanel("courses");
     notifications.show({
       title: "Expected from now on",
-      message: `“${isolated(name)}” is held against every later version of the graph.`,
+      message: `Every later version of the graph is checked against “${isolated(name)}”.`,
     });
   };
   if (naming) {

@@ -41,10 +41,10 @@ function Verdict({ runner, found, arrow, onKept }: VerdictProps) {
   if (proposal.verdict === "unreachable") {
     return (
       <p className={style.verdict} role="status">
-        Nothing takes it, whatever its actions end with and in whatever order:{" "}
+        Nothing can take this outcome, however the actions end and in whatever order:{" "}
         {proposal.states === 0
           ? "no arrow leads there."
-          : `all ${proposal.states} states were looked at.`}
+          : `all ${proposal.states} states were checked.`}
       </p>
     );
   }

@@ -159,7 +159,7 @@ export function ProposeDialog({ draft, onClose }: { draft: GraphDraft; onClose: 
     <Modal opened onClose={onClose} title={<bdi>Propose “{draft.name}”</bdi>}>
       <Textarea
         label="What is it for?"
-        description="Others see it in the history of the graph, look at the draft, and say yes or no."
+        description="Others see this text in the history of the graph, look at the draft, and answer yes or no."
         autosize
         minRows={3}
         maxLength={2000}

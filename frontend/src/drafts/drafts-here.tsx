@@ -43,8 +43,8 @@ function ProposalOf({ draft, onMerge }: DraftRowProps) {
       {mayEdit && (
         <p className={style.quiet}>
           {mine
-            ? "You have proposed it: a second person has to answer."
-            : "One link that is opened in two browsers may be one person."}
+            ? "You made this proposal: a second person has to answer."
+            : "Two browsers that opened the same link may belong to one person."}
         </p>
       )}
       {mayEdit && (
@@ -90,7 +90,7 @@ async function deleteDraft({ id, name }: GraphDraft, client: QueryClient): Promi
   await refreshGraphs(client);
   notifications.show({
     title: `“${isolated(name)}” is deleted`,
-    message: "It can be brought back from the list of graphs.",
+    message: "You can restore it from the list of graphs.",
   });
 }
 

@@ -47,7 +47,7 @@ function useMerge({ draft, into, onClose }: Props) {
       onClose();
       notifications.show({
         title: into === "origin" ? `“${isolated(draft.name)}” is merged` : "Taken over",
-        message: changed ? "The history leads back." : "Everything stays as it was.",
+        message: changed ? "To go back, use the history." : "Nothing changed.",
       });
     });
   return { busy, wrong, merge };
@@ -56,10 +56,10 @@ function useMerge({ draft, into, onClose }: Props) {
 function Intro({ found, draft, into }: Props & { found: MergePreview }) {
   const into_name =
     into === "origin" ? draft.origin_name || "the graph" : `“${isolated(draft.name)}”`;
-  if (isNothing(found.changes)) return <p>As it is chosen, nothing changes.</p>;
+  if (isNothing(found.changes)) return <p>With these choices, nothing changes.</p>;
   return (
     <p>
-      What <bdi>{namesWords(found.authors)}</bdi> did comes into <bdi>{into_name}</bdi>:
+      Changes of <bdi>{namesWords(found.authors)}</bdi> come into <bdi>{into_name}</bdi>:
     </p>
   );
 }
@@ -190,11 +190,11 @@ export function MergeConflicts({ conflicts, choices, names, onChoose }: MergeCon
 }
 
 export function MergeProblems({ problems }: { problems: readonly Problem[] }) {
-  if (problems.length === 0) return <p className={style.quiet}>No problem comes with it.</p>;
+  if (problems.length === 0) return <p className={style.quiet}>The merge brings no problem.</p>;
   return (
-    <section aria-label="Problems that come with it">
+    <section aria-label="Problems that the merge brings">
       <h3>
-        {problems.length === 1 ? "1 problem comes" : `${problems.length} problems come`} with it
+        The merge brings {problems.length === 1 ? "1 problem" : `${problems.length} problems`}
       </h3>
       <ul className={style.problems}>
         {problems.map((problem) => (
@@ -256,7 +256,8 @@ function Compared({ draft }: { draft: GraphDraft }) {
       </div>
       {conflicts.length > 0 && (
         <p className={style.quiet}>
-          Both changed {conflicts.map(({ what }) => what).join(", ")}. A merge asks whose counts.
+          Both changed {conflicts.map(({ what }) => what).join(", ")}. A merge asks which value to
+          keep.
         </p>
       )}
     </>

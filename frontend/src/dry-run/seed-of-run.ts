@@ -35,11 +35,14 @@ function endedBehaviour(node: string, visit: Visit, doubts: SeedDoubt[]): Behavi
       most: bound === Number.POSITIVE_INFINITY ? null : bound / 1000,
     });
     const played = ((least + most) / 2000).toFixed(1);
-    doubts.push({ node, text: `took ${known ?? "an unknown time"}; ${played} s is played` });
+    doubts.push({
+      node,
+      text: `took ${known ?? "an unknown time"}; the dry-run takes ${played} s`,
+    });
   }
   const result = visit.result ?? "true";
   if (visit.result === null) {
-    doubts.push({ node, text: "ended with a result that is not known; true is played" });
+    doubts.push({ node, text: "ended with an unknown result; the dry-run takes true" });
   }
   const after_s = Math.round((least + most) / 2) / 1000;
   if (result === "stopped") return { never: true };
@@ -60,7 +63,7 @@ function seededAction(node: string, action: ActionRun, at: number, doubts: SeedD
   const inputs: Visit["inputs"][] = [];
   let [ended, end]: [number, string | null] = [0, null];
   if (action.older > 0) {
-    doubts.push({ node, text: `its first ${action.older} visits are not kept singly` });
+    doubts.push({ node, text: `its first ${action.older} visits were not recorded one by one` });
   }
   for (const visit of action.visits) {
     const { state, sure } = visitAt(visit, at);
@@ -71,7 +74,7 @@ function seededAction(node: string, action: ActionRun, at: number, doubts: SeedD
           : state === "ended"
             ? "may go on"
             : "may have ended";
-      doubts.push({ node, text: `${may} by then: nobody saw it exactly` });
+      doubts.push({ node, text: `${may} by then: the exact time was not seen` });
     }
     if (state === "not begun") continue;
     inputs.push(visit.inputs);
@@ -93,7 +96,10 @@ function namesNow(run: Run, graph: Graph, doubts: SeedDoubt[]): Map<string, stri
   for (const [name, action] of Object.entries(run.actions ?? {})) {
     if (action.aid === null) {
       if (action.visits.length > 0) {
-        doubts.push({ node: name, text: "is of a sub-graph: it is played as usual" });
+        doubts.push({
+          node: name,
+          text: "belongs to a sub-graph, which the dry-run plays as usual",
+        });
       }
       continue;
     }
@@ -123,7 +129,10 @@ export function seedOf(run: Run, graph: Graph, differs: number, at: number): Dry
   const doubts: SeedDoubt[] = [];
   if (differs > 0) {
     const places = differs === 1 ? "1 place" : `${differs} places`;
-    doubts.push({ node: "", text: `The graph differs from what ran in ${places}; it is played` });
+    doubts.push({
+      node: "",
+      text: `The graph on screen differs from the one that ran in ${places}; the dry-run plays the one on screen`,
+    });
   }
   const names = namesNow(run, graph, doubts);
   const found = [...names].flatMap(([name, node]) => {
@@ -134,7 +143,7 @@ export function seedOf(run: Run, graph: Graph, differs: number, at: number): Dry
   const values = valuesAt(run, names, at);
   const silent = begun.filter(({ node }) => !values.some((value) => value.node === node));
   if (silent.length > 0) {
-    const text = `With which values ${silent.length} of ${begun.length} actions ran was not seen; what the graph says is played`;
+    const text = `The values of ${silent.length} of ${begun.length} actions were not seen; the dry-run takes those of the graph`;
     doubts.push({ node: "", text });
   }
   const ends = begun.flatMap(({ node, end }) => (end === null ? [] : [[node, end] as const]));

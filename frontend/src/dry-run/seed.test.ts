@@ -100,18 +100,22 @@ test("what is not known of the moment says so, and nothing of it is hidden", () 
     "Sub/Pick_0": [null, [visit(2, 3)]],
   });
   const texts = seedOf(vague, graph, 2, at(4)).doubts.map(({ node, text }) => `${node}: ${text}`);
-  expect(texts).toContain("Look_0: may have ended by then: nobody saw it exactly");
+  expect(texts).toContain("Look_0: may have ended by then: the exact time was not seen");
   expect(texts).toContain("Gone_0: ran, and is not in this graph any more");
-  expect(texts).toContain("Sub/Pick_0: is of a sub-graph: it is played as usual");
-  expect(texts).toContain(": The graph differs from what ran in 2 places; it is played");
-  expect(texts.some((text) => text.includes("1 of 1 actions ran was not seen"))).toBe(true);
+  expect(texts).toContain("Sub/Pick_0: belongs to a sub-graph, which the dry-run plays as usual");
+  expect(texts).toContain(
+    ": The graph on screen differs from the one that ran in 2 places; the dry-run plays the one on screen",
+  );
+  expect(texts.some((text) => text.includes("The values of 1 of 1 actions were not seen"))).toBe(
+    true,
+  );
 });
 
 test("a duration that is known as a range is played as its middle, and told as a range", () => {
   const range = ran({ Look_0: [look, [visit(0, 2, { not_after: iso(3) })]] });
   const seed = seedOf(range, graph, 0, at(9));
   expect(seed.behaviours.Look_0).toEqual([{ after_s: 2.5, result: "on_true" }]);
-  expect(seed.doubts.map(({ text }) => text)).toContain("took 2.0–3.0 s; 2.5 s is played");
+  expect(seed.doubts.map(({ text }) => text)).toContain("took 2.0–3.0 s; the dry-run takes 2.5 s");
 });
 
 test("a visit is only surely over, or surely not begun, outside of all its bounds", () => {
@@ -147,6 +151,6 @@ test("a dry-run begins where the rules have led to the same; what they lead else
   expect(seededMoment(seed, states, keys)).toEqual({ index: 1, doubts: [] });
   const never = seededMoment(seed, [state({ [look]: 1 }, [])], keys);
   expect(never.doubts).toEqual([
-    { node: "Grip_0", text: "had begun 1×, going on in the run; by the rules not run" },
+    { node: "Grip_0", text: "in the run: begun 1×, going on; by the engine’s rules: not run" },
   ]);
 });

@@ -72,7 +72,7 @@ function strayed(seeded: SeededAction, state: PlaybackState, keys: ReadonlyMap<s
   const told = (begun: number, ended: number) =>
     begun === 0 ? "not run" : begun > ended ? `begun ${begun}×, going on` : `ended ${ended}×`;
   const [there, here] = [told(seeded.begun, seeded.ended), told(visits, visits - goes)];
-  return { node: seeded.node, text: `had ${there} in the run; by the rules ${here}` };
+  return { node: seeded.node, text: `in the run: ${there}; by the engine’s rules: ${here}` };
 }
 
 /** The moment of a played trace that is as the run was then, or comes nearest, and what is not. */

@@ -203,7 +203,7 @@ export const undo: EditAction = {
   icon: IconArrowBackUp,
   changes: true,
   enabled: (context) => context.canUndo,
-  idle: "There is nothing of yours to undo.",
+  idle: "You have no change to undo.",
   run: (context) => context.undo.undo(),
 };
 

@@ -68,7 +68,7 @@ function EmptyCanvas({ waiting, context }: { waiting: boolean; context: EditorCo
     return (
       <div className={style.empty}>
         <Empty icon={<IconRouteAltLeft size={22} />} title="Nothing is drawn yet">
-          What the others draw appears here. You are here to look.
+          What others draw appears here. You can view this graph, not change it.
         </Empty>
       </div>
     );
@@ -85,8 +85,8 @@ function EmptyCanvas({ waiting, context }: { waiting: boolean; context: EditorCo
         }
       >
         {fingers
-          ? "Tap Add, type a name. Then tap an outcome of its card and what follows."
-          : "Double-click the canvas, or drag an action from the list. Then drag from its outcomes to what follows."}
+          ? "Tap Add and type a name. Then tap an outcome of its card and the action that follows."
+          : "Double-click the canvas, or drag an action from the list. Then drag from an outcome to the action that follows."}
         {!fingers && (
           <>
             {" "}

@@ -74,9 +74,9 @@ function useLogged(found: readonly ChangedTwice[], looks: boolean) {
 
 /** `isWhole`: whether all steps since then were read; undefined while none are. */
 function unknownWords(isWhole: boolean | undefined, error: Error | null): string {
-  if (isWhole) return "another value, which never stood, so the history does not show it";
+  if (isWhole) return "another value, which was replaced at once, so the history does not show it";
   if (isWhole === false)
-    return "another value; so much was changed since then that only the history can show it";
+    return "another value; too much changed since then to show it here: see the history";
   if (error === null) return "another value, which is being read from the history";
   return `another value; the history could not be read: ${errorText(error)}`;
 }
@@ -137,8 +137,9 @@ function ChangedTwiceDialog({
       centered
     >
       <Text>
-        You and others changed the same, without seeing each other’s change. What is marked stands
-        now; choose another value where it should. Each choice is an edit that you can undo.
+        You and others changed the same values, without seeing each other’s changes. The marked
+        value is in the graph now; you can choose another one. Each choice is an edit that you can
+        undo.
       </Text>
       <ul className={style.list} aria-label="Fields with two values">
         {told.map((each) => (
@@ -175,8 +176,8 @@ export function ChangedTwiceNotice({ all }: { all: readonly ChangedTwice[] }) {
     >
       {away > 0 && (
         <>
-          While you were away, others changed {things(away)} that you changed, too. One of both
-          values stands.{" "}
+          While you were away, others changed {things(away)} that you changed, too. Only one of the
+          two values is in the graph.{" "}
         </>
       )}
       {unseen > 0 && (

@@ -47,9 +47,7 @@ export function ProblemCount({ told }: { told: readonly ProblemGroup[] }) {
       type="button"
       className={style.counts}
       onClick={() => setPanel("problems")}
-      title={
-        blocks === "" ? "Nothing keeps it from starting" : `${blocks}: this keeps it from starting`
-      }
+      title={blocks === "" ? "No problem prevents a start" : `${blocks}: this prevents a start`}
     >
       {wrong > 0 && (
         <span className={style.count} data-kind="wrong">

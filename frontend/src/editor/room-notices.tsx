@@ -30,9 +30,9 @@ const StrandedEditsDialog = lazyPart(() =>
 
 const words: Record<ConnectionNotice, string> = {
   "went-back":
-    "A backup was restored: the graph is as the server has it now. Nothing of yours was waiting.",
+    "A backup was restored: the page shows the graph as the server has it now. You had no unsaved changes.",
   differed:
-    "This page showed something else than the server has, so it was loaded anew. This was reported; nothing of yours is lost.",
+    "This page differed from the server, so it was loaded again. The fault was reported; none of your changes is lost.",
 };
 
 /** Tells why nobody can change this graph, and what to do about it. */
@@ -41,9 +41,9 @@ function ReadOnly() {
   if (readOnly === undefined) return null;
   return (
     <Notice icon={<IconLock size={16} />} tone="warn">
-      {readOnly} What was before that is shown, and can be downloaded and run. Whoever runs the
-      server can look with <code>action-assistant verify</code> and bring a backup back with{" "}
-      <code>restore</code>.
+      {readOnly} The page shows the graph as it was before that; you can download and run it. The
+      administrator of the server can check it with <code>action-assistant verify</code> and restore
+      a backup with <code>restore</code>.
     </Notice>
   );
 }

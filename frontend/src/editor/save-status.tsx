@@ -26,8 +26,8 @@ const whys: Record<RefusalReason, string> = {
   forbidden: "View only",
   "no-such-graph": "This graph is gone",
   "other-epoch": "A backup was restored",
-  "other-client": "Opening anew",
-  differs: "Opening anew",
+  "other-client": "Reloading",
+  differs: "Reloading",
   full: "This graph is full",
   "not-accepted": "The server refused a change",
   restarting: "The editor restarts",
@@ -83,7 +83,7 @@ const signs = {
 };
 
 const DRAFTS_WHY =
-  "What you typed is not in the graph: it does not fit its field yet, or waits for its button.";
+  "What you typed is not in the graph yet: it is not valid for its field, or you have not pressed its button.";
 
 /** Return the number of drafts on this page that are not written to this graph. */
 function useDraftCounts(): DraftCounts {

@@ -169,13 +169,13 @@ function Item({ change, taken, onTake }: ItemProps) {
 
 function causeOf({ refused }: StrandedEdits, what: string, when: string): string {
   if (refused === undefined) {
-    return `A backup was restored on the server. ${what} that you made here (the last at ${when}) were not stored before that.`;
+    return `A backup was restored on the server. ${what} that you made here (the last at ${when}) were not stored by then.`;
   }
   const why =
     refused === "full"
       ? "This graph is full: it may have 5,000 actions and 32 MiB."
       : "The server refused a change.";
-  return `${why} Not stored: ${what} that you made here (the last at ${when}). Everything else of yours is.`;
+  return `${why} Not stored: ${what} that you made here (the last at ${when}). All your other changes are stored.`;
 }
 
 interface BodyProps {
@@ -205,8 +205,8 @@ function Body({ choice, by, onLater }: BodyProps) {
   return (
     <>
       <Text>
-        {causeOf(stranded, counted(all.length, "change"), when)} Behind this dialog is the graph as
-        it is now. Which of them should be applied to it?
+        {causeOf(stranded, counted(all.length, "change"), when)} Behind this dialog you see the
+        graph as it is now. Which of these changes should be applied to it?
       </Text>
       <Group mt="xs" gap="xs" className={style.marks ?? ""}>
         <Button size="compact-sm" onClick={() => setLeft(new Set())}>

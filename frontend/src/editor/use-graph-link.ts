@@ -25,7 +25,9 @@ export function useGraphLink(context: EditorContext, begun: boolean): void {
       const { graph, select, setPanel } = now.current;
       const selection = present(graph, target.selection);
       if (selection.length < target.selection.length) {
-        notifications.show({ message: "What the link points at is not in this graph any more." });
+        notifications.show({
+          message: "The link points to something that is no longer in this graph.",
+        });
       }
       select(selection);
       if (target.problem !== null) setPanel(selection.length > 0 ? "details" : "problems");

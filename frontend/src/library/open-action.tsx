@@ -293,7 +293,7 @@ function MissingAction() {
         </Button>
       }
     >
-      It was deleted, or the address is of another server.
+      It was deleted, or the address belongs to another server.
     </Empty>
   );
 }

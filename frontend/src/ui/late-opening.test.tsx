@@ -73,6 +73,6 @@ test("a menu that comes late opens by the press that asked for it, and its butto
 test("a menu that does not come is said, and its button stays", async () => {
   await press();
   await act(async () => arrive(new Error("offline")));
-  await vi.waitFor(() => expect(document.body.textContent).toContain("did not arrive"));
+  await vi.waitFor(() => expect(document.body.textContent).toContain("did not load"));
   expect(trigger()).not.toBeNull();
 });

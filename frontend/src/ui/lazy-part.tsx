@@ -11,7 +11,7 @@ class PartMissing extends Error {
   /** The next one who needs the part asks for it again. */
   readonly forget: () => void;
   constructor(cause: unknown, forget: () => void) {
-    super("A part of the page did not arrive.", { cause });
+    super("A part of the page did not load.", { cause });
     this.name = "PartMissing";
     this.forget = forget;
   }
@@ -83,7 +83,7 @@ function Missing() {
     <div role="alert">
       <Empty
         icon={<IconPlugConnectedX size={22} />}
-        title="This part of the page did not arrive"
+        title="This part of the page did not load"
         action={
           <Button variant="filled" onClick={() => location.reload()}>
             Reload the page

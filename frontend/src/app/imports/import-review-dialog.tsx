@@ -50,7 +50,7 @@ function Body({ waiting }: { waiting: ImportUnderReview }) {
       <section className={style.part} aria-label="Translated">
         <h3>Translated</h3>
         {preview.remarks.length === 0 ? (
-          <Text c="dimmed">Only the form; every value stays as it was.</Text>
+          <Text c="dimmed">Only the format; all values stay the same.</Text>
         ) : (
           <ul>
             {preview.remarks.map(({ message, where, times = 1 }) => (

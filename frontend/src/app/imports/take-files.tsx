@@ -147,11 +147,11 @@ function offerReplacing(known: readonly KnownFile[], after: () => void): void {
     id,
     title:
       known.length === 1
-        ? `${known[0]?.file} is of an action that the library has`
+        ? `The library has the action of ${known[0]?.file} already`
         : `The library has ${known.length} of these actions already`,
     message: (
       <Button size="compact-sm" mt="xs" onClick={() => void replace()}>
-        Make them what the files say
+        Replace them by the files
       </Button>
     ),
     autoClose: false,

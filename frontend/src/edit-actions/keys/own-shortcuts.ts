@@ -83,9 +83,9 @@ export function refusalOf(shortcut: string): string | null {
   const keys = plain(shortcut);
   const printed = printedKeys(keys).join(" ");
   if (/^Mod\+(?:Alt\+)?(?:Shift\+)?\.$/.test(keys)) return `${printed} is STOP's, always.`;
-  if (BROWSERS.has(keys)) return `Browsers keep ${printed} for themselves.`;
-  if (READERS.test(keys)) return `Screen readers and keyboards of some countries keep ${printed}.`;
-  if (WALKING.test(keys)) return `${printed} is how the page is walked without a mouse.`;
+  if (BROWSERS.has(keys)) return `Browsers use ${printed} themselves.`;
+  if (READERS.test(keys)) return `Screen readers and keyboards of some countries use ${printed}.`;
+  if (WALKING.test(keys)) return `${printed} moves the focus without a mouse.`;
   return null;
 }
 

@@ -28,7 +28,7 @@ export function leadElsewhere(
     notifications.show({
       color: "red",
       title: "The arrow was not moved",
-      message: "These two are connected already, or no arrow can lead there.",
+      message: "These two are already connected, or no arrow can end there.",
     });
   }
 }

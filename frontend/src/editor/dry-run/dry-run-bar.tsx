@@ -58,8 +58,8 @@ function SeedNote({ run }: { run: DryRun }) {
       </Popover.Target>
       <Popover.Dropdown className={style.seed ?? ""}>
         <p>
-          It begins as run {seed.number} was {stopwatch(seed.at)} after its start. What went on then
-          waits for you: decide how it ends.
+          The dry-run begins with the state of run {seed.number}, {stopwatch(seed.at)} after its
+          start. Actions that ran at that moment wait for you: decide how they end.
         </p>
         {seed.values.length > 0 && (
           <dl aria-label="Values at that moment">
@@ -75,7 +75,7 @@ function SeedNote({ run }: { run: DryRun }) {
         )}
         {doubts.length > 0 && (
           <>
-            <h3>Not known, or not as it was</h3>
+            <h3>Not known, or different from the run</h3>
             <ul>
               {doubts.slice(0, MOST).map((doubt) => (
                 <Doubt key={`${doubt.node} ${doubt.text}`} doubt={doubt} />
@@ -256,11 +256,14 @@ function MomentText({ run }: { run: DryRun }) {
   return (
     <>
       {run.words.join(" · ") || "…"}
-      {last && run.cut && <i> · It continues, but the dry-run ends here.</i>}
+      {last && run.cut && <i> · The graph continues, but the dry-run ends here.</i>}
       {last && !run.cut && run.sighting.running.length > 0 && (
         <i>
           {" "}
-          · {run.seed ? "It waits for you: decide how it ends." : "This never ends by itself."}
+          ·{" "}
+          {run.seed
+            ? "Running actions wait for you: decide how they end."
+            : "The running actions never end on their own."}
         </i>
       )}
     </>

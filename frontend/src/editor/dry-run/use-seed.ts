@@ -20,7 +20,11 @@ function useRecordReader(asked: boolean): typeof seedOfMoment | null {
     if (!asked) return;
     import("./record-reader").then(setLoaded, (error: Error) => {
       const message = errorText(error);
-      notifications.show({ color: "red", title: "The dry-run does not begin there", message });
+      notifications.show({
+        color: "red",
+        title: "The dry-run cannot begin at that moment",
+        message,
+      });
     });
   }, [asked]);
   return loaded?.seedOfMoment ?? null;

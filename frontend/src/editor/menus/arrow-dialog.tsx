@@ -217,7 +217,7 @@ export function targetsOf(
       label: isNew ? `New action “${isolated(template.name)}”` : template.name,
       sub: isNew
         ? ""
-        : `${template.ofGraph ? "a graph" : "one more of the library"} · ${template.description ?? ""}`,
+        : `${template.ofGraph ? "a graph" : "another use, from the library"} · ${template.description ?? ""}`,
       icon: <IconPlus size={16} aria-hidden />,
     };
   });

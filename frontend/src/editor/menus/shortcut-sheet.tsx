@@ -46,7 +46,11 @@ function wishFor(editAction: EditAction, own: OwnShortcuts, keys: string): Wish 
   if (others.length === 0) return null;
   const printed = printedKeys(keys).join(" ");
   const names = others.map(({ label }) => `“${isolated(label)}”`).join(", ");
-  return { keys, problem: `${printed} is taken by ${names}.`, others: others.every(isChangeable) };
+  return {
+    keys,
+    problem: `${printed} is already used by ${names}.`,
+    others: others.every(isChangeable),
+  };
 }
 
 /** Records the keys that are pressed next. The keys of STOP are never recorded and always work. */
@@ -175,7 +179,7 @@ export function ShortcutSheet({ onClose }: { onClose: () => void }) {
           checked={singles}
           onChange={(event) => setSingles(event.currentTarget.checked)}
           label="Single letters are shortcuts"
-          description="Switch this off if speech or another device types letters by itself."
+          description="Switch this off if speech input or another device types letters."
         />
         <Switch
           checked={all}

@@ -73,7 +73,7 @@ function offer(name: string, words: string, props: Omit<OfferProps, "id">): void
 }
 
 const WORDS = {
-  gone: "What you typed in was deleted",
+  gone: "The field you typed in was deleted",
   unfit: "Not written: it did not fit its field",
   written: null, // it was written and still exists
 } as const;
