@@ -97,11 +97,27 @@ key_change: Final = Table(
     Index(None, "graph", "owner", "seq"),
     Index(None, "graph", "root", "key", "seq"),
 )
-#: Up to which event the changes of a graph are derived, and its document then, to go on from.
+#: The values that each event brought and that another value of their key overwrote at once: `stands`, none where
+#: the key was deleted. Derived together with the changes of keys.
+overwritten_value: Final = Table(
+    "overwritten_value",
+    EDITOR,
+    Column("graph", Text, primary_key=True),
+    Column("seq", BigInteger, primary_key=True, autoincrement=False),
+    Column("root", Text, primary_key=True),
+    Column("key", Text, primary_key=True),
+    Column("author", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+    Column("value", LargeBinary, nullable=False),
+    Column("stands", LargeBinary),
+)
+#: Up to which event the changes of a graph are derived, and its document then, to go on from. `form`: what was
+#: derived; none before overwritten values were.
 key_change_head: Final = Table(
     "key_change_head",
     EDITOR,
     Column("graph", Text, primary_key=True),
     Column("seq", BigInteger, nullable=False),
     Column("document", LargeBinary, nullable=False),
+    Column("form", BigInteger),
 )

@@ -200,9 +200,27 @@ export interface EditorApi {
         graphs: string[];
     };
     /**
+     * ChangedThings
+     * @description A difference with at most 30 items of each kind; `more`: the number of others.
+     */
+    ChangedThings: {
+        /** @default [] */
+        fields?: EditorApi["Field"][];
+        /** @default [] */
+        actions?: EditorApi["ActionChange"][];
+        /** @default [] */
+        relations?: EditorApi["RelationChange"][];
+        /** @default [] */
+        notes?: EditorApi["NoteChange"][];
+        /** @default 0 */
+        more?: number;
+    };
+    /**
      * Changes
-     * @description The changes of one person as a difference, with at most 30 items of each kind; `more`: the
-     *     number of others. `comments`: the number of threads with new comments.
+     * @description The changes of somebody. `comments`: the number of threads with new comments. `overwritten`: the values
+     *     that this person set while somebody else, without knowing of it, set those that stayed: each as the
+     *     difference between what this person wanted (`before`) and what stayed (`after`). Of notes the text that this
+     *     person wanted.
      */
     Changes: {
         /** @default [] */
@@ -217,6 +235,7 @@ export interface EditorApi {
         more?: number;
         /** @default 0 */
         comments?: number;
+        overwritten?: EditorApi["ChangedThings"];
     };
     /**
      * Command
@@ -315,6 +334,8 @@ export interface EditorApi {
     /**
      * DocumentStep
      * @description The change `seq` gave a key of a root map another value (docs/contracts.md 1). null is no value.
+     *     `overwritten`: the value that the change brought, where another one overwrote it at once; `before` and
+     *     `after` are then what the key went on showing.
      */
     DocumentStep: {
         seq: number;
@@ -324,6 +345,8 @@ export interface EditorApi {
         key: string;
         before: unknown;
         after: unknown;
+        /** @default null */
+        overwritten?: unknown;
     };
     /**
      * DraftAnswer
@@ -497,13 +520,16 @@ export interface EditorApi {
         at: string;
         seq: number;
         merged?: EditorApi["MergedBy"];
+        /** @default false */
+        overwritten?: boolean;
         field: string;
     };
     /**
      * FieldValue
      * @description The value that a person gave a field by the change `seq`, and the value before; null is no
      *     value. `merged`: how the value came from a draft, where that person set it; `seq` is then the
-     *     change of the merge.
+     *     change of the merge. `overwritten`: the field never showed the value, since another person had set
+     *     `before` at the same time, without either seeing the other's, and `before` stayed.
      */
     FieldValue: {
         value: unknown;
@@ -513,6 +539,8 @@ export interface EditorApi {
         at: string;
         seq: number;
         merged?: EditorApi["MergedBy"];
+        /** @default false */
+        overwritten?: boolean;
     };
     /**
      * FlatCopy

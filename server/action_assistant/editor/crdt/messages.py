@@ -162,6 +162,10 @@ class ByteReader:
             shift += 7
         return number
 
+    def read_since(self, left: int) -> bytes:
+        """Return the bytes that were read since `left` bytes were left."""
+        return self._data[len(self._data) - left : self._at]
+
     @property
     def left(self) -> int:
         """Return the number of bytes that were not read yet."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Sequence, Set
 from datetime import datetime
+from itertools import zip_longest
 from typing import Any, Final
 
 import msgspec
@@ -11,7 +12,7 @@ from action_assistant.editor.documents.values import Root
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.document_places import field_of
-from action_assistant.editor.history.key_changes import LoggedChange, unpacked
+from action_assistant.editor.history.key_changes import LoggedChange, OverwrittenValue, unpacked
 from action_assistant.editor.history.merge_origins import (
     MergedBy,
     bring_up,
@@ -33,7 +34,8 @@ _MOST: Final = 1000  # values of one field
 class FieldValue(msgspec.Struct, frozen=True, omit_defaults=True):
     """The value that a person gave a field by the change `seq`, and the value before; None is no
     value. `merged`: how the value came from a draft, where that person set it; `seq` is then the
-    change of the merge."""
+    change of the merge. `overwritten`: the field never showed the value, since another person had set
+    `before` at the same time, without either seeing the other's, and `before` stayed."""
 
     value: Any
     before: Any
@@ -41,6 +43,7 @@ class FieldValue(msgspec.Struct, frozen=True, omit_defaults=True):
     at: datetime
     seq: int
     merged: MergedBy | None = None
+    overwritten: bool = False
 
 
 class FieldBlame(FieldValue, frozen=True, kw_only=True, omit_defaults=True):
@@ -50,8 +53,10 @@ class FieldBlame(FieldValue, frozen=True, kw_only=True, omit_defaults=True):
     field: str
 
 
-class DocumentStep(msgspec.Struct, frozen=True):
-    """The change `seq` gave a key of a root map another value (docs/contracts.md 1). None is no value."""
+class DocumentStep(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The change `seq` gave a key of a root map another value (docs/contracts.md 1). None is no value.
+    `overwritten`: the value that the change brought, where another one overwrote it at once; `before` and
+    `after` are then what the key went on showing."""
 
     seq: int
     author: str
@@ -59,6 +64,7 @@ class DocumentStep(msgspec.Struct, frozen=True):
     key: str
     before: Any
     after: Any
+    overwritten: Any = None
 
 
 class Blame:
@@ -74,9 +80,9 @@ class Blame:
         return await self._index.text(fields_of, graph, owner, upto if seq is None else seq)
 
     async def of_field(self, graph: str, owner: str, field: str, seq: int | None) -> bytes:
-        """Return the JSON of all values that a field has had up to `seq` (None: now), newest first,
-        as `FieldValue`s. What one person typed in one go is one value. Raise Unavailable if the
-        journal cannot be read."""
+        """Return the JSON of all values that people gave a field up to `seq` (None: now), newest
+        first, as `FieldValue`s, also those that were overwritten at once. What one person typed in
+        one go is one value. Raise Unavailable if the journal cannot be read."""
         upto = await bring_up(self._index, graph, seq)
         at = upto if seq is None else seq
         return await self._index.text(values_of, graph, owner, field, at)
@@ -106,20 +112,30 @@ def values_of(
 ) -> list[FieldValue]:
     """Return all values of a field up to the change `at`, newest first."""
     changes: list[LoggedChange] = []
+    lost: list[OverwrittenValue] = []
     for root, key in keys_of(owner, field):
         changes += index_queries.of_key(connection, graph, root, key, at)
+        lost += index_queries.overwritten_of_key(connection, graph, root, key, at)
     alone = grafts_of(connection, graph).keys()
-    return _values(connection, graph, in_one_go(changes, alone)[::-1][:_MOST])
+    found = _values(connection, graph, in_one_go(changes, alone)[::-1][:_MOST])
+    found += _overwritten(connection, lost)
+    return sorted(found, key=lambda each: each.seq, reverse=True)[:_MOST]
 
 
 def steps(
     connection: Connection, graph: str, after: int, upto: int, limit: int
 ) -> list[DocumentStep]:
-    """Return the newest `limit` changes of keys with `after < seq <= upto`, oldest first."""
-    return [
+    """Return the newest `limit` changes of keys and values overwritten at once with
+    `after < seq <= upto`, oldest first."""
+    found = [
         DocumentStep(c.seq, c.author, c.root, c.key, unpacked(c.before), unpacked(c.after))
         for c in index_queries.between(connection, graph, after, upto, limit)
     ]
+    for each in index_queries.overwritten_between(connection, graph, after, upto, limit):
+        stands = unpacked(each.stands)
+        of = (each.seq, each.author, each.root, each.key)
+        found.append(DocumentStep(*of, stands, stands, unpacked(each.value)))
+    return sorted(found, key=lambda step: step.seq)[-limit:]
 
 
 def _values(
@@ -137,6 +153,28 @@ def _values(
             merged_by(change, original, person),
         )
         for change, original in zip(changes, originals(connection, graph, changes), strict=True)
+    ]
+
+
+def _overwritten(connection: Connection, lost: Sequence[OverwrittenValue]) -> list[FieldValue]:
+    """Return the values of a field that were overwritten at once: of those that one person typed in one go the
+    last."""
+    person = stored_people(connection)
+    last = [
+        each
+        for each, after in zip_longest(lost, lost[1:])
+        if after is None or after.author != each.author or after.at - each.at >= _ONE_GO
+    ]
+    return [
+        FieldValue(
+            unpacked(each.value),
+            unpacked(each.stands),
+            person(each.author),
+            when(each.at),
+            each.seq,
+            overwritten=True,
+        )
+        for each in last
     ]
 
 

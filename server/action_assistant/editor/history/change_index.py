@@ -6,21 +6,32 @@ and hands back rows that are stored slice by slice (decision 108).
 
 import logging
 from collections import defaultdict
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Concatenate, Final, ParamSpec, TypeVar
 
 import anyio
 import msgspec
-from sqlalchemy import Connection, delete, func, insert, select, tuple_
+from sqlalchemy import Connection, Table, and_, delete, func, insert, select, tuple_
 
-from action_assistant.editor.history.index_queries import COLUMNS, IndexGrowth, growth
+from action_assistant.editor.history.index_queries import (
+    COLUMNS,
+    FORM,
+    OVERWRITTEN_COLUMNS,
+    IndexGrowth,
+    growth,
+)
 from action_assistant.editor.log.graph_events import graph_of, graph_stream
 from action_assistant.errors import Refused
 from action_assistant.journal.databases import ask_from_worker
 from action_assistant.journal.journal import Journal
-from action_assistant.schema.editor_tables import editor_head, key_change, key_change_head
+from action_assistant.schema.editor_tables import (
+    editor_head,
+    key_change,
+    key_change_head,
+    overwritten_value,
+)
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 log: Final = logging.getLogger(__name__)
@@ -33,7 +44,8 @@ _FAR: Final = 5_000  # events behind, from which on it is not left for later
 #: Rows that one transaction stores or deletes: it takes some milliseconds, for which others wait.
 ROWS: Final = 200
 
-_c, _head = key_change.c, key_change_head.c
+_head = key_change_head.c
+_TABLES: Final = (key_change, overwritten_value)
 
 
 class ChangeIndex:
@@ -65,7 +77,9 @@ class ChangeIndex:
 
     async def head(self, graph: str) -> int:
         """Return the last change of a graph that is in the index; 0 if it has none."""
-        rows = await self._journal.query(select(_head.seq).where(_head.graph == graph))
+        rows = await self._journal.query(
+            select(_head.seq).where(_head.graph == graph, _head.form == FORM)
+        )
         return rows[0].seq if rows else 0
 
     async def value(
@@ -119,7 +133,7 @@ class ChangeIndex:
         stream, newest = editor_head.c.stream, editor_head.c.seq
         indexed = func.coalesce(_head.seq, 0)
         same = stream == graph_stream("") + _head.graph
-        joined = editor_head.outerjoin(key_change_head, same)
+        joined = editor_head.outerjoin(key_change_head, and_(same, _head.form == FORM))
         chosen = select(stream, newest, (newest - indexed).label("more")).select_from(joined)
         chosen = chosen.where(newest > indexed, stream.startswith("graph/"))
         try:
@@ -136,8 +150,12 @@ class ChangeIndex:
         if found.leftovers:
             await self._delete_after(graph, found.after)
         for each in found.slices:
-            await self._journal.derive(partial(_insert, each))
-        head = {"graph": graph, "seq": found.seq, "document": found.document}
+            await self._journal.derive(partial(_insert, key_change, COLUMNS, each))
+        for each in found.overwritten:
+            await self._journal.derive(
+                partial(_insert, overwritten_value, OVERWRITTEN_COLUMNS, each)
+            )
+        head = {"graph": graph, "seq": found.seq, "document": found.document, "form": FORM}
 
         def keep(connection: Connection) -> None:
             _drop_head(connection, graph)
@@ -151,8 +169,9 @@ class ChangeIndex:
         await self._delete_after(graph, 0)
 
     async def _delete_after(self, graph: str, seq: int) -> None:
-        while await self._journal.derive(partial(_delete_some, graph=graph, after=seq)):
-            pass
+        for table in _TABLES:
+            while await self._journal.derive(partial(_delete_some, table, graph=graph, after=seq)):
+                pass
 
 
 def _answered(url: str, question: Callable[..., T], args: tuple[Any, ...]) -> T:
@@ -164,18 +183,19 @@ def _as_json(connection: Connection, question: Callable[..., Any], args: tuple[A
     return msgspec.json.encode(question(connection, *args))
 
 
-def _insert(rows: bytes, connection: Connection) -> None:
-    values = [dict(zip(COLUMNS, row, strict=True)) for row in msgspec.msgpack.decode(rows)]
-    connection.execute(insert(key_change), values)
+def _insert(table: Table, columns: Sequence[str], rows: bytes, connection: Connection) -> None:
+    values = [dict(zip(columns, row, strict=True)) for row in msgspec.msgpack.decode(rows)]
+    connection.execute(insert(table), values)
 
 
 def _drop_head(connection: Connection, graph: str) -> None:
     connection.execute(delete(key_change_head).where(_head.graph == graph))
 
 
-def _delete_some(connection: Connection, graph: str, after: int) -> bool:
+def _delete_some(table: Table, connection: Connection, graph: str, after: int) -> bool:
     """Delete some of the rows after a change; return whether any were left to be deleted."""
-    keys = (_c.seq, _c.root, _c.key)
-    some = select(*keys).where(_c.graph == graph, _c.seq > after).limit(ROWS)
-    done = connection.execute(delete(key_change).where(_c.graph == graph, tuple_(*keys).in_(some)))
+    c = table.c
+    keys = (c.seq, c.root, c.key)
+    some = select(*keys).where(c.graph == graph, c.seq > after).limit(ROWS)
+    done = connection.execute(delete(table).where(c.graph == graph, tuple_(*keys).in_(some)))
     return done.rowcount > 0

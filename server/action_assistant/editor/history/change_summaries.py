@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, Final, TypeAlias
 
 import msgspec
+from msgspec.structs import replace
 from sqlalchemy import Connection
 
 from action_assistant.editor.documents.document import Maps, read_maps
@@ -11,6 +12,7 @@ from action_assistant.editor.documents.values import ROOTS, ends_of
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.key_changes import (
     LoggedChange,
+    OverwrittenValue,
     Packed,
     Place,
     owner_of,
@@ -33,16 +35,24 @@ _SHOWN: Final = 30  # things of one kind in one session
 _ENDS: Final = {ENTRY, EXIT}
 
 
-class Changes(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The changes of one person as a difference, with at most 30 items of each kind; `more`: the
-    number of others. `comments`: the number of threads with new comments."""
+class ChangedThings(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A difference with at most 30 items of each kind; `more`: the number of others."""
 
     fields: tuple[Field, ...] = ()
     actions: tuple[ActionChange, ...] = ()
     relations: tuple[RelationChange, ...] = ()
     notes: tuple[NoteChange, ...] = ()
     more: int = 0
+
+
+class Changes(ChangedThings, frozen=True, omit_defaults=True):
+    """The changes of somebody. `comments`: the number of threads with new comments. `overwritten`: the values
+    that this person set while somebody else, without knowing of it, set those that stayed: each as the
+    difference between what this person wanted (`before`) and what stayed (`after`). Of notes the text that this
+    person wanted."""
+
     comments: int = 0
+    overwritten: ChangedThings | None = None
 
 
 class Stretch(msgspec.Struct, frozen=True, array_like=True):
@@ -54,25 +64,36 @@ class Stretch(msgspec.Struct, frozen=True, array_like=True):
 
 
 def told(
-    base: Sequence[LoggedChange], changes: Sequence[LoggedChange], stretches: Sequence[Stretch]
+    base: Sequence[LoggedChange],
+    changes: Sequence[LoggedChange],
+    stretches: Sequence[Stretch],
+    lost: Sequence[OverwrittenValue] = (),
 ) -> list[Changes]:
     """Return the changes of each stretch. `changes`: in order of time; `base`: the values of the
-    touched keys before them."""
+    touched keys before them; `lost`: the values that were overwritten at once, in order of time."""
     state = state_of(base)
+    gone: State = {}  # the names of actions that were deleted
+    wanted: list[dict[Place, OverwrittenValue]] = [{} for _ in stretches]
+    losing = _Current(stretches)
+    for each in lost:
+        if (mine := losing.of(each)) is not None:
+            wanted[mine][each.place] = each
     own: list[dict[Place, tuple[Packed, Packed]]] = [{} for _ in stretches]
     found = [Changes() for _ in stretches]
     current = _Current(stretches)
     ends = sorted(range(len(stretches)), key=lambda n: stretches[n].last, reverse=True)
     for change in changes:
         while ends and stretches[ends[-1]].last < change.seq:
-            found[ends[-1]] = _told(own[ends[-1]], state)
+            found[ends[-1]] = _told(own[ends[-1]], wanted[ends[-1]], state, gone)
             ends.pop()
         state[change.place] = change.after
+        if change.after is None and _is_name_of_action(change):
+            gone[change.place] = change.before
         if (mine := current.of(change)) is not None:
             before, _ = own[mine].get(change.place, (change.before, None))
             own[mine][change.place] = before, change.after
     for n in ends:
-        found[n] = _told(own[n], state)
+        found[n] = _told(own[n], wanted[n], state, gone)
     return found
 
 
@@ -169,23 +190,56 @@ class _Current:
         for n, stretch in sorted(enumerate(stretches), key=lambda each: each[1].first):
             self._of.setdefault(stretch.author, []).append((n, stretch))
 
-    def of(self, change: LoggedChange) -> int | None:
+    def of(self, change: LoggedChange | OverwrittenValue) -> int | None:
+        """Return the number of the stretch of a change, of which later ones are asked for only; None where
+        there is none."""
         mine = self._of.get(change.author, [])
         while mine and mine[0][1].last < change.seq:
             mine.pop(0)
         return mine[0][0] if mine and mine[0][1].first <= change.seq else None
 
 
-def _told(own: Mapping[Place, tuple[Packed, Packed]], state: State) -> Changes:
+def _told(
+    own: Mapping[Place, tuple[Packed, Packed]],
+    lost: Mapping[Place, OverwrittenValue],
+    state: State,
+    gone: State,
+) -> Changes:
     """Return the difference that one person made to the things they touched, without later changes
     by others."""
     owners = {owner_of(*place) for place in own}
-    names = {("actions", key) for owner in owners for key in _ends(owner)}
-    around = {p: value for p, value in state.items() if owner_of(*p) in owners or p in names}
+    around = _around(owners, state)
     before = around | {place: old for place, (old, _) in own.items()}
     after = around | {place: new for place, (_, new) in own.items()}
     found = difference((0, graph_of(before)), (0, graph_of(after)))
-    return shortened(found, owners)
+    told = shortened(found, owners)
+    return replace(told, overwritten=_overwritten(lost, state, gone)) if lost else told
+
+
+def _around(owners: Set[str], state: State) -> State:
+    """Return the values of some owners, and the names of the actions between which arrows are."""
+    names = {("actions", key) for owner in owners for key in _ends(owner)}
+    return {p: value for p, value in state.items() if owner_of(*p) in owners or p in names}
+
+
+def _overwritten(
+    lost: Mapping[Place, OverwrittenValue], state: State, gone: State
+) -> ChangedThings | None:
+    """Return the values that were lost as differences to those that stayed; None where nothing tells of them, as
+    of comments. An action that was deleted meanwhile is called by its last name."""
+    owners = {owner_of(*place) for place in lost}
+    around = _around(owners, gone) | {
+        p: v for p, v in _around(owners, state).items() if v is not None
+    }
+    wanted = graph_of(around | {place: each.value for place, each in lost.items()})
+    stayed = graph_of(
+        around
+        | {place: each.stands for place, each in lost.items() if each.stands or place not in gone}
+    )
+    found = shortened(difference((0, wanted), (0, stayed)), owners)
+    notes = difference((0, stayed), (0, wanted)).notes[:_SHOWN]
+    things = ChangedThings(found.fields, found.actions, found.relations, notes, found.more)
+    return None if things == ChangedThings() else things
 
 
 def _ends(owner: str) -> set[str]:

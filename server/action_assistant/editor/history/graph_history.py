@@ -13,7 +13,7 @@ from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.change_summaries import Changes, Stretch, told
 from action_assistant.editor.history.edit_sessions import EditSession, Kind, Step, edit_sessions
-from action_assistant.editor.history.key_changes import LoggedChange, owner_of
+from action_assistant.editor.history.key_changes import LoggedChange, OverwrittenValue, owner_of
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people.people import stored_people
 from action_assistant.schema import editor_tables
@@ -204,8 +204,9 @@ def _changes(
         first = rows[0].seq + 1  # of which not everything may be here
         rows = [row for row in rows if row.seq >= first]
     edits = [each for each in edits if each.first >= first]
-    base = index_queries.at(connection, graph, first - 1, _touched(rows))
-    found = told(base, rows, edits)
+    lost = index_queries.overwritten_between(connection, graph, first - 1, last, _CHANGES)
+    base = index_queries.at(connection, graph, first - 1, _touched([*rows, *lost]))
+    found = told(base, rows, edits, lost)
     return {(e.author, e.last): each for e, each in zip(edits, found, strict=True)}
 
 
@@ -281,7 +282,7 @@ def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
     return Step(kind, row.author, at, 1 if kind == "created" else None, row.seq)
 
 
-def _touched(rows: Sequence[LoggedChange]) -> set[str]:
+def _touched(rows: Sequence[LoggedChange | OverwrittenValue]) -> set[str]:
     """Return the owners of the changed keys, and the actions at both ends of changed arrows."""
     owners = {owner_of(row.root, row.key) for row in rows}
     ends = {end for owner in owners if (found := ends_of(owner)) for end in found[:2]}

@@ -1,17 +1,28 @@
 """Queries of the index of key changes, over a connection. Their results are as large as a graph: for workers."""
 
 import zlib
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from typing import Any, Final
 
 import msgspec
 from sqlalchemy import ColumnElement, Connection, Row, Select, and_, func, literal, select
 
 from action_assistant.editor.documents.values import Root
-from action_assistant.editor.history.key_changes import LoggedChange, Place, observed, owner_of
+from action_assistant.editor.history.key_changes import (
+    LoggedChange,
+    OverwrittenValue,
+    Place,
+    observed,
+    owner_of,
+)
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.journal.events import Event
-from action_assistant.schema.editor_tables import editor_event, key_change, key_change_head
+from action_assistant.schema.editor_tables import (
+    editor_event,
+    key_change,
+    key_change_head,
+    overwritten_value,
+)
 
 _EVENTS: Final = 1000  # observed in one go
 _BYTES: Final = 4 << 20  # of them
@@ -23,22 +34,30 @@ _ZLIB: Final = (
 
 _c = key_change.c
 _CHANGE: Final = select(_c.seq, _c.author, _c.at, _c.root, _c.key, _c.before, _c.after)
+_o = overwritten_value.c
+_OVERWRITTEN: Final = select(*(_o[name] for name in OverwrittenValue._fields))
+#: The form of indexes that have overwritten values. One of another form counts as none, and is made anew.
+FORM: Final = 1
 #: The columns of a row in a slice, in the order of `LoggedChange` after the first two.
 COLUMNS: Final = ("graph", "owner", *LoggedChange._fields)
+#: The columns of a row in a slice of overwritten values.
+OVERWRITTEN_COLUMNS: Final = ("graph", *OverwrittenValue._fields)
 
 
 class IndexGrowth(msgspec.Struct, frozen=True):
     """The rows that the index lacks, as slices of MessagePack, and the next head: `seq` and
     `document`.
 
-    `after`: the present head. `leftovers`: rows after it exist from an interrupted attempt.
-    `unreadable`: the document of the head is of another version, so the index must be built again.
+    `slices`: of changes; `overwritten`: of values that were overwritten at once. `after`: the present
+    head. `leftovers`: rows after it exist from an interrupted attempt. `unreadable`: the document of
+    the head is of another version, so the index must be built again.
     """
 
     after: int
     seq: int
     document: bytes
-    slices: tuple[bytes, ...]
+    slices: tuple[bytes, ...] = ()
+    overwritten: tuple[bytes, ...] = ()
     damaged: bool = False
     leftovers: bool = False
     unreadable: bool = False
@@ -48,22 +67,26 @@ def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth |
     """Return what the next events of a graph add to its index; None if there are no more events."""
     seq, kept = _head(connection, graph)
     document = _unpacked(kept)
-    more = select(literal(1)).where(_c.graph == graph, _c.seq > seq).limit(1)
-    leftovers = connection.execute(more).first() is not None
+    leftovers = any(
+        connection.execute(select(literal(1)).where(c.graph == graph, c.seq > seq).limit(1)).first()
+        for c in (_c, _o)
+    )
     events = _some_events(connection, graph, seq)
     if not events:
         return None
     found = observed(document, events)
     if found is None:
-        return IndexGrowth(seq, 0, b"", (), leftovers=leftovers, unreadable=True)
+        return IndexGrowth(seq, 0, b"", leftovers=leftovers, unreadable=True)
     # In the order of the table's indexes: rows in any order touch as many pages as there are rows.
     changes = sorted(found.changes, key=lambda each: (each.seq, each.root, each.key))
     rows = [(graph, owner_of(each.root, each.key), *each) for each in changes]
-    slices = tuple(
-        msgspec.msgpack.encode(rows[start : start + slice_rows])
-        for start in range(0, len(rows), slice_rows)
+    lost = [(graph, *each) for each in found.overwritten]
+    slices, overwritten = (_slices(each, slice_rows) for each in (rows, lost))
+    return IndexGrowth(
+        *(seq, found.seq, _packed(found.document), slices, overwritten),
+        damaged=found.damaged,
+        leftovers=leftovers,
     )
-    return IndexGrowth(seq, found.seq, _packed(found.document), slices, found.damaged, leftovers)
 
 
 def between(
@@ -76,6 +99,24 @@ def between(
         chosen = chosen.where(_c.author == by)
     newest_first = chosen.order_by(_c.seq.desc(), _c.root, _c.key).limit(limit)
     return _changes(connection, newest_first)[::-1]
+
+
+def overwritten_between(
+    connection: Connection, graph: str, after: int, upto: int, limit: int
+) -> list[OverwrittenValue]:
+    """Return the newest values with `after < seq <= upto` that were overwritten at once, in order of time."""
+    chosen = _OVERWRITTEN.where(_o.graph == graph, _o.seq > after, _o.seq <= upto)
+    newest_first = chosen.order_by(_o.seq.desc(), _o.root, _o.key).limit(limit)
+    return [OverwrittenValue._make(row) for row in connection.execute(newest_first)][::-1]
+
+
+def overwritten_of_key(
+    connection: Connection, graph: str, root: Root, key: str, upto: int
+) -> list[OverwrittenValue]:
+    """Return the values of one key that were overwritten at once, in order of time."""
+    same = (_o.graph == graph, _o.root == root, _o.key == key, _o.seq <= upto)
+    chosen = _OVERWRITTEN.where(*same).order_by(_o.seq)
+    return [OverwrittenValue._make(row) for row in connection.execute(chosen)]
 
 
 def at(
@@ -115,6 +156,11 @@ def of_key(
     return _changes(connection, _CHANGE.where(*same).order_by(_c.seq))
 
 
+def _slices(rows: Sequence[tuple[Any, ...]], most: int) -> tuple[bytes, ...]:
+    parts = (rows[start : start + most] for start in range(0, len(rows), most))
+    return tuple(map(msgspec.msgpack.encode, parts))
+
+
 def _packed(document: bytes) -> bytes:
     """Return the document as the head stores it. A large one is compressed to about a tenth, since
     storing it blocks the writer."""
@@ -135,7 +181,9 @@ def _unpacked(kept: bytes) -> bytes:
 
 def _head(connection: Connection, graph: str) -> tuple[int, bytes]:
     head = key_change_head.c
-    row = connection.execute(select(head.seq, head.document).where(head.graph == graph)).first()
+    row = connection.execute(
+        select(head.seq, head.document).where(head.graph == graph, head.form == FORM)
+    ).first()
     return (row.seq, row.document) if row is not None else (0, b"")
 
 

@@ -12,6 +12,7 @@ from action_assistant.editor.crdt.messages import Malformed
 from action_assistant.editor.crdt.replica import Replica, ReplicaState
 from action_assistant.editor.documents.document import PLAIN, is_same
 from action_assistant.editor.documents.values import ROOTS, Root
+from action_assistant.editor.history.overwritten import LostValues
 from action_assistant.journal.events import Event
 
 #: A plain value of the document as MessagePack; None where there is no such key.
@@ -39,13 +40,36 @@ class LoggedChange(NamedTuple):
         return self.root, self.key
 
 
+class OverwrittenValue(NamedTuple):
+    """The event `seq` brought a value of a key of a root map that another value overwrote at once: the key went
+    on showing the value `stands`, None where it was deleted.
+
+    `at`: microseconds since 1970, UTC.
+    """
+
+    seq: int
+    author: str
+    at: int
+    root: Root
+    key: str
+    value: Packed
+    stands: Packed
+
+    @property
+    def place(self) -> Place:
+        """The key that was set, with its root."""
+        return self.root, self.key
+
+
 class ObservedEvents(msgspec.Struct, frozen=True):
     """The changes of keys by some events, and the snapshot of the document after the event `seq`.
-    `damaged`: the next event cannot be applied."""
+    `overwritten`: the values that the events brought and that did not come to stand. `damaged`: the
+    next event cannot be applied."""
 
     document: bytes
     seq: int
     changes: list[LoggedChange]
+    overwritten: list[OverwrittenValue]
     damaged: bool = False
 
 
@@ -58,9 +82,11 @@ def observed(document: bytes, events: Sequence[Event]) -> ObservedEvents | None:
     seen = _Observer(replica)
     seq = events[0].seq - 1
     changes: list[LoggedChange] = []
+    overwritten: list[OverwrittenValue] = []
     damaged = False
     try:
         for event in replica.replay_each(events):
+            overwritten += seen.overwritten(event)
             changes += seen.changes(event)
             seq = event.seq
     except (Malformed, Panicked):
@@ -71,7 +97,8 @@ def observed(document: bytes, events: Sequence[Event]) -> ObservedEvents | None:
     if damaged and seq >= events[0].seq:  # what failed may have left something behind
         again = observed(document, [event for event in events if event.seq <= seq])
         kept = document if again is None else again.document
-    return ObservedEvents(kept or document, seq if damaged else events[-1].seq, changes, damaged)
+    upto = seq if damaged else events[-1].seq
+    return ObservedEvents(kept or document, upto, changes, overwritten, damaged)
 
 
 def owner_of(root: Root, key: str) -> str:
@@ -100,6 +127,20 @@ class _Observer:
         self._subscriptions: Final = {
             root: shared.observe(partial(self._hear, root)) for root, shared in self._maps.items()
         }
+        self._set: set[Place] = set()
+        self._lost: Final = LostValues(replica, self._maps)
+
+    def overwritten(self, event: Event) -> list[OverwrittenValue]:
+        """Return the values that `event` brought since the last call and that did not come to stand."""
+        set_keys, self._set = len(self._set), set()
+        return [
+            OverwrittenValue(
+                *(event.seq, each.author, event.at, each.root, each.key),
+                _packed(each.value),
+                _packed(_plain(self._maps[each.root].get(each.key))),
+            )
+            for each in self._lost.found(event, set_keys)
+        ]
 
     def changes(self, event: Event) -> list[LoggedChange]:
         """Return the changes since the last call, which `event` made."""
@@ -120,6 +161,8 @@ class _Observer:
             before, after = _plain(told.get("oldValue")), _plain(told.get("newValue"))
             first, _ = self._heard.get((root, key), (before, None))
             self._heard[root, key] = first, after
+            if told["action"] != "delete":
+                self._set.add((root, key))
 
 
 def _map(replica: Replica, root: Root) -> "Map[Any]":

@@ -6,7 +6,7 @@ also takes what Yjs in a page fails at; that is refused here. Yjs update format,
 """
 
 from collections.abc import Mapping
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, NamedTuple, TypeAlias
 
 from action_assistant.editor.crdt.messages import ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Placed
@@ -61,6 +61,37 @@ def cut_items(update: bytes, known: Mapping[int, int]) -> list[int]:
     return [c for c, start, end in scan.items if start < known.get(c, 0) < end]
 
 
+class WrittenItem(NamedTuple):
+    """An item of an update, with the clocks from `start` to `end`. `place`: the name of a root and a key in it;
+    None where the item does not name them. Then they are those of the item `beside`, a client and a clock,
+    if there is one. `content`: the bytes after those."""
+
+    client: int
+    start: int
+    end: int
+    beside: tuple[int, int] | None
+    place: tuple[bytes, bytes] | None
+    kind: int
+    content: bytes
+
+
+class WrittenUpdate(NamedTuple):
+    """The items of an update in the order of their clocks, where each client's structs end, and the ranges of
+    clocks that the update deletes, by client."""
+
+    items: list[WrittenItem]
+    ends: dict[int, int]
+    deleted: dict[int, list[tuple[int, int]]]
+
+
+def written(update: bytes) -> WrittenUpdate:
+    """Read the items of an update that a room took, or of a whole document. Raises Malformed."""
+    scan = Scan(ByteReader(update), stored=True, collects=True)
+    scan.whole()
+    ends = {client: end for client, _, end in scan.outline().brings}
+    return WrittenUpdate(scan.written, ends, scan.deleted)
+
+
 #: A struct that tells where this one lies, and whether inside it.
 _Reference: TypeAlias = tuple[int, int, bool]
 #: The kind of key that a struct may add to a root.
@@ -71,9 +102,14 @@ _ACTION: Final = "action"
 
 
 class Scan:
-    """Reads an update struct by struct, and collects its outline."""
+    """Reads an update struct by struct, and collects its outline; with `collects` also its items."""
 
-    def __init__(self, reader: ByteReader, *, stored: bool) -> None:
+    def __init__(self, reader: ByteReader, *, stored: bool, collects: bool = False) -> None:
+        self.written: Final[list[WrittenItem]] = []
+        self.deleted: Final[dict[int, list[tuple[int, int]]]] = {}
+        self._collects = collects
+        self._place: tuple[bytes, bytes] | None = None
+        self._content_left = 0  # bytes of the update from the content of the last struct on
         self.parted: Final[list[tuple[int, int]]] = []
         self.items: Final[list[tuple[int, int, int]]] = []  # of more than one clock
         self._needs: dict[int, int] = {}
@@ -140,6 +176,11 @@ class Scan:
         clock = start + size
         if size > 1 and info & 31 != _GC:
             self.items.append((client, start, clock))
+        if self._collects and info & 31 != _GC:
+            beside = None if reference is None or reference[2] else reference[:2]
+            content = self._reader.read_since(self._content_left)
+            item = (client, start, clock, beside, self._place, info & 31, content)
+            self.written.append(WrittenItem._make(item))
         self._fields += fresh is not _NONE
         self._actions += fresh is _ACTION
         if reference is not None:
@@ -161,6 +202,7 @@ class Scan:
             return length(reader), None, _NONE
         reference: _Reference | None = None
         fresh: _Fresh = _NONE
+        self._place = None
         if info & 0x80:
             client, clock = _need(reader, needs)
             reference = client, clock, False
@@ -171,15 +213,20 @@ class Scan:
             self.parted.append(right)
         if not info & 0xC0:
             parent = reader.number()
+            root = b""
             if parent == 1:
-                fresh = _ACTION if reader.text() == b"actions" else _FIELD
+                root = reader.text()
+                fresh = _ACTION if root == b"actions" else _FIELD
                 fresh = _NONE if kind == _DELETED else fresh
             elif parent == 0:
                 reference = *_need(reader, needs), True
             else:
                 raise Malformed("a struct without a parent")
             if info & 0x20:
-                fresh = _FIELD if b"|" in reader.text() and fresh is _ACTION else fresh
+                key = reader.text()
+                fresh = _FIELD if b"|" in key and fresh is _ACTION else fresh
+                self._place = (root, key) if parent == 1 else None
+        self._content_left = reader.left
         return self._contents.content(kind), reference, fresh
 
     def _deletions(self) -> None:
@@ -195,6 +242,8 @@ class Scan:
                     raise Malformed("a clock that no client reaches")
                 needs[client] = max(end, needs.get(client, 0))
                 self.parted.extend(((client, start), (client, end)))
+                if self._collects:
+                    self.deleted.setdefault(client, []).append((start, end))
 
 
 def _need(reader: ByteReader, needs: dict[int, int]) -> tuple[int, int]:
