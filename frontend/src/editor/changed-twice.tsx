@@ -74,7 +74,7 @@ function useLogged(found: readonly ChangedTwice[], looks: boolean) {
 
 /** `isWhole`: whether all steps since then were read; undefined while none are. */
 function unknownWords(isWhole: boolean | undefined, error: Error | null): string {
-  if (isWhole) return "another value, which was replaced at once, so the history does not show it";
+  if (isWhole) return "another value, which the history does not show";
   if (isWhole === false)
     return "another value; too much changed since then to show it here: see the history";
   if (error === null) return "another value, which is being read from the history";

@@ -16,6 +16,7 @@ const SIGNS: Readonly<Record<EntryLine["sign"], ReactNode>> = {
   added: "+",
   removed: "−",
   changed: "△",
+  overwritten: "≠",
   looks: "·",
   said: <IconNote size={12} />,
 };

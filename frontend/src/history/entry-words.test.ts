@@ -109,3 +109,37 @@ test("names are said without their number where it is 0", () => {
     "an action",
   ]);
 });
+
+test("values that were overwritten at once, with what stayed", () => {
+  const overwritten = {
+    fields: [{ field: "description", before: "mine", after: "theirs" }],
+    actions: [
+      changed("a", "Look_0", ["description", "by Ada", "by Mari"], ["position", [0, 0], [1, 1]]),
+      changed("b", "Grip_0", ["name", "Grasp_0", "Grip_0"], ["in/speed", number(3), number(7)]),
+      changed("c", "Lift_0", ["description", "up", ""]),
+      { change: "removed" as const, aid: "d", name: "Turn_0", fields: [] },
+    ],
+    relations: [
+      arrow("removed", "Dock", "Charge"),
+      {
+        ...arrow("changed", "Look", "Grip"),
+        fields: [{ field: "on_true", before: "stop", after: "run" }],
+        when: [],
+      },
+    ],
+    notes: [{ change: "changed" as const, id: "n", text: "hot steam", moved: false }],
+  };
+  expect(words({ overwritten })).toEqual([
+    "set Look description to by Ada, overwritten at once by by Mari",
+    "moved Look, overwritten at once",
+    "renamed Grip to Grasp, overwritten at once by Grip",
+    "set Grip speed to 3, overwritten at once by 7",
+    "set Lift description to up, deleted by somebody else at the same time",
+    "added Turn, deleted by somebody else at the same time",
+    "connected Dock → Charge, deleted by somebody else at the same time",
+    "set Look → Grip when true to stop, overwritten at once by run",
+    "set the graph description to mine, overwritten at once by theirs",
+    "wrote a note “hot steam”, overwritten at once",
+  ]);
+  expect(entryLines({ overwritten }).every(({ sign }) => sign === "overwritten")).toBe(true);
+});

@@ -5,8 +5,11 @@ import type { HistoryEntry } from "../api/history";
 import { type FieldChange, linesOf } from "../differences/difference-words";
 import { isolated } from "../words/isolated";
 
-/** `looks`: only where things stand, which means nothing to a robot. `said`: notes and comments. */
-type LineSign = "added" | "removed" | "changed" | "looks" | "said";
+/**
+ * `looks`: only where things stand, which means nothing to a robot. `said`: notes and comments. `overwritten`: a
+ * value that never stood, since somebody else had set another one without knowing of it.
+ */
+type LineSign = "added" | "removed" | "changed" | "overwritten" | "looks" | "said";
 
 export interface LinePart {
   readonly kind: "text" | "name" | "old" | "new";
@@ -182,7 +185,78 @@ function looksLine(
   return [{ sign: "looks", of: null, parts: [text(did.join(" and "))] }];
 }
 
-const ORDER: readonly LineSign[] = ["added", "removed", "changed", "said", "looks"];
+const ORDER: readonly LineSign[] = ["added", "removed", "changed", "overwritten", "said", "looks"];
+
+type OverwrittenChanges = NonNullable<SittingChanges["overwritten"]>;
+
+/** The value that was wanted, and the one that stayed. */
+function wantedAndStayed(wanted: string | null, stayed: string | null): LinePart[] {
+  const is = stayed === null || stayed === "" ? null : stayed;
+  const end =
+    is === null
+      ? [text(", deleted by somebody else at the same time")]
+      : [text(", overwritten at once by "), { kind: "new", text: short(is) } as const];
+  return [text(" to "), { kind: "old", text: short(wanted || "nothing") }, ...end];
+}
+
+/** A field whose values are said; the full names of an action become what people call it. */
+function spokenField({ field, before, after }: FieldChange): FieldChange {
+  if (field !== "name") return { field, before, after };
+  return { field, before: spokenName(String(before)), after: spokenName(String(after)) };
+}
+
+/**
+ * Return lines for values that this person set while somebody else, without knowing of it, set those that stayed.
+ * `before` of a field is the wanted value, `after` the one that stayed.
+ */
+function overwrittenLines(changes: OverwrittenChanges): EntryLine[] {
+  const { fields = [], actions = [], relations = [], notes = [] } = changes;
+  const line = (of: string | null, ...parts: readonly LinePart[]): EntryLine => ({
+    sign: "overwritten",
+    of,
+    parts,
+  });
+  const set = (of: string | null, what: readonly LinePart[], all: readonly FieldChange[]) =>
+    linesOf(all).map(({ name: field, before, after }) => {
+      const did = text(field === "name" ? "renamed " : "set ");
+      const its =
+        field === "required" ? "waits for it" : plainField(field).replace(/^on /, "when ");
+      const named = field === "name" ? [] : [text(` ${its}`)];
+      return line(of, did, ...what, ...named, ...wantedAndStayed(before, after));
+    });
+  const gone = text(", deleted by somebody else at the same time");
+  const atOnce = text(", overwritten at once");
+  return [
+    ...actions.flatMap(({ aid, name: full, change, fields: its }) => {
+      const spoken = name(spokenName(full));
+      if (change !== "changed") return [line(aid, text("added "), spoken, gone)];
+      const moved = its.filter(({ field }) => field === "position").length;
+      return [
+        ...set(aid, [spoken], its.filter(({ field }) => field !== "position").map(spokenField)),
+        ...(moved > 0 ? [line(aid, text("moved "), spoken, atOnce)] : []),
+      ];
+    }),
+    ...relations.flatMap(({ ends, parent, child, change, fields: its }) => {
+      const between = [name(spokenName(parent)), text(" → "), name(spokenName(child))];
+      const of = ends.join(">");
+      if (change !== "changed") return [line(of, text("connected "), ...between, gone)];
+      const bends = its.filter(isBend).length;
+      return [
+        ...set(
+          of,
+          between,
+          its.filter((field) => !isBend(field)),
+        ),
+        ...(bends > 0 ? [line(of, text("bent "), ...between, atOnce)] : []),
+      ];
+    }),
+    ...set(null, [text("the graph")], fields),
+    ...notes.map((note) => {
+      const said = note.text === "" ? "" : ` “${short(note.text.replace(/\s+/g, " "))}”`;
+      return line(`g/${note.id}`, text(`${note.moved ? "moved" : "wrote"} a note${said}`), atOnce);
+    }),
+  ];
+}
 
 /**
  * Return lines for all changes of a sitting: added and removed things first, changes of looks last.
@@ -200,6 +274,7 @@ export function entryLines(changes: SittingChanges): EntryLine[] {
     ...graphLines(fields),
     ...notes.filter((note) => !note.moved).map(noteLine),
     ...looksLine(actions, relations, notes),
+    ...(changes.overwritten ? overwrittenLines(changes.overwritten) : []),
   ];
   if (comments > 0) {
     const words = comments === 1 ? "wrote a comment" : `wrote comments in ${comments} threads`;

@@ -17,7 +17,15 @@ import { day, hourMinute, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
 import { useTimeline } from "./timeline";
 import style from "./value-history.module.css";
-import { blamedName, factsOf, runNumbers, spansOf, type ValueSpan } from "./value-spans";
+import {
+  blamedName,
+  factsOf,
+  type OverwrittenValue,
+  overwrittenOf,
+  runNumbers,
+  spansOf,
+  type ValueSpan,
+} from "./value-spans";
 
 interface ByProps {
   value: Pick<FieldValue, "author" | "at" | "merged">;
@@ -46,14 +54,33 @@ export function By({ value, color }: ByProps) {
 interface TableProps {
   field: string;
   spans: readonly ValueSpan[];
+  overwritten: readonly OverwrittenValue[];
   colorOf: (person: string) => string;
   at: number;
 }
 
-/** The newest value first; each leads to its moment. */
-function ValueTable({ field, spans, colorOf, at }: TableProps) {
+/** A value that was overwritten at once: it leads nowhere, since the field never showed it. */
+function OverwrittenRow({ lost, color }: { lost: OverwrittenValue; color: string }) {
+  return (
+    <tr>
+      <td className={style.lost}>
+        <code>{lost.text}</code>
+      </td>
+      <td>
+        <By value={lost.value} color={color} />
+      </td>
+      <td className={style.ran}>
+        overwritten at once by <code>{lost.stayed}</code>
+      </td>
+    </tr>
+  );
+}
+
+/** The newest value first; each that the field has shown leads to its moment. */
+function ValueTable({ field, spans, overwritten, colorOf, at }: TableProps) {
   const { lookAt, past } = useEditorContext();
   const here = spans.findLast(({ value }) => value.seq <= at);
+  const rows = [...spans, ...overwritten].sort((a, b) => b.value.seq - a.value.seq);
   return (
     <table className={style.table}>
       <caption className="visually-hidden">Values of {isolated(blamedName(field))}</caption>
@@ -65,24 +92,32 @@ function ValueTable({ field, spans, colorOf, at }: TableProps) {
         </tr>
       </thead>
       <tbody>
-        {[...spans].reverse().map((span) => (
-          <tr key={span.value.seq} data-here={span === here || undefined}>
-            <td>
-              <button
-                type="button"
-                aria-current={span === here || undefined}
-                onClick={() => lookAt({ at: span.value.seq, with: past?.with ?? "own" })}
-              >
-                <code>{span.text}</code>
-                <span className="visually-hidden">: look at that moment</span>
-              </button>
-            </td>
-            <td>
-              <By value={span.value} color={colorOf(span.value.author.id)} />
-            </td>
-            <td className={style.ran}>{runNumbers(span.runs)}</td>
-          </tr>
-        ))}
+        {rows.map((span) =>
+          "stayed" in span ? (
+            <OverwrittenRow
+              key={`lost ${span.value.seq}`}
+              lost={span}
+              color={colorOf(span.value.author.id)}
+            />
+          ) : (
+            <tr key={span.value.seq} data-here={span === here || undefined}>
+              <td>
+                <button
+                  type="button"
+                  aria-current={span === here || undefined}
+                  onClick={() => lookAt({ at: span.value.seq, with: past?.with ?? "own" })}
+                >
+                  <code>{span.text}</code>
+                  <span className="visually-hidden">: look at that moment</span>
+                </button>
+              </td>
+              <td>
+                <By value={span.value} color={colorOf(span.value.author.id)} />
+              </td>
+              <td className={style.ran}>{runNumbers(span.runs)}</td>
+            </tr>
+          ),
+        )}
       </tbody>
     </table>
   );
@@ -153,7 +188,10 @@ export function ValueHistory({ of, field }: Props) {
   return (
     <div className={style.values}>
       {numbers > 1 && <ValueChart {...{ spans, colorOf, at }} />}
-      <ValueTable {...{ field, spans, colorOf, at }} />
+      <ValueTable
+        {...{ field, spans, colorOf, at }}
+        overwritten={overwrittenOf(field, data ?? [])}
+      />
       <ul className={style.facts} aria-label={`What ran with each ${isolated(blamedName(field))}`}>
         {factsOf(spans).map(({ text, words }) => (
           <li key={text}>

@@ -2,7 +2,7 @@ import { expect, test } from "vitest";
 import type { Version } from "../api/graphs";
 import type { FieldValue } from "../api/history";
 import type { ListedRun } from "../api/review";
-import { factsOf, runNumbers, spansOf } from "./value-spans";
+import { factsOf, overwrittenOf, runNumbers, spansOf } from "./value-spans";
 
 const value = (is: unknown, seq: number): FieldValue => ({
   value: is === null ? null : JSON.stringify({ pvf_type: "number", pvf_value: is }),
@@ -53,4 +53,14 @@ test("a value that came back has the runs of both times", () => {
 test("what is no number is no number", () => {
   const spans = spansOf("in/to", [value("office", 3), value(null, 2), value("1e9 m", 1)], [], []);
   expect(spans.map(({ number }) => number)).toEqual([null, null, null]);
+});
+
+test("a value that was overwritten at once has no runs, and takes none from the one that stayed", () => {
+  const lost = { ...value(0.7, 6), before: value(0.4, 5).value, overwritten: true };
+  const all = [value(0.9, 12), lost, value(0.4, 5), value(0.3, 2)];
+  expect(spansOf("in/speed", all, versions, runs)).toEqual(
+    spansOf("in/speed", values, versions, runs),
+  );
+  const [only, ...others] = overwrittenOf("in/speed", all);
+  expect([only?.text, only?.stayed, others.length]).toEqual(["0.7", "0.4", 0]);
 });

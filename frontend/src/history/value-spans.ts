@@ -22,7 +22,27 @@ function numberOf(value: unknown): number | null {
   return Number.isFinite(found) ? found : null;
 }
 
-/** `values` as they are asked for, the newest first; the spans are in the order of time. */
+/** A value that the field never showed, since another one, which stayed, was set at the same time. */
+export interface OverwrittenValue {
+  readonly value: FieldValue;
+  /** Both values as text. */
+  readonly text: string;
+  readonly stayed: string;
+}
+
+/** `values` as they are asked for, the newest first. */
+export function overwrittenOf(field: string, values: readonly FieldValue[]): OverwrittenValue[] {
+  return values.flatMap((value) =>
+    value.overwritten === true
+      ? [{ value, text: blamedValue(field, value.value), stayed: blamedValue(field, value.before) }]
+      : [],
+  );
+}
+
+/**
+ * `values` as they are asked for, the newest first; the spans are in the order of time. Values that were
+ * overwritten at once have none.
+ */
 export function spansOf(
   field: string,
   values: readonly FieldValue[],
@@ -36,7 +56,7 @@ export function spansOf(
       return seq === undefined ? [] : [{ run, seq }];
     })
     .sort((a, b) => a.run.number - b.run.number);
-  const oldest = [...values].reverse();
+  const oldest = values.filter(({ overwritten }) => overwritten !== true).reverse();
   return oldest.map((value, i) => {
     const until = oldest[i + 1]?.seq ?? Number.POSITIVE_INFINITY;
     const its = started.filter(({ seq }) => value.seq <= seq && seq < until);

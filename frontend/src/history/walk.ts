@@ -129,9 +129,13 @@ export class PastWalk {
     return this.#upto;
   }
 
-  /** Takes steps that adjoin those that it has; others are of no use, and are left. */
-  add(steps: readonly DocumentStep[], after: number, upto: number): void {
+  /**
+   * Takes steps that adjoin those that it has; others are of no use, and are left. So are values that were
+   * overwritten at once, which no graph showed.
+   */
+  add(all: readonly DocumentStep[], after: number, upto: number): void {
     if (upto < this.#from || after > this.#upto) return;
+    const steps = all.filter((step) => step.overwritten === undefined);
     const before = steps.filter(({ seq }) => seq <= this.#from);
     const behind = steps.filter(({ seq }) => seq > this.#upto);
     this.#steps = [...before, ...this.#steps, ...behind];

@@ -175,6 +175,8 @@ test("a value of others that came as collected is the newest one of others that 
   const known = asLogged(twice, [...steps, step(8, "mari", "other", "name")], "ada");
   expect(known?.theirs).toBe("theirs");
   expect(asLogged(twice, [step(5, "mari", "old"), step(7, "ada", "mine")], "ada")).toBeNull();
+  const lost = { ...step(8, "mari", "mine"), overwritten: "theirs" };
+  expect(asLogged(twice, [...steps.slice(2), lost], "ada")?.theirs).toBe("theirs");
   room.changedTwice.choose(known as ChangedTwice, "theirs");
   expect(server.doc.getMap("meta").get("description")).toBe("theirs");
 });

@@ -29,6 +29,8 @@ interface LoggedStep {
   readonly root: Root;
   readonly key: string;
   readonly after: unknown;
+  /** The value that the step brought, where another one overwrote it at once. */
+  readonly overwritten?: unknown;
 }
 
 /** Returns the choice with the value that others than `me` set last, by the log; null where it has none of them. */
@@ -42,7 +44,7 @@ export function asLogged(
     (step) => step.root === root && step.key === key && step.author !== me && step.seq > since,
   );
   if (last === undefined) return null;
-  const theirs = last.after ?? undefined;
+  const theirs = last.overwritten ?? last.after ?? undefined;
   return { ...twice, theirs, writes: { ...writes, theirs: [[root, key, theirs]] } };
 }
 
