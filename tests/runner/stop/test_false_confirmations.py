@@ -278,7 +278,9 @@ class Story:
             for node in [each for each in self.network.nodes if not each.robot.gone][:-1]:
                 self.network.kill(node)
             control.stop_all(BEN)
-            for turn in range(4):  # feedback that nobody can contradict opens one again for a moment
+            for turn in range(
+                4
+            ):  # feedback that nobody can contradict opens one again for a moment
                 with anyio.move_on_after(60):
                     while control.open:
                         await anyio.sleep(0.5)
