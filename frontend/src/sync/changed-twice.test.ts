@@ -54,6 +54,17 @@ const told = (all: readonly ChangedTwice[]) =>
   all.map(({ key, mine, theirs }) => [key.split("|")[1] ?? "", mine, theirs]);
 
 describe.each([true, false])("where the value of this page stands: %s", (wins) => {
+  test("the server gets the value of this page, from which the history tells it", () => {
+    open(wins);
+    const a = addAction(room.doc, { name: "A" });
+    apart(
+      (doc) => setField(doc, a, "description", "mine"),
+      (doc) => setField(doc, a, "description", "theirs"),
+    );
+    const sent = server.last.received.map((data) => new TextDecoder("latin1").decode(data));
+    expect(sent.some((text) => text.includes("mine"))).toBe(true);
+  });
+
   test("a field that two people changed is told with two values, and one of them is chosen", () => {
     open(wins);
     const a = addAction(room.doc, { name: "A" });

@@ -49,6 +49,10 @@ type LinkChange = Partial<Omit<RoomLink, "why" | "readOnly">> & {
   readOnly?: string | undefined;
 };
 
+function mergedEdits(edits: readonly UnsavedEdit[]): Uint8Array {
+  return Y.mergeUpdates(edits.map(({ update }) => update));
+}
+
 export function connectRoom(options: RoomOptions): Room {
   return new Connection(options);
 }
@@ -390,6 +394,11 @@ class Connection implements Room, SocketHandler {
     const whole = Y.encodeStateAsUpdate(this.doc, state);
     const edits = this.outbox.edits;
     if (whole.length <= LARGE) {
+      // The edits as they were made: a value that has just lost here is collected, and no longer in the document.
+      for (const piece of edits.length === 0 ? [] : piecesOf(mergedEdits(edits))) {
+        this.outbox.sentPart();
+        this.socket.send(messages.updateMessage(piece));
+      }
       this.outbox.sentAll();
       this.socket.send(messages.syncStep2(whole));
       return;
@@ -406,9 +415,7 @@ class Connection implements Room, SocketHandler {
   private giveUnsent(): void {
     const { unsent } = this.outbox;
     if (unsent.length === 0) return;
-    this.sendUpdate(Y.mergeUpdates(unsent.map(({ update }) => update)), () =>
-      this.outbox.sentAll(),
-    );
+    this.sendUpdate(mergedEdits(unsent), () => this.outbox.sentAll());
   }
 
   /** Sends an update, in pieces where one message could not hold it; `sent` counts the last of them. */
