@@ -1,6 +1,7 @@
 """Snapshots are a cache: gone, damaged or old ones make no difference but time."""
 
 import hashlib
+import pickle
 import sqlite3
 import zlib
 from collections.abc import Callable
@@ -11,10 +12,12 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Map
 
+from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.crdt.loading import Loaded, load
+from action_assistant.editor.log.document_events import UPDATED
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput
-from action_assistant.journal.events import nothing
+from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
 from editor.client import Client, settle
 
@@ -170,14 +173,21 @@ async def test_who_waits_for_something_is_still_its_author_after_a_snapshot(
     await journal.close()
 
 
-async def test_the_snapshot_of_a_large_document_is_stored_packed(tmp_path: Path) -> None:
-    path = tmp_path / "editor.db"
-    journal = await Journal.open(f"sqlite:///{path}", branch="editor", fold=nothing)
+def large() -> Doc[Any]:
+    """A document of more than 1 MiB."""
     doc: Doc[Any] = Doc()
     notes = doc.get("notes", type=Map)
     with doc.transaction():
         for n in range(16_000):
             notes[f"note {n}"] = f"The value of note {n} is written out here, to be long enough."
+    return doc
+
+
+async def test_the_snapshot_of_a_large_document_is_stored_packed(tmp_path: Path) -> None:
+    path = tmp_path / "editor.db"
+    journal = await Journal.open(f"sqlite:///{path}", branch="editor", fold=nothing)
+    doc = large()
+    notes = doc.get("notes", type=Map)
     rooms = Rooms(journal, linger=60, window=0)
     async with rooms.enter("graph/g") as room:
         await room.submit(doc.get_update(), "ada")
@@ -216,4 +226,39 @@ async def test_a_packed_snapshot_that_is_damaged_makes_no_difference(tmp_path: P
         found = await load(journal, "graph/g")
         assert (found.seq, found.kept) == (1, 0)
         assert found.replica.doc.get("notes", type=Map).to_py() == {"a": "b"}
+    await journal.close()
+
+
+async def test_a_large_document_travels_packed_between_processes(tmp_path: Path) -> None:
+    """Whatever the event loop pickles for a worker, and gets back, it copies."""
+    journal = await Journal.open(
+        f"sqlite:///{tmp_path / 'editor.db'}", branch="editor", fold=nothing
+    )
+    doc, sizes = large(), list[int]()
+    notes, whole = doc.get("notes", type=Map), len(doc.get_update())
+
+    async def in_worker(work: Callable[..., Any], /, *values: Any) -> Any:
+        found = work(*values)
+        sizes.extend(len(pickle.dumps(each)) for each in (values, found))
+        return found
+
+    rooms = Rooms(journal, linger=60, window=0)
+    async with rooms.enter("graph/g") as room:
+        await room.submit(doc.get_update(), "ada")
+    await rooms.close()
+    closed = Rooms(journal)
+    assert (await GraphReader(journal, closed, in_worker).now("g")).seq == 1
+    before = doc.get_state()
+    notes["one more"] = "value"
+    await journal.append("graph/g", [Draft(UPDATED, "ada", doc.get_update(before))])
+    reader = GraphReader(journal, closed, in_worker)
+    for seq in (1, 2):
+        sight = await reader.at("g", seq)
+        assert sight.seq == seq
+        read: Doc[Any] = Doc()
+        read.apply_update(sight.state)
+        assert len(read.get("notes", type=Map)) == 15_999 + seq
+    assert len(sizes) == 2
+    assert max(sizes) < whole // 3
+    await closed.close()
     await journal.close()

@@ -26,6 +26,11 @@ class Folded(msgspec.Struct, frozen=True):
     damaged: StreamDamage | None = None
 
 
+def _folded(replica: Replica, seq: int, damaged: StreamDamage | None = None) -> Folded:
+    """Return a document as it is sent from the worker: packed where it is large, since the event loop copies it."""
+    return Folded(ReplicaState.packed(ReplicaState.of(replica)), seq, damaged)
+
+
 def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
     """Fold events that rooms have accepted, with the result of `fold` with `learn`, but without
     reading every event completely. Other events could crash the process."""
@@ -34,7 +39,7 @@ def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
         return None
     try:
         replica.replay_sound(events)
-        return Folded(ReplicaState.of(replica), events.last)
+        return _folded(replica, events.last)
     except (Malformed, Panicked, Uncertain):
         return fold(document, events, learn=True)
 
@@ -49,7 +54,7 @@ def fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
         return None
     try:
         replica.replay(events, learn=learn)
-        return Folded(ReplicaState.of(replica), events.last)
+        return _folded(replica, events.last)
     except (Malformed, Panicked):
         return _before_the_bad(document, events, learn=learn)
 
@@ -65,7 +70,7 @@ def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Fo
     replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
     replica.replay(good, learn=learn)
-    return Folded(ReplicaState.of(replica), good.last, damaged)
+    return _folded(replica, good.last, damaged)
 
 
 def _first_bad(document: bytes, events: EventColumns) -> tuple[int, str]:

@@ -287,7 +287,8 @@ async def stored(
         found = await _followed(
             journal, stream, snapshot, upto, learn=learn, run_in_worker=run_in_worker
         )
-        if await ReplicaState.read_aside(found.document) is not None:
+        is_ours = found.document is not snapshot.state
+        if is_ours or await ReplicaState.read_aside(found.document) is not None:
             return found
     return await _followed(journal, stream, None, upto, learn=learn, run_in_worker=run_in_worker)
 

@@ -481,9 +481,12 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
     async def packed_aside(kept: bytes) -> bytes:
         """Compress a large snapshot to about a tenth: all edits wait for as long as the writer stores it. A thread
         does it, since compressing needs no interpreter lock."""
-        if len(kept) < _LARGE:
-            return kept
-        return await asyncio.to_thread(zlib.compress, kept, 1)
+        return kept if len(kept) < _LARGE else await asyncio.to_thread(ReplicaState.packed, kept)
+
+    @staticmethod
+    def packed(kept: bytes) -> bytes:
+        """Compress a large snapshot as `packed_aside` does. For workers."""
+        return kept if len(kept) < _LARGE else zlib.compress(kept, 1)
 
     @staticmethod
     def is_packed(kept: bytes) -> bool:
