@@ -55,7 +55,7 @@ test("the script is the default, and behaviours are a choice beside it", async (
   );
   await dialog.getByRole("radio", { name: /^Python behaviours/ }).check();
   await expect(dialog.getByRole("radio", { name: /^Simulator/ })).toHaveAccessibleName(
-    "Simulator its Python may move something",
+    "Simulator its Python code may move something",
   );
   const hold = dialog.getByRole("button", { name: "Start v1 on the simulator" });
   await expect(hold).toBeEnabled();
@@ -72,7 +72,7 @@ test("one that cannot be run is said before the start, which is not offered then
   await open(page, "Broken");
   const dialog = page.getByRole("dialog", { name: /^Start v1/ });
   await dialog.getByRole("radio", { name: /^Python behaviours/ }).check();
-  const looked = dialog.getByRole("region", { name: "Looked at before the start" });
+  const looked = dialog.getByRole("region", { name: "Checks before the start" });
   await expect(looked.getByText("broken.py cannot be read: it is not UTF-8")).toBeVisible();
   await expect(dialog.getByRole("button", { name: /^Start v1: Something/ })).toBeDisabled();
   await dialog.getByRole("radio", { name: /^Simulated/ }).check();

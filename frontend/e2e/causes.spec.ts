@@ -96,7 +96,9 @@ test("since when it fails is named: who, what, and the step that differs", async
   await page.getByRole("button", { name: "Since when?" }).click();
   const dialog = page.getByRole("dialog", { name: "Since when?" });
   const place = dialog.getByRole("list", { name: "Where it goes another way" });
-  await expect(place.getByRole("listitem").first()).toContainText("from this edit on it goes");
+  await expect(place.getByRole("listitem").first()).toContainText(
+    "from this edit on, the graph goes",
+  );
   await expect(place).toContainText("Wait_0 → Wait_1");
   await expect(place).toContainText("Wait_1 is told to run");
   await expect(dialog).toContainText(/since run \d+, which went well/);

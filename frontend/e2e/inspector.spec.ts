@@ -197,7 +197,7 @@ test("a parameter is renamed, retyped, limited to values, and a pose is added as
   await settings.getByRole("textbox", { name: "Allowed values" }).fill("red\nblue");
   await settings.getByRole("switch", { name: "Required" }).click({ force: true });
   await settings.getByRole("textbox", { name: "Name" }).fill("target");
-  await expect(settings.getByText(/This is a group of others/)).toBeVisible();
+  await expect(settings.getByText(/This name clashes with a group/)).toBeVisible();
   await settings.getByRole("textbox", { name: "Name" }).fill("paint");
   await settings.getByRole("textbox", { name: "Name" }).press("Enter");
   await page.getByRole("combobox", { name: "paint" }).click();

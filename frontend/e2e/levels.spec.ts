@@ -84,7 +84,7 @@ test("an address names its level: a colleague who opens it stands in it, and fin
 test("a graph that others run inside says so, and which they are", async () => {
   const { page } = ada;
   await page.getByRole("button", { name: "Used in 1 graph" }).click();
-  await expect(page.getByRole("menu")).toContainText("What you change here changes in each");
+  await expect(page.getByRole("menu")).toContainText("Your changes here apply in each");
   await page.getByRole("menuitem", { name: "Round" }).click();
   await expect(card(page, "Fetch")).toBeVisible();
   await expect(where(page)).toContainText("Graphs/Round");

@@ -127,7 +127,7 @@ test("hits are stepped through by keyboard and shown on the canvas; one robot st
   await page.keyboard.press("Shift+Enter");
   await expect(count).toHaveText(/^1 of \d+/);
   await field.fill("type:nothing_is_of_this");
-  await expect(page.getByText("Nothing says that.")).toBeVisible();
+  await expect(page.getByText("Nothing matches.")).toBeVisible();
   await page.keyboard.press("Escape");
   await expect(field).toHaveCount(0);
 

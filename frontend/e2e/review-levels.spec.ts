@@ -223,7 +223,7 @@ test("where the runner has the robot's folder, what it lacks is written there an
     const write = looked.getByRole("button", { name: NAME });
     await write.focus();
     await page.keyboard.press("Enter"); // no hold: it asks
-    await expect(page.getByText("What is there now is kept beside it.")).toBeVisible();
+    await expect(page.getByText("A copy of the present state is kept beside it.")).toBeVisible();
     await page
       .getByRole("button", { name: `${NAME}, and replace grip.graph.json` })
       .last()

@@ -262,7 +262,7 @@ test("figures of a robot say what is not known, and between which bounds the res
   const { page } = ada;
   await page.goto(`${product.url}/runs/statistics?graph=${runs.good?.graph}`);
   const success = page.locator("section").filter({ hasText: "Success" }).first();
-  await expect(success).toContainText("Of 1 that finished the result is not known");
+  await expect(success).toContainText("1 finished with an unknown result");
   await expect(page.getByText(/arrows? it is not known whether/)).toBeVisible();
   await expect(page.getByRole("row").filter({ hasText: "Grip_0" })).toContainText(/[–≤]/);
   await open(page, runs.good);

@@ -157,7 +157,7 @@ test("a start of somebody else is seen, named, imported and stopped", async () =
   await page.goto(`${product.url}/robots`);
   const there = card(page, "Eve");
   await expect(there.getByText("not started from here")).toBeVisible({ timeout: 30_000 });
-  await expect(there.getByText("1 other program can start things there")).toBeVisible();
+  await expect(there.getByText("1 other program can also start graphs on it")).toBeVisible();
   await there.getByRole("tab", { name: "What others told it" }).click();
   await expect(there.getByText("Somebody else started theirs")).toBeVisible();
   await there.getByRole("button", { name: "Stop", exact: true }).click();
@@ -246,7 +246,7 @@ test.describe("what the page shows of an engine that", () => {
     await expect(card(page, "Old").getByText(older)).toBeVisible();
     await choose(page, await product.chain(2, 1), ["Old"]);
     await expect(lookedAt(page, "Old").getByText(/generation/)).toBeVisible();
-    const start = page.getByRole("button", { name: "Something stands in the way" });
+    const start = page.getByRole("button", { name: "A check prevents the start" });
     await expect(start).toBeDisabled();
   });
 

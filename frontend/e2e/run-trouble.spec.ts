@@ -181,7 +181,7 @@ test("the answer to a start on two robots gets lost: both runs are found, and no
   await page.keyboard.down("Enter");
   await expect(page.getByRole("dialog")).toBeHidden();
   await page.keyboard.up("Enter");
-  const notice = page.getByRole("region", { name: "Starts that are not sure" });
+  const notice = page.getByRole("region", { name: "Starts without an answer" });
   for (const robot of ["David", "Eve"]) {
     await expect(notice).toContainText(new RegExp(`Started after all: run \\d+ on ${robot}`));
   }

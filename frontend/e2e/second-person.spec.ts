@@ -54,7 +54,7 @@ test("nobody starts alone, also who has said yes", async () => {
   const { page } = ada;
   await openStart(page);
   await expect(lookedAt(page)).toContainText("nobody else has said yes to exactly this graph");
-  await expect(page.getByRole("button", { name: /Something stands in the way/ })).toBeDisabled();
+  await expect(page.getByRole("button", { name: /A check prevents the start/ })).toBeDisabled();
   await yes(page).click();
   await expect(dialog(page)).toContainText("You said yes to v1: somebody else may start it.");
   await dialog(page).getByRole("button", { name: "Look again" }).click();

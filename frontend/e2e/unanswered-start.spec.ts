@@ -23,7 +23,7 @@ interface Run {
 }
 
 const runs = () => product.ask<Run[]>("/api/runs", {}, product.runnerUrl);
-const notice = (page: Page) => page.getByRole("region", { name: "Starts that are not sure" });
+const notice = (page: Page) => page.getByRole("region", { name: "Starts without an answer" });
 
 /** Every start that leaves the page, and what becomes of it on its way. */
 async function underWay(page: Page, then: (route: Route) => Promise<void>): Promise<string[]> {
@@ -96,8 +96,8 @@ test("it never arrives: that is not known, and so it is said, for as long as it 
   const sent = await underWay(page, (route) => route.abort("connectionreset"));
   await start(page);
   await expect(notice(page)).toContainText("NOT KNOWN whether v1 of chain_60 started");
-  await expect(notice(page)).toContainText("has nothing of it so far");
-  await expect(notice(page)).toContainText("not sent again");
+  await expect(notice(page)).toContainText("knows nothing of this start so far");
+  await expect(notice(page)).toContainText("does not send it again");
   await page.screenshot({ path: test.info().outputPath("unsure.png") });
   expect(sent).toHaveLength(1);
   expect(await runs()).toHaveLength(before);

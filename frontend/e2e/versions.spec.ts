@@ -108,7 +108,7 @@ test("a value is set back from the chart of all that it was", async () => {
   await expect(rows.nth(1)).toContainText(/1\.5.*Mari/);
   await expect(rows.nth(2)).toContainText(/0\.9.*Ada.*runs 1–2/);
   await expect(rows.nth(3)).toContainText("0.4");
-  await expect(speed.getByRole("list", { name: /What ran/ })).toContainText(
+  await expect(speed.getByRole("list", { name: /Runs with each value/ })).toContainText(
     /With 0\.9: 2 runs, 2 true/,
   );
   expect(await violations(page)).toEqual([]);

@@ -180,8 +180,8 @@ export function FindBar({ problems, onClose }: Props) {
       </div>
       {none && (
         <p className={style.none}>
-          Nothing says that. <code>robot:</code>, <code>type:</code>, <code>parameter:</code>,{" "}
-          <code>problem:</code> look in one place only.
+          Nothing matches. <code>robot:</code>, <code>type:</code>, <code>parameter:</code>,{" "}
+          <code>problem:</code> search in one field only.
         </p>
       )}
       {query === "" && (

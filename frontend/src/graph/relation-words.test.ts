@@ -21,7 +21,7 @@ test("an arrow says each thing that it does, with the outcomes that lead there",
   setResponse(doc, id, "on_error", "bypass");
   expect(words()).toEqual([
     "Runs when Scan ends true, ends false or is stopped.",
-    "Is passed over when Scan ends with an error: what follows it starts at once.",
+    "Is bypassed when Scan ends with an error: the actions after it start at once.",
   ]);
   const nothing = () => ignoredWords(graphOf(doc), graphOf(doc).relations[0] as never);
   expect(nothing()).toBeNull();
@@ -41,9 +41,9 @@ test("an arrow that one side does not know says what comes of that", () => {
     return startWords(graphOf(doc), b).join(" ");
   };
   expect(words("children")).toContain("the engine breaks down when A ends");
-  expect(words("parents")).toContain("this never runs");
+  expect(words("parents")).toContain("it never runs");
   setRequired(doc, id, false); // makes it known to both again
-  expect(words("parents")).toContain("nothing comes of it");
+  expect(words("parents")).toContain("the arrow does nothing");
 });
 
 test("a join says whom it waits for", () => {
@@ -59,7 +59,7 @@ test("a join says whom it waits for", () => {
   setRequired(doc, fromB, false);
   expect(last()).toBe("Waits until A has ended, not for B.");
   setRequired(doc, fromA, false);
-  expect(last()).toBe("Does not wait for the others: each counts by itself, each time.");
+  expect(last()).toBe("Does not wait for the others: each arrow acts on its own, every time.");
   setEntry(doc, c);
   setRequired(doc, fromA, true);
   expect(last()).toBe("Waits for A also at the start, so it cannot be the first.");
@@ -76,7 +76,7 @@ test("an end says when the graph ends", () => {
   expect(startWords(graphOf(doc), a)).toEqual(["Runs when the graph starts."]);
   expect(startWords(graphOf(doc), EXIT)).toEqual([
     "The graph ends when A ends true.",
-    "The graph ends at once when A ends with an error, whoever else it waits for.",
+    "The graph ends at once when A ends with an error, whatever else it waits for.",
   ]);
 });
 

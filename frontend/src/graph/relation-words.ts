@@ -79,11 +79,11 @@ export function startWords(graph: Graph, key: Key): readonly string[] {
 /** A file that lists a relation on one side only (hazards H2 and H2b). */
 function oneSidedWords(relation: Relation, parent: string): string {
   if (relation.only === "children") {
-    return `Only ${isolated(parent)} knows of this arrow: the engine breaks down when ${isolated(parent)} ends.`;
+    return `Only ${isolated(parent)} lists this arrow: the engine breaks down when ${isolated(parent)} ends.`;
   }
   return relation.required
-    ? `${isolated(parent)} does not know of this arrow, yet is waited for: this never runs.`
-    : `${isolated(parent)} does not know of this arrow: nothing comes of it.`;
+    ? `${isolated(parent)} does not list this arrow, but this action waits for it: it never runs.`
+    : `${isolated(parent)} does not list this arrow: the arrow does nothing.`;
 }
 
 function groups(relation: Relation): { response: Response; outcomes: Precondition[] }[] {
@@ -105,11 +105,11 @@ function responseWords(response: Response, when: string): string {
     case "stop":
       return `Is stopped, if it runs, when ${when}.`;
     case "pause":
-      return `Is paused, if it runs, when ${when}; only resuming the graph wakes it.`;
+      return `Is paused, if it runs, when ${when}; it goes on only when the graph is resumed.`;
     case "restart":
       return `Nothing happens when ${when}: the engine knows “restart” but does not do it.`;
     case "bypass":
-      return `Is passed over when ${when}: what follows it starts at once.`;
+      return `Is bypassed when ${when}: the actions after it start at once.`;
     case "ignore":
       return `Does nothing when ${when}.`;
   }
@@ -118,7 +118,7 @@ function responseWords(response: Response, when: string): string {
 /** For the engine run, stop, pause and restart of the end are all one. */
 function endWords(response: Response, when: string): string {
   return response === "bypass"
-    ? `The graph ends at once when ${when}, whoever else it waits for.`
+    ? `The graph ends at once when ${when}, whatever else it waits for.`
     : `The graph ends when ${when}.`;
 }
 
@@ -135,7 +135,7 @@ function waitWords(graph: Graph, relations: readonly Relation[]): string | null 
   if (parents.length < 2) return null;
   if (free.length === 0) return `Waits until ${names(required)} have ended; the last one decides.`;
   if (required.length === 0)
-    return "Does not wait for the others: each counts by itself, each time.";
+    return "Does not wait for the others: each arrow acts on its own, every time.";
   const ended = required.length > 1 ? "have ended" : "has ended";
   return `Waits until ${names(required)} ${ended}, not for ${names(free)}.`;
 }

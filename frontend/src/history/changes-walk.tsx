@@ -22,7 +22,7 @@ export function showThing({ select, view }: EditorContext, { key, thing }: Chang
 }
 
 function thingWords({ name, change, looks, lines }: ChangedThing): string {
-  if (looks) return `${isolated(name)}: only where it stands`;
+  if (looks) return `${isolated(name)}: only its position`;
   const [line] = lines;
   if (change !== "changed" || line === undefined) return `${name} ${change}`;
   const more = lines.length > 1 ? ` and ${lines.length - 1} more` : "";

@@ -140,7 +140,7 @@ export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
         )}
         {changes && <ChangesWalk changes={changes} />}
         {compared.foreign !== null && <Foreign run={compared.foreign} {...{ running }} />}
-        {seq === 0 && <p>The past is on the server, which is not there now.</p>}
+        {seq === 0 && <p>The past is stored on the server, which does not answer now.</p>}
         {compared.error && <p role="alert">{errorText(compared.error)}</p>}
       </div>
     </section>
@@ -152,8 +152,8 @@ function Foreign({ run, running }: { run: string; running: ReturnType<typeof use
   const words = running.find((each) => each.run === run)?.words ?? "a run that is over";
   return (
     <p role="note" className={style.foreign}>
-      <b>What runs is no version of this graph</b> ({words}). It is compared as it was sent; whose
-      the differences are is not known.
+      <b>What runs is no version of this graph</b> ({words}). It is compared as it was sent; who
+      made the differences is not known.
     </p>
   );
 }

@@ -11,6 +11,6 @@ test("what was left is named, and only the first few", () => {
   ];
   const graph = { ...EMPTY_GRAPH, actions };
   expect(leftWords(graph, [])).toBe("");
-  expect(leftWords(graph, [a, `${a}>${b}`])).toContain("it: Drive, Drive → Grip.");
+  expect(leftWords(graph, [a, `${a}>${b}`])).toContain("since: Drive, Drive → Grip.");
   expect(leftWords(graph, [a, b, a, b, a, b])).toContain(" and 2 more.");
 });

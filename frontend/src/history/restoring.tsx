@@ -60,7 +60,7 @@ export function PastWays({ versions }: { versions: readonly Version[] }) {
       >
         Copy {isolated(called)} as a new graph
       </Button>
-      <p>To go back is an edit like any other: nothing is lost, and it can be undone.</p>
+      <p>Restoring is an edit like any other: nothing is lost, and you can undo it.</p>
     </div>
   );
 }
@@ -82,7 +82,7 @@ export function leftWords(graph: Graph, left: readonly string[]): string {
   if (left.length === 0) return "";
   const names = left.slice(0, MOST).map((key) => thingName(graph, key));
   const more = left.length > names.length ? ` and ${left.length - names.length} more` : "";
-  return `Left as it is, since others changed it or built on it: ${names.map(isolated).join(", ")}${more}.`;
+  return `Not undone, because others changed it or built on it since: ${names.map(isolated).join(", ")}${more}.`;
 }
 
 export function useGoingBack(context: EditorContext) {

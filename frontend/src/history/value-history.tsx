@@ -151,7 +151,11 @@ function SetBack({ of, field, span }: Props & { span: ValueSpan }) {
     notifications.show(
       done
         ? { message: `${isolated(name)} is ${span.text} again`, autoClose: 4_000 }
-        : { color: "red", title: "Not set back", message: "What it belongs to is not there now." },
+        : {
+            color: "red",
+            title: "Not set back",
+            message: "The part of the graph with this value no longer exists.",
+          },
     );
   };
   return (
@@ -192,7 +196,10 @@ export function ValueHistory({ of, field }: Props) {
         {...{ field, spans, colorOf, at }}
         overwritten={overwrittenOf(field, data ?? [])}
       />
-      <ul className={style.facts} aria-label={`What ran with each ${isolated(blamedName(field))}`}>
+      <ul
+        className={style.facts}
+        aria-label={`Runs with each value of ${isolated(blamedName(field))}`}
+      >
         {factsOf(spans).map(({ text, words }) => (
           <li key={text}>
             <b>

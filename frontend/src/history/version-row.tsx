@@ -182,7 +182,7 @@ function InsideVersion({ version }: { version: Version }) {
     <>
       <p className={style.quiet}>
         {graphs.length === 1 ? "1 graph" : `${graphs.length} graphs`} inside
-        {changed > 0 && `, ${changed} otherwise now: published again, it takes them as they are`}
+        {changed > 0 && `, ${changed} changed since: a new version takes them as they are now`}
       </p>
       <ul className={style.inside} aria-label="Graphs inside of it">
         {graphs.map((each) => (

@@ -66,8 +66,7 @@ export function VersionsList({ timeline }: { timeline: Timeline }) {
       <PublishForm />
       {all.length === 0 && (
         <p className={style.empty}>
-          No version yet. One is published with each start, and by hand whenever there is something
-          to say of it.
+          No version yet. Each start publishes one. You can also publish one by hand, with a note.
         </p>
       )}
       <ol className={style.list} aria-label="Versions">
@@ -78,7 +77,7 @@ export function VersionsList({ timeline }: { timeline: Timeline }) {
           {all.length - most} older ones
         </Button>
       )}
-      {moreRuns && <p className={style.empty}>Runs are counted among the newest {runs.length}.</p>}
+      {moreRuns && <p className={style.empty}>Only the newest {runs.length} runs are counted.</p>}
     </>
   );
 }
@@ -91,7 +90,7 @@ function useObstacle(): string | null {
   const { past } = useEditorContext();
   const { state, unsaved, seq } = useThrottledLink();
   if (past !== null) return null; // that is stored
-  if (state !== "live" || seq === 0) return "The server is not there now.";
+  if (state !== "live" || seq === 0) return "The server does not answer now.";
   return unsaved > 0 ? "Saving what was changed …" : null;
 }
 
@@ -143,7 +142,7 @@ function Fields({ onPublished, onClose }: FieldsProps) {
       />
       <Textarea
         label="Note"
-        placeholder="What is to be known of it"
+        placeholder="What should others know about it?"
         autosize
         minRows={2}
         maxRows={8}

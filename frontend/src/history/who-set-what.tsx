@@ -50,7 +50,7 @@ export function WhoSetWhat({ of, what }: { of: string; what: string }) {
   const colorOf = usePersonColors(found.data?.map(({ author }) => author.id));
   const { busy, restore } = useGoingBack(context);
   if (found.isPending) return <Skeleton height={120} />;
-  if (found.isError) return <p className={style.quiet}>It was not there at that moment.</p>;
+  if (found.isError) return <p className={style.quiet}>It did not exist at that moment.</p>;
   return (
     <>
       <ul className={style.fields} aria-label="Who set what">

@@ -16,7 +16,7 @@ export function ActionFacts({ button, known }: { button: ReactElement; known: Kn
       <Menu.Target>{button}</Menu.Target>
       <Menu.Dropdown>
         <div className={style.facts}>
-          <p>{template.description || "Nobody has described it yet."}</p>
+          <p>{template.description || "No description yet."}</p>
           {[
             ["Takes", takes],
             ["Gives", gives],

@@ -88,7 +88,7 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
           >
             {mayEdit
               ? "Begin with an empty one, or drop a UMRF file anywhere on this page."
-              : "What the others make appears here."}
+              : "Graphs of others appear here."}
           </Empty>
         )}
         {list.length > 0 && <GraphCards graphs={list} />}

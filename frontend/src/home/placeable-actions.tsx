@@ -109,7 +109,9 @@ function Graphs({ graphs, onPlace }: { graphs: readonly KnownGraph[]; onPlace: P
       <div className={style.heading}>
         <h2>Graphs</h2>
       </div>
-      <p className={style.how}>One action that runs a whole graph, where a robot has indexed it.</p>
+      <p className={style.how}>
+        Each is one action that runs a whole graph, on robots that have indexed it.
+      </p>
       {graphs.map(({ graph, template }) => (
         <ActionRow key={graph} known={bare(template)} note={on(template.name)} onPlace={onPlace} />
       ))}

@@ -62,7 +62,7 @@ function GraphList({ search, current }: { search: string; current: string | unde
         ))}
       </nav>
       {graphs.isSuccess && shown.length === 0 && (
-        <p className={style.hint}>{search === "" ? "No graph yet." : "No graph is called so."}</p>
+        <p className={style.hint}>{search === "" ? "No graph yet." : "No graph has this name."}</p>
       )}
     </>
   );

@@ -34,7 +34,7 @@ function Ghost({ action }: { action: Action }) {
         <b>
           {action.name} {action.instanceId}
         </b>
-        , but the graph has no such action. It cannot be started like this.
+        , but the graph has no such action. The graph cannot be started like this.
         <Group mt="sm">
           <Button size="compact-sm" onClick={() => adoptGhost(doc, action.key)}>
             Make it an action

@@ -22,7 +22,7 @@ export function GraphForm() {
         <DraftInput
           label="Graph"
           value={graph.name}
-          check={(draft) => (draft.trim() === "" ? "A graph has a name." : null)}
+          check={(draft) => (draft.trim() === "" ? "Enter a name for the graph." : null)}
           onCommit={(name) => rename(name.trim())}
           onLeaving
         />
@@ -58,8 +58,8 @@ function Tips() {
     return (
       <ul className={style.tips}>
         <li>Tap + and type the name of an action</li>
-        <li>Tap an outcome of a card, then what shall follow it</li>
-        <li>A finger that rests on a card shows what can be done with it</li>
+        <li>Tap an outcome of a card, then the action that follows</li>
+        <li>Hold a finger on a card to see what you can do with it</li>
         <li>Two fingers move and zoom</li>
         <li>Tap a card or an arrow to see what it says</li>
       </ul>
@@ -70,10 +70,10 @@ function Tips() {
       <li>
         <FirstShortcut editAction={add} /> or double-click: type the name of an action
       </li>
-      <li>Drag from an outcome of a card to what shall follow it</li>
+      <li>Drag from an outcome of a card to the action that follows</li>
       <li>Drop on empty canvas to add the next action there</li>
       <li>
-        <FirstShortcut editAction={connectTo} /> draws an arrow by keys alone, once more goes on
+        <FirstShortcut editAction={connectTo} /> draws an arrow by keyboard; press again to continue
         from its end
       </li>
       <li>

@@ -61,7 +61,7 @@ function InterfaceRow({ side, of: parameter }: ParameterProps) {
           }
         />
       )}
-      {mixed && <p className={style.mixed}>Its actions take it as different types.</p>}
+      {mixed && <p className={style.mixed}>Actions of this graph take it with different types.</p>}
     </li>
   );
 }

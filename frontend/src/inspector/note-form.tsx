@@ -90,8 +90,8 @@ export function NoteForm({ note }: { note: Note }) {
       </div>
       <p className={style.hint}>
         {frame
-          ? "A frame takes along what lies in it. No engine reads it."
-          : "Markdown. [[Drive 0]] links to the action of that name, also once it is called otherwise. No engine reads notes."}
+          ? "Moving a frame moves what lies in it. Engines ignore frames."
+          : "Markdown. [[Drive 0]] links to the action of that name, also after it is renamed. Engines ignore notes."}
       </p>
       <Button
         leftSection={<IconTrash size={14} />}

@@ -194,7 +194,7 @@ function FixAll({ problems }: { problems: Problems["problems"] }) {
           fullWidth
           mb="sm"
           leftSection={<IconTool size={15} aria-hidden />}
-          title="Everything that can be mended without losing what was drawn. One undo takes it back."
+          title="Fixes everything that can be fixed without losing what was drawn. One undo reverts it."
           onClick={() => {
             if (applySafeFixes(doc, problems) === 0) tellNothingLeft();
           }}

@@ -35,9 +35,9 @@ function Origins({ flat: { origins, left_out } }: { flat: FlatGraph }) {
   return (
     <>
       <p>
-        It has {counted(origins.length, "action")}, and does what this graph does with those inside
-        of it as they are now: the same actions with the same values, in the same order, with the
-        same end.
+        It has {counted(origins.length, "action")}. It does what this graph does together with the
+        graphs inside it, as they are now: the same actions with the same values, in the same order,
+        with the same end.
       </p>
       <ul className={style.list} aria-label="Where its actions come from">
         {origins.slice(0, MOST).map(({ key, action, levels }) => (

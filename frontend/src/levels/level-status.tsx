@@ -40,7 +40,7 @@ function useNoticeOfMany(graphs: readonly string[]): void {
         color: "yellow",
         autoClose: NOTICE_MS,
         title: `This graph runs inside ${count} others`,
-        message: `What you change here changes in each: ${names.slice(0, NAMED).map(isolated).join(", ")}${count > NAMED ? " …" : "."} Undo takes it back.`,
+        message: `Your changes here apply in each of them: ${names.slice(0, NAMED).map(isolated).join(", ")}${count > NAMED ? " …" : "."} Undo takes it back.`,
       });
     };
     undo.on("stack-item-added", tell);
@@ -70,8 +70,8 @@ function UsedIn() {
       </Menu.Target>
       <Menu.Dropdown>
         <p className={style.words}>
-          What you change here changes in each of them. A version that was published keeps what it
-          was published with.
+          Your changes here apply in each of them. Published versions keep what they were published
+          with.
         </p>
         {graphs.map((graph) => (
           <Menu.Item key={graph} component={Link} to={`/graphs/${graph}`}>

@@ -147,7 +147,7 @@ function useMaking(context: EditorContext, look: ExtractionLook, again: () => Pr
     await Promise.all([refreshGraphs(client), refreshLibrary(client)]);
     const late = meanwhile(made.changes);
     if (late !== "")
-      return `The graph “${isolated(name)}” is made, but the actions stay here too: changed meanwhile: ${late}.`;
+      return `The graph “${isolated(name)}” is made, but the actions also stay here, because somebody changed them meanwhile: ${late}.`;
     makeActionEdit(context, made.changes);
     notifications.show({
       title: `“${isolated(name)}” is a graph of its own now`,
@@ -217,7 +217,8 @@ function ExtractForm({ look, again, ...props }: ExtractProps & PreviewProps) {
         </div>
       )}
       <p className={style.quiet}>
-        A robot runs it only with the new graph in its index, and cannot be paused meanwhile.
+        A robot runs it only if the new graph is in its index. It cannot be paused while that graph
+        runs.
       </p>
       <Group justify="flex-end" gap="sm" mt="lg">
         <Button onClick={onClose}>Cancel</Button>

@@ -179,7 +179,7 @@ const TYPES: Readonly<Record<string, string>> = {
 export function ActionOverview({ description, type, labels, inputs, outputs, children }: Props) {
   return (
     <>
-      <p className={style.lead}>{description || "Nobody has described it yet."}</p>
+      <p className={style.lead}>{description || "No description yet."}</p>
       <ul className={style.marks} aria-label="Type and labels">
         <li title={`Type ${type}`}>{TYPES[type] ?? `type ${type}`}</li>
         {labels.map((label) => (

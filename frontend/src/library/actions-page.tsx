@@ -91,7 +91,7 @@ function NoSelection({ isEmpty }: { isEmpty: boolean }) {
   return (
     <Empty icon={<IconBolt size={22} />} title={isEmpty ? "No action yet" : "What robots can do"}>
       {isEmpty
-        ? "Make one, import the file of one, or draw a graph: what it uses is listed here."
+        ? "Make an action, import its file, or draw a graph: the actions that it uses are listed here."
         : "Choose an action to see what it takes and gives, where it is used, and its C++ package."}
     </Empty>
   );

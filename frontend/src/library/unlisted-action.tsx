@@ -64,7 +64,7 @@ export function UnlistedAction({ listed, knowledge, busy, onAdd, onTake }: Props
         <p className={style.names}>
           {action === null
             ? "The library does not have it, and no graph uses it."
-            : "Only graphs use it: each says for itself what it takes. In the library it is described once."}
+            : "Not in the library: each graph describes its parameters separately. In the library, they are described once."}
         </p>
         <ActionOverview {...partsOf(listed)}>
           {action && <UsedIn usedIn={action.used_in} differs={[]} />}

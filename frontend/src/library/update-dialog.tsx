@@ -35,8 +35,8 @@ function words(error: unknown, uses: readonly ActionUse[]): string {
   const text = place === undefined ? errorText(error) : `${place}: ${errorText(error)}`;
   const changed = error instanceof Refusal && error.details.status === 409;
   return changed
-    ? `${text} Nothing was written. What would change is shown anew below.`
-    : `${text} Look below at what would still change.`;
+    ? `${text} Nothing was written. See below what would change now.`
+    : `${text} See below what would still change.`;
 }
 
 const toggled = (set: ReadonlySet<string>, key: string): ReadonlySet<string> => {
@@ -163,7 +163,7 @@ function RenameChoices({ update }: { update: Update }) {
   if (update.suggested.length + update.possible.length === 0) return null;
   return (
     <fieldset className={style.renames}>
-      <legend>Only renamed? Then its value is kept under the new name.</legend>
+      <legend>Only renamed? Then the value is kept under the new name.</legend>
       {update.suggested.map((each) => (
         <Checkbox
           key={each.key}
@@ -260,7 +260,7 @@ function Body({ id, mayEdit, onClose }: Props) {
       <UpdatedGraphs done={update.done} update={update} />
       {mayEdit && <RenameChoices update={update} />}
       {older.length === 0 ? (
-        <p>Every graph uses the parameters as they are.</p>
+        <p>Every graph uses the current parameters.</p>
       ) : (
         <ul className={style.uses}>
           {older.map((use) => (

@@ -51,7 +51,7 @@ export function useNewActions() {
       await deleteGraph(id);
       notifications.show({
         title: `${isolated(name)} is deleted from the library`,
-        message: "Graphs keep what they use. It can be brought back below the list.",
+        message: "Graphs that use it do not change. You can restore it below the list.",
       });
       go("/actions");
     } catch (error) {

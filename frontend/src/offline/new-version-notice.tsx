@@ -10,7 +10,7 @@ export function NewVersionNotice() {
   if (!shown) return null;
   return (
     <div className={style.notice} role="status">
-      <span>The server was updated. This page goes on as it is; reload it to get the new one.</span>
+      <span>The server was updated. This page still works; reload it to get the new version.</span>
       <Button size="compact-sm" onClick={() => location.reload()}>
         Reload
       </Button>

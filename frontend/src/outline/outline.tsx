@@ -214,7 +214,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
       </div>
       {rows.length === 1 && graph.actions.length === 0 && (
         <Empty icon={<IconListTree size={22} />} title="Nothing here yet">
-          The actions of the graph stand here as a list, in the order in which they run.
+          The actions of the graph are listed here, in the order in which they run.
         </Empty>
       )}
       {(rows.length > 1 || graph.actions.length > 0) && (

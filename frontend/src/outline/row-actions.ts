@@ -145,7 +145,7 @@ export function moveRow(context: EditorContext, row: OutlineItem, step: -1 | 1):
   const at = siblings.findIndex(({ child }) => child === here?.child);
   const one = siblings[at];
   const other = siblings[at + step];
-  if (one === undefined || other === undefined) return "There is nothing to change places with";
+  if (one === undefined || other === undefined) return "There is nothing to swap it with";
   swapOrder(context.doc, siblings.map(relationId), at, at + step);
   const before = step < 0 ? "before" : "after";
   return `${isolated(endName(context.graph, one.child))} stands ${before} ${isolated(endName(context.graph, other.child))}`;

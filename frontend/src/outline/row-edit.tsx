@@ -37,7 +37,7 @@ function Rename({ row, onDone }: Props) {
   const field = useDraft({
     of: key,
     value: old,
-    check: (draft) => (draft.trim() === "" ? "An action has a name." : null),
+    check: (draft) => (draft.trim() === "" ? "Enter a name for the action." : null),
     onCommit: (draft) => rename(doc, key, draft.trim()),
     onLeaving: true,
   });

@@ -87,7 +87,9 @@ interface PackageFilesProps {
 
 async function copy(path: string, text: string) {
   const done = await copyText(text);
-  notifications.show({ message: done ? `${path} is copied.` : "The browser did not let it copy." });
+  notifications.show({
+    message: done ? `${path} is copied.` : "The browser did not allow copying.",
+  });
 }
 
 export function PackageFiles({ graph, seq, name, path }: PackageFilesProps) {

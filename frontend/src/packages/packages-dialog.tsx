@@ -118,8 +118,8 @@ export function PackageRefusals({ refusals, context, onClose }: PackageRefusalsP
     <section aria-label="Without a package" className={style.refusals}>
       <h3>
         {refusals.length === 1
-          ? "One thing stands against a package"
-          : `${refusals.length} things stand against packages`}
+          ? "One reason prevents a package"
+          : `${refusals.length} reasons prevent packages`}
       </h3>
       <ul>
         {refusals.map(({ action, place, reason }) => (

@@ -107,7 +107,7 @@ function PlaceView({ place, graph }: { place: CourseChange; graph: string }) {
           <bdi>{authorName(place.author)}</bdi>
           {at === null ? "" : `, ${day(at, now)} ${clock(at)}`}
         </b>
-        : from this edit on it goes {place.parts ? "another way" : "the first way again"}.{" "}
+        : from this edit on, the graph goes {place.parts ? "another way" : "the first way again"}.{" "}
         <Link to={`/graphs/${graph}?at=${place.seq}`}>The graph then</Link>
       </p>
       <DifferenceView
@@ -144,7 +144,7 @@ function Answer({ answer, graph }: { answer: SinceAnswer; graph: string }) {
       <p className={style.quiet}>
         {found.looked} {found.looked === 1 ? "moment" : "moments"} {since}, simulated with what the
         actions of this run did.
-        {found.exact ? "" : " It may have changed and changed back between two of them."}
+        {found.exact ? "" : " The graph may have changed and changed back between two of them."}
       </p>
     </>
   );

@@ -93,7 +93,7 @@ function Before({ found }: { found: Comparison }) {
       <h2>Before they began</h2>
       {!found.same_engine && (
         <p className={style.same}>
-          They ran in different places: {isolated(found.a.engine)} and {isolated(found.b.engine)}.
+          They ran on different engines: {isolated(found.a.engine)} and {isolated(found.b.engine)}.
         </p>
       )}
       <GraphChanges found={found} />

@@ -172,7 +172,9 @@ export function GhostLanes({ found, a, b, selected, onPick }: Props) {
             <AllLevels lanes={actions} inside={nested} />
           </span>
         )}
-        <span>A faded or hatched end: when it ended is known only to this range.</span>
+        <span>
+          A faded or hatched end: the moment of the end is known only to lie in this range.
+        </span>
         <Segments
           size="xs"
           label="Where both begin"

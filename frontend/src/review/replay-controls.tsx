@@ -153,7 +153,7 @@ export function markText(mark: Pick<ReplayMark, "kind" | "by" | "text" | "since"
     case "run.pause_requested.v1":
       return `${isolated(by)} asked for a pause`;
     case "run.resume_requested.v1":
-      return `${isolated(by)} let it go on`;
+      return `${isolated(by)} resumed the run`;
     case "run.modify_requested.v1":
       return `${isolated(by)} sent another version`;
     case "run.modify_refused.v1":

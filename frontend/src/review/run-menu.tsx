@@ -54,7 +54,7 @@ function ExpectDialog({ runner, run, onClose }: Props & { onClose: () => void })
       notifications.show({
         title: "Expected from now on",
         message:
-          "The tests of the graph tell when it would go another way, and so does each start.",
+          "The tests of the graph, and each start, report when a run would take another course.",
       });
     } catch (error) {
       setRefused(errorText(error));
@@ -213,7 +213,7 @@ const FAULTS: { value: InjectedFault; label: string }[] = [
   { value: "error", label: "It ends in error" },
   { value: "false", label: "It ends false" },
   { value: "hang", label: "It never ends and ignores Stop" },
-  { value: "init_error", label: "It fails while it is made ready" },
+  { value: "init_error", label: "It fails while it loads" },
 ];
 
 interface FaultDialogProps {

@@ -14,7 +14,7 @@ function Value({ text, differs }: { text: string | null; differs: boolean }) {
   if (text === null) return <td className={style.none}>—</td>;
   return (
     <td data-differs={differs || undefined}>
-      {differs && <abbr title="Not what was sent: it was changed on the way">≠ </abbr>}
+      {differs && <abbr title="Not the value that was sent: it was changed on the way">≠ </abbr>}
       <code title={text}>{text}</code>
     </td>
   );

@@ -228,7 +228,7 @@ function NoRuns({ runner, failed, isKnown, filtered, isNew, onChanged }: NoRunsP
   if (failed !== null) {
     return (
       <Empty icon={<IconAlertTriangle size={22} />} title="The runs cannot be read">
-        {errorText(failed)} What was recorded is safe; it shows again when the runner answers.
+        {errorText(failed)} Recorded runs are safe; they are shown again when the runner answers.
       </Empty>
     );
   }
@@ -238,8 +238,8 @@ function NoRuns({ runner, failed, isKnown, filtered, isNew, onChanged }: NoRunsP
       <Empty icon={<IconSearch size={22} />} title="No run fits">
         No run matches this search and filter. A text is searched for in names of graphs, robots,
         people and actions, in notes, in the number of a run, and in what its events say: causes,
-        alarms, messages, reasons. Values of parameters are not searched, and of a run that goes on
-        only its names are.
+        alarms, messages, reasons. Values of parameters are not searched. Of a run that goes on,
+        only names are searched.
       </Empty>
     );
   }

@@ -163,7 +163,7 @@ function Found({ found }: { found: Statistics }) {
           <p className={style.quiet}>
             {found.judged > 0 && `${found.succeeded} of ${found.judged} runs finished true. `}
             {found.unknown > 0 &&
-              `Of ${found.unknown} that finished the result is not known, since robots do not tell it; they are not counted. `}
+              `${found.unknown} finished with an unknown result, since robots do not report it; they are not counted. `}
             Stopped, refused and lost ones say nothing about the graph and are not counted.
           </p>
         </section>
@@ -172,7 +172,7 @@ function Found({ found }: { found: Statistics }) {
           {failing.length === 0 ? (
             <p className={style.quiet}>
               {hidden > 0
-                ? `No action is known to have ended false or in error; of ${hidden} visits nobody knows.`
+                ? `No action is known to have ended false or in error; the result of ${hidden} visits is not known.`
                 : "No action ended false or in error."}
             </p>
           ) : (
@@ -212,7 +212,7 @@ function Found({ found }: { found: Statistics }) {
           {found.untold > 0 && (
             <p className={style.quiet}>
               Of {found.untold === 1 ? "1 arrow" : `${found.untold} arrows`} it is not known whether
-              it was ever taken: robots do not tell results.
+              it was ever taken: robots do not report results.
             </p>
           )}
         </section>

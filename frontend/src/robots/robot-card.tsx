@@ -41,7 +41,7 @@ function robotSigns(robot: Robot): Sign[] {
   }
   if (robot.others > 0) {
     const who = robot.others === 1 ? "1 other program" : `${robot.others} other programs`;
-    signs.push({ good: false, text: `${isolated(who)} can start things there` });
+    signs.push({ good: false, text: `${isolated(who)} can also start graphs on it` });
   }
   if (robot.actor !== "" && robot.actor !== robot.name) {
     signs.push({ good: false, text: `Its feedback calls itself ${robot.actor}` });
@@ -186,11 +186,11 @@ function IndexedActions({ robot }: { robot: string }) {
   const { runner } = useLive();
   const known = useIndexedByRobot(runner, robot, true);
   if (known.isPending) return <Text c="dimmed">Reading …</Text>;
-  if (known.isError) return <Text c="var(--error)">What it knows cannot be read now.</Text>;
+  if (known.isError) return <Text c="var(--error)">Its index cannot be read now.</Text>;
   const { actions, graphs, unread } = known.data;
   return (
     <>
-      {actions.length === 0 && <Text c="dimmed">It has named no actions.</Text>}
+      {actions.length === 0 && <Text c="dimmed">It reports no actions.</Text>}
       <ul className={style.list}>
         {actions.map(({ name, inputs, outputs }) => (
           <li key={name}>

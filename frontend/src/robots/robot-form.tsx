@@ -57,7 +57,7 @@ function Profile(props: {
         onChange={(event) => put("commit", event.currentTarget.value.trim())}
       />
       <Switch
-        label="Stopping a paused graph works there (then Pause is offered)"
+        label="A paused graph can be stopped there (Pause is offered only then)"
         checked={is("pauses_safely")}
         onChange={(event) => put("pauses_safely", event.currentTarget.checked)}
       />
@@ -67,12 +67,12 @@ function Profile(props: {
         onChange={(event) => put("synchronises", event.currentTarget.checked)}
       />
       <Switch
-        label="Passing over an action is fixed there (H3)"
+        label="Bypassing an action works there (H3 is fixed)"
         checked={is("bypass_fixed")}
         onChange={(event) => put("bypass_fixed", event.currentTarget.checked)}
       />
       <Switch
-        label="It takes only what a second person has said yes to"
+        label="Starts and changes need the yes of a second person"
         checked={is("second_person")}
         onChange={(event) => put("second_person", event.currentTarget.checked)}
       />

@@ -109,7 +109,7 @@ export function RobotLog({ robot, onImport }: Props) {
   if (entries.isPending) return <Text c="dimmed">Reading …</Text>;
   if (entries.isError) return <Text c="var(--error)">The record cannot be read now.</Text>;
   if (entries.data.length === 0) {
-    return <Text c="dimmed">Nobody else has told it anything while the runner was listening.</Text>;
+    return <Text c="dimmed">No command of others was seen while the runner was listening.</Text>;
   }
   return (
     <ol className={style.list}>

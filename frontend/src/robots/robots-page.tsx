@@ -18,7 +18,7 @@ interface Props {
 function Practise() {
   return (
     <p>
-      Without one, practise with an emulated robot: it behaves like a real engine.
+      Without a robot, practise with an emulated one: it behaves like a real engine.
       <Code block className={style.code ?? ""}>
         action-assistant simulate-robot David
       </Code>
@@ -79,8 +79,8 @@ export function RobotsPage({ onImport }: Props) {
         )}
         {known && robots.length === 0 && (
           <Empty icon={<IconRobot size={22} />} title="No robot yet" action={button}>
-            Register the name that its TeMoto engine answers to, and everybody here sees how it is,
-            what runs on it, and can stop it.
+            Register the name of its TeMoto engine. Then everybody here sees its state and what runs
+            on it, and can stop it.
             <Practise />
           </Empty>
         )}
@@ -125,8 +125,7 @@ export function FoundEngines({ may, on, onTake }: FoundEnginesProps) {
       </h3>
       {looking && (
         <p className={style.quiet} role="status">
-          Looking for engines; others may still come into sight for {Math.ceil(data?.left_s ?? 0)}{" "}
-          s.
+          Looking for engines; more may be found for another {Math.ceil(data?.left_s ?? 0)} s.
         </p>
       )}
       <ul className={style.list}>

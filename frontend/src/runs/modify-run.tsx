@@ -46,7 +46,7 @@ function modifyObstacle(run: Run, engine: Robot | undefined, obstacle: string | 
   if (run.state !== "running" && run.state !== "paused") return `Run ${run.number} is ${run.state}`;
   if (run.desired === "stopped") return `Run ${run.number} is being stopped`;
   if (engine?.pauses !== true) {
-    return `Changing it pauses it, and pausing is not safe on ${where}: stop it and start anew`;
+    return `Changing a run pauses it, and pausing is not safe on ${where}: stop the run and start again`;
   }
   return obstacle;
 }
@@ -83,7 +83,7 @@ async function looked({ run, label, running, settle }: Props): Promise<LookedAt>
   const seq = await settle();
   const document = await fetchDocument(run.graph ?? "", seq, AbortSignal.timeout(PATIENCE));
   const found = differences(running, readGraph(mapsFrom(document)));
-  if (found.length === 0) throw new Error("What runs is what is on screen.");
+  if (found.length === 0) throw new Error("The running graph is the one on screen.");
   return { seq, version: run.version, label, found };
 }
 
@@ -123,13 +123,13 @@ function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
       if (!(error instanceof Unanswered)) return notifyFailure("Not sent", errorText(error));
       notifyFailure(
         "NOT KNOWN whether it was sent",
-        `${error.message} It may go on by the new graph.`,
+        `${error.message} The run may go on with the new graph.`,
       );
       onClose();
     },
   });
   const other = run.version !== asking.version;
-  const why = other ? "Something else was sent meanwhile: look again" : obstacle;
+  const why = other ? "Another version was sent meanwhile: check again" : obstacle;
   return (
     <Modal
       opened
@@ -143,8 +143,8 @@ function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
       </p>
       <List found={asking.found} />
       <Text size="sm" c="dimmed">
-        The engine pauses the graph, takes this one in its place and goes on. Actions that run now
-        are paused meanwhile. Stop works all the while.
+        The engine pauses the running graph, replaces it by this one and goes on. Actions that run
+        now are paused meanwhile. Stop works all the while.
       </Text>
       <footer className={style.foot}>
         <Button onClick={onClose}>Cancel</Button>

@@ -10,7 +10,7 @@ test("no reason is given when everything is saved", () => {
 test("a person who works offline reads how many edits wait, and where", () => {
   const link = { state: "offline", unsaved: 2, seq: 3 } as const;
   expect(unsavedReason({ ...link, kept: true })).toBe(
-    "The server does not answer. 2 changes wait on this device and survive closing the page. Sent when it is back.",
+    "The server does not answer. 2 changes wait on this device and survive closing the page. Sent when the server answers again.",
   );
   expect(unsavedReason({ ...link, kept: false })).toContain("wait in this page only: keep it open");
   expect(unsavedReason({ ...link, unsaved: 0 })).toBe("The server does not answer.");

@@ -11,14 +11,14 @@ export function unsavedReason(link: RoomLink): string | null {
   switch (link.state) {
     case "live":
       if (link.readOnly !== undefined) return `${link.readOnly}${keeps}`;
-      return link.unsaved === 0 ? null : `${edits} on the way to the server.`;
+      return link.unsaved === 0 ? null : `${edits} being sent to the server.`;
     case "refused":
       return `${refusals[link.why ?? "not-accepted"]}${keeps}`;
     case "connecting":
     case "offline": {
       const why = link.why === undefined ? "The server does not answer." : refusals[link.why];
       if (link.unsaved === 0) return link.state === "connecting" ? null : why;
-      return `${why}${keeps} Sent when it is back.`;
+      return `${why}${keeps} Sent when the server answers again.`;
     }
   }
 }

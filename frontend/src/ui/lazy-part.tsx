@@ -90,8 +90,8 @@ function Missing() {
           </Button>
         }
       >
-        The server does not answer, or it was updated while this page was open. What you changed and
-        is not saved yet waits on this device; where it cannot, the browser asks before it reloads.
+        The server does not answer, or it was updated while this page was open. Unsaved changes wait
+        on this device; if that is not possible, the browser asks before it reloads.
       </Empty>
     </div>
   );

@@ -58,7 +58,7 @@ test("a part that does not arrive is said, and asked for again by the next one",
   });
   const said = await drawn(Part);
   expect(said).toMatch(/^STOP This part of the page did not load/);
-  expect(said).toContain("waits on this device");
+  expect(said).toContain("wait on this device");
   expect(said).toContain("Reload the page");
   expect(await drawn(Part)).toBe("here");
   expect(times).toBe(2);

@@ -48,7 +48,7 @@ interface NameProps {
 function NameWriting({ name, rename, onDone }: NameProps) {
   const field = useDraft({
     value: name,
-    check: (draft) => (draft.trim() === "" ? "A graph has a name." : null),
+    check: (draft) => (draft.trim() === "" ? "Enter a name for the graph." : null),
     onCommit: (draft) => draft.trim() === name || rename(draft.trim()),
     onLeaving: true,
   });

@@ -89,7 +89,7 @@ test("only what fits and precedes can be taken; the rest says why not", () => {
   const drop = now.actions.find(({ name }) => name === "Drop");
   const far = drop && outputChoices(now, drop, "angle", []);
   expect(far?.find(({ parent, output }) => parent === look && output === "colour")?.reason).toBe(
-    "no arrow leads from it to here",
+    "no arrow leads from there to here",
   );
 });
 

@@ -31,5 +31,5 @@ test("a name inside another one, or one that is there, is refused", () => {
   expect(taken(list, pathFrom("pose.w"))).toBeNull();
   expect(taken(list, pathFrom("pose"))).toContain("group");
   expect(taken(list, pathFrom("a.b"))).toContain("group");
-  expect(taken(list, "a")).toContain("of this name");
+  expect(taken(list, "a")).toContain("has this name");
 });

@@ -18,13 +18,13 @@ export function pathFrom(words: string): string {
 
 /** Returns why a path cannot be used for one more parameter; null when it can. */
 export function taken(list: readonly Parameter[], path: string): string | null {
-  if (path === "") return "A parameter has a name.";
+  if (path === "") return "Enter a name for the parameter.";
   const same = list.some((other) => other.path === path);
-  if (same) return "There is one of this name.";
+  if (same) return "Another parameter has this name.";
   const within = list.some(
     (other) => other.path.startsWith(`${path}/`) || path.startsWith(`${other.path}/`),
   );
-  return within ? "This is a group of others." : null;
+  return within ? "This name clashes with a group of parameters." : null;
 }
 
 export interface NameSuggestion {

@@ -110,7 +110,9 @@ function reasonOf(ways: Arrivals, parent: Action, ties: readonly Tie[]): string 
   const relation = ways.direct.get(parent.key);
   if (relation) return harm(ways, parent, relation, ties);
   if (parent.key === ways.action.key) return "is its own output";
-  return ways.earlier.has(parent.key) ? "no arrow leads from it to here" : "does not come before";
+  return ways.earlier.has(parent.key)
+    ? "no arrow leads from there to here"
+    : "does not come before";
 }
 
 function rankOf({ reason, relation, taken }: OutputChoice): number {

@@ -21,7 +21,7 @@ export function NameField({ action, description, onRename }: NameProps) {
       <DraftInput
         label="Name"
         value={action.name}
-        check={(draft) => (draft.trim() === "" ? "An action has a name." : null)}
+        check={(draft) => (draft.trim() === "" ? "Enter a name for the action." : null)}
         onCommit={(name) => onRename(name.trim())}
       />
       {description}
@@ -52,7 +52,7 @@ export function TypeField({ action }: Props) {
         label="Type"
         value={action.type}
         description="sync and async behave alike; spontaneous may report again and again"
-        check={(draft) => (draft.trim() === "" ? "The engine wants one, usually sync." : null)}
+        check={(draft) => (draft.trim() === "" ? "The engine needs a type, usually sync." : null)}
         onCommit={(text) => setField(doc, action.key, "type", text.trim())}
       />
     </SharedField>

@@ -37,7 +37,7 @@ function VerdictWords({ verdict, onShow }: { verdict: Verdict; onShow: readonly 
     case "unknown":
       return (
         <p data-tone="warning">
-          It cannot be checked now: {verdict.why} Your text is kept in this page.
+          Your text cannot be checked now: {verdict.why} It is kept in this page.
         </p>
       );
     case "wrong":
@@ -49,7 +49,8 @@ function VerdictWords({ verdict, onShow }: { verdict: Verdict; onShow: readonly 
       );
     case "fits": {
       const { changes, problems } = verdict.rewriting;
-      if (changes.length === 0) return <p className={style.quiet}>This says the same as before.</p>;
+      if (changes.length === 0)
+        return <p className={style.quiet}>The text means the same as before: nothing changes.</p>;
       const some = onShow.slice(0, 3).join(", ");
       const more = onShow.length > 3 ? ` and ${onShow.length - 3} more` : "";
       return (
@@ -82,7 +83,7 @@ function Meanwhile({ names, onRest, onAll, onBack }: MeanwhileProps) {
     <div className={style.foot} role="alertdialog" aria-label="Changed meanwhile">
       <p data-tone="warning">
         <IconAlertTriangle size={14} aria-hidden /> Somebody changed{" "}
-        {names.map(isolated).join(", ")} since you began. What shall stay?
+        {names.map(isolated).join(", ")} since you began. What should stay?
       </p>
       <div className={style.buttons}>
         <Button size="compact-sm" onClick={onAll}>

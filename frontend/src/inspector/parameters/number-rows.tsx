@@ -124,7 +124,7 @@ export function NumberRows({ action, side, block }: Props) {
                 renamed={given.some((giver) => giver.renamed)}
               />
             )}
-            <Tooltip label="Each number by itself: name, type …">
+            <Tooltip label="Each number separately: name, type …">
               <ActionIcon
                 size={24}
                 disabled={false}

@@ -83,7 +83,7 @@ function Choices({ choices, search, renamed }: ListProps) {
         <Combobox.Empty>
           {choices.length === 0
             ? "No action of this graph gives such a value."
-            : "None is called so."}
+            : "No output has this name."}
         </Combobox.Empty>
       )}
       {left > 0 && <Combobox.Footer>{left} more: type a part of the name</Combobox.Footer>}

@@ -55,7 +55,7 @@ test("a renaming that does nothing, or worse, says what the engine makes of it",
   expect(says("pose::x", "at::x")).toBeNull();
   expect(says("pose::x", "colour")).toContain("takes string, not number");
   expect(says("gone", "at::x")).toContain("breaks down");
-  expect(says("pose::x", "gone")).toContain("takes no gone");
+  expect(says("pose::x", "gone")).toContain("has no parameter gone");
   expect(says("pose::x", "fixed")).toContain("locked");
 });
 

@@ -54,16 +54,16 @@ export function misfit(
   const output = named(parent?.outputs, source);
   const input = named(child?.inputs, target);
   if (parent !== undefined && output === undefined) {
-    return `${isolated(parent.name)} gives no ${source}: the engine breaks down here.`;
+    return `${isolated(parent.name)} has no output ${source}: the engine breaks down here.`;
   }
   if (child !== undefined && input === undefined)
-    return `${isolated(child.name)} takes no ${target}: nothing happens.`;
+    return `${isolated(child.name)} has no parameter ${target}: the renaming does nothing.`;
   if (output === undefined || input === undefined) return null;
   const [from, to] = [parameterValueOf(output.text), parameterValueOf(input.text)];
   if (from.type !== to.type) {
-    return `${target} takes ${to.type ?? "no type"}, not ${from.type ?? "no type"}: nothing happens.`;
+    return `${target} takes ${to.type ?? "no type"}, not ${from.type ?? "no type"}: the renaming does nothing.`;
   }
-  return to.locked ? `${target} is locked: nothing happens.` : null;
+  return to.locked ? `${target} is locked: the renaming does nothing.` : null;
 }
 
 /** The outputs that reach an input because both are called the same, and fit. */

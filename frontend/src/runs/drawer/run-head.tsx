@@ -187,7 +187,7 @@ function failure(error: unknown, paused: boolean) {
   return {
     color: "red",
     autoClose: false as const,
-    title: `NOT KNOWN whether it ${paused ? "goes on" : "pauses"}`,
+    title: `NOT KNOWN whether the run ${paused ? "goes on" : "pauses"}`,
     message: `${message} The robot may ${paused ? "move" : "go on"}.`,
   };
 }

@@ -53,8 +53,8 @@ export function ValuesPanel({ run, graph, aid }: Props) {
           </div>
         ))}
       </dl>
-      {found.values.length === 0 && <p>It has no value that is known.</p>}
-      {onlySent && <p>As sent: with what it runs was not seen.</p>}
+      {found.values.length === 0 && <p>No value of it is known.</p>}
+      {onlySent && <p>These values were sent; the values that it runs with were not seen.</p>}
       {found.said !== null && <blockquote>“{found.said}”</blockquote>}
       {found.after.length > 0 && (
         <p className={style.after}>

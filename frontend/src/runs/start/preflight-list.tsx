@@ -144,8 +144,9 @@ function Waiting({ robot, seconds }: { robot: string; seconds: number }) {
     );
   return (
     <span>
-      Written, but {isolated(robot)} has not indexed it within {PATIENCE} s. Its engine may look
-      only at its start (<code>--indexing-rate 0</code>): restart it. Or it looks in another folder.
+      Written, but {isolated(robot)} has not indexed it within {PATIENCE} s. Its engine may read the
+      folder only when it starts (<code>--indexing-rate 0</code>): restart the engine. Or it reads
+      another folder.
     </span>
   );
 }
@@ -171,14 +172,15 @@ function What({ folder, robot }: { folder: IndexFolderLook; robot: string }) {
       {hindered.length === 0 &&
         replaced.map(({ graph, replaces }) => (
           <span key={graph}>
-            {replaces}, which has another {isolated(graph)}, would be replaced, and kept beside.
+            {replaces}, which has another {isolated(graph)}, would be replaced; the old file is kept
+            beside it.
           </span>
         ))}
       {names === "" && folder.waiting.length > 0 && (
         <span>
           {folder.waiting.join(", ")} {folder.waiting.length > 1 ? "are" : "is"} in {folder.path}{" "}
-          already, and {isolated(robot)} has not indexed it. Its engine may look only at its start:
-          restart it.
+          already, and {isolated(robot)} has not indexed it. Its engine may read the folder only
+          when it starts: restart the engine.
         </span>
       )}
     </>
@@ -214,7 +216,7 @@ function WriteButton({ folder, robot, busy, onWrite }: WriteButtonProps) {
           : `Hold to write, replacing ${replaced.length === 1 ? "a file" : "files"}`
       }
       name={`${label}, and replace ${paths}`}
-      question={`Replace ${paths}? What is there now is kept beside it.`}
+      question={`Replace ${paths}? A copy of the present state is kept beside it.`}
       disabled={busy}
       onHeld={onWrite}
     />
@@ -257,7 +259,7 @@ function IndexWriting({ item, look, robot, graph, seq, onLookAgain }: IndexWriti
           onWrite={() => write.mutate()}
         />
       )}
-      {can && !may && <span>Whoever may operate robots can do that.</span>}
+      {can && !may && <span>Only operators and owners can do that.</span>}
       {write.isError && (
         <span className={style.failed} role="alert">
           {errorText(write.error)}
@@ -327,8 +329,8 @@ function InsideRemedies({ item, look, graph, seq, onLeave }: InsideRemediesProps
   return (
     <span className={style.remedies}>
       <span>
-        One graph that does the same has no graphs inside that would have to be looked up, and a
-        name of its own.
+        One graph that does the same has a name of its own, and no graphs inside that the robot has
+        to look up.
       </span>
       <OneGraph graph={graph} onLeave={onLeave} />
     </span>

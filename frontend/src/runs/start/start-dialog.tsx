@@ -91,7 +91,7 @@ function Choice({ robot, on, may, behaviours, onToggle }: ChoiceProps) {
       <span className={style.name}>{robot.simulated ? "Simulator" : robot.name}</span>
       {robot.simulated ? (
         <span className={style.quiet}>
-          {behaviours ? "its Python may move something" : "nothing moves"}
+          {behaviours ? "its Python code may move something" : "nothing moves"}
         </span>
       ) : (
         <EngineLabel robot={robot} />
@@ -125,8 +125,8 @@ function Where(props: WhereProps) {
       ))}
       {now.engines.every((robot) => robot.simulated) && (
         <Text size="sm" c="dimmed">
-          No robot is registered. <Link to="/robots">Robots</Link> says how, also how to practise
-          without one.
+          No robot is registered. <Link to="/robots">Robots</Link> explains how to register one, and
+          how to practise without one.
         </Text>
       )}
     </fieldset>
@@ -166,7 +166,7 @@ function obstacleOf(
 ): string | null {
   if (engines.length === 0) return "Choose where";
   if (looks === undefined) return "Looking …";
-  if (looks.some((look) => look.never)) return "Something stands in the way";
+  if (looks.some((look) => look.never)) return "A check prevents the start";
   const codes = looks.flatMap((look) => look.override);
   if (codes.length > 0 && reason.trim() === "") return "Say why to start anyway";
   return null;
@@ -222,7 +222,7 @@ export function StartDialog(props: Props) {
       {engines.length > 0 && (
         <section
           className={style.looks}
-          aria-label="Looked at before the start"
+          aria-label="Checks before the start"
           aria-busy={look.isFetching}
         >
           <header className={style.lookHead}>
@@ -358,8 +358,8 @@ function Said({ given, me, label }: { given: readonly Approval[]; me: string; la
       )}
       {mine && `You said yes to ${isolated(label)}: somebody else may start it.`}{" "}
       <span className={style.doubt}>
-        A second person needs a browser of their own. One link that is opened in two browsers may be
-        one person: that cannot be told here.
+        A second person needs a browser of their own. Two browsers that opened the same link may
+        belong to one person: the server cannot know that.
       </span>
     </Text>
   );

@@ -70,7 +70,7 @@ test("of a group it is told which robots have a run and which are not known", ()
   expect(unknownWords(sent, found(["Eve", "David"]), false)).toBeNull();
   const half = unknownWords(sent, found(["Eve"]), false);
   expect(half).toContain("NOT KNOWN whether v3 of patrol started on David.");
-  expect(half).toContain("nothing of it so far");
+  expect(half).toContain("nothing of this start so far");
   expect(unknownWords(sent, found([], true), false)).toContain("still carrying it out");
   expect(unknownWords(sent, found([]), true)).toContain("has not answered");
 });

@@ -33,10 +33,10 @@ export function unknownWords(
   if (left.length === 0) return null;
   const where = left.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
   const head = `NOT KNOWN whether ${sent.what} started on ${where.map(isolated).join(", ")}.`;
-  const after = "It is looked for, and not sent again. Stop works.";
+  const after = "The page looks for this start, and does not send it again. Stop works.";
   if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
   if (found.under_way) return `${head} The runner is still carrying it out. ${after}`;
-  return `${head} The runner has nothing of it so far. ${after}`;
+  return `${head} The runner knows nothing of this start so far. ${after}`;
 }
 
 function Found({ run }: { run: Run }) {
@@ -94,7 +94,7 @@ export function UnansweredStartNotice() {
   const starts = useSyncExternalStore(unansweredStarts.subscribe, unansweredStarts.list);
   if (starts.length === 0) return null;
   return (
-    <section className={style.notice} aria-label="Starts that are not sure">
+    <section className={style.notice} aria-label="Starts without an answer">
       {starts.map((sent) => (
         <Start key={sent.request} sent={sent} />
       ))}

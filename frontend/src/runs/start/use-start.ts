@@ -56,13 +56,13 @@ export function useStart(graph: string) {
   return useMutation({
     mutationFn: async (wanted: StartInput) => {
       const { seq, engines, digest, tree, script, behaviours, override } = wanted;
-      if (runner === undefined) throw new Error("The runner is not known yet.");
+      if (runner === undefined) throw new Error("The address of the runner is not known yet.");
       const { version, umrf } = await publishedVersion(graph, await seq);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
       const same =
         digest === version.digest && (tree ?? version.tree_digest) === version.tree_digest;
       if (digest !== null && !same) {
-        throw new Error("The graph is not the one that was looked at. Nothing was sent.");
+        throw new Error("The graph is not the one that was checked. Nothing was sent.");
       }
       const versions = client.getQueryData<Version[]>(queryKeys.versions(graph)) ?? [];
       const what = `${nextLabel(versions, version.seq)} of ${nameIn(version)}`;

@@ -85,7 +85,7 @@ function ChangedPage() {
     <div className={style.changed} role="alert">
       <span>
         A translation or an extension changes this page: what it says may be old or wrong. STOP
-        works. Turn it off for this page, then reload.
+        works. Turn the translation or the extension off for this page, then reload.
       </span>
       <Reload />
     </div>

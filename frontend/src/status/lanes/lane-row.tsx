@@ -96,7 +96,7 @@ function Fixed({ bar, inferred }: { bar: Bar; inferred: boolean }) {
         <i
           className={style.maybe}
           data-bounds={sure === null ? "all" : undefined}
-          title="It went on at some time within this: its ends were not seen exactly"
+          title="It ran at some time within this range: its begin and end were not seen exactly"
           style={{ left: percent(maybe.left), width: percent(maybe.width), color }}
         />
       )}
