@@ -224,13 +224,13 @@ def hide_target_password() -> None:
 
 
 def _is_database(name: str) -> bool:
-    """Tell whether an argument is the option `--database` or a beginning of it that argparse
+    """Return whether an argument is the option `--database` or a beginning of it that argparse
     accepts. `--data` is another option."""
     return len(name) > len("--data") and "--database".startswith(name)
 
 
 def _has_password(url: str) -> bool:
-    """Tell whether a URL may hold a password. The test is wide on purpose: SQLAlchemy allows
+    """Return whether a URL may hold a password. The test is wide on purpose: SQLAlchemy allows
     characters in a password that others read as its end."""
     return "@" in url or "password=" in url
 

@@ -205,7 +205,7 @@ class NamedDirectory:
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write a file. Who owns it is not this system's to say."""
+        """Write a new file durably. `owner` is ignored, since this system has no such owners."""
         path = self._path / _component(name)
         try:
             with path.open("xb") as out:

@@ -132,7 +132,7 @@ def _merged(server: Server, below: str, preview: "MergePreview", asked: dict[str
 
 
 def _choices(words: Iterable[str]) -> dict[str, str]:
-    """Return the side that was chosen for each place. Raise CannotStart for a word of another form."""
+    """Return the side that was chosen for each place. Raise CannotStart for a malformed argument."""
     found = {}
     for each in words:
         place, equals, side = each.rpartition("=")

@@ -301,7 +301,8 @@ def _trace(
 def _print_unknown(
     options: argparse.Namespace, reading: codec.Reading, actions: Mapping[str, Signature] | None
 ) -> None:
-    """Say which actions it is that the engine does not have so: its own refusal does not."""
+    """Print which actions the engine lacks, or has with other parameters, since its refusal does
+    not name them."""
     for problem in checks.check_reading(reading, actions, graphs=_library(options.graphs)):
         if problem.code in {"unknown-action", "signature"}:
             print(f"{options.file}: {problem.message} ({_at(problem.where)})", file=sys.stderr)

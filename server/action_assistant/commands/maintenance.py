@@ -164,7 +164,8 @@ def _strange(journal: "_KnownJournal") -> list[str]:
 
 
 async def _head(journal: Journal, branch: Branch, position: int, data: Path) -> heads.LogHead:
-    """Return where a log ended at a position. Raises OSError, Refused."""
+    """Return the head of a whole log after the event at this position. Raise OSError or Refused if
+    an archive cannot be read."""
     from action_assistant.runner.archives import archive_file
 
     folder = settings.keep(data).folder
@@ -181,7 +182,7 @@ async def _head(journal: Journal, branch: Branch, position: int, data: Path) -> 
 async def _is_as_then(
     journal: Journal, branch: Branch, line: "head_line.HeadLine", events: int, data: Path
 ) -> bool:
-    """Say whether a log still begins as a line tells."""
+    """Return whether the log still begins as a line of `verify --head` says, and print the result."""
     then = line.heads.get(branch)
     if then is None:
         print(f"{branch}: the line of {line.time} does not speak of it")

@@ -66,8 +66,9 @@ class Findings(NamedTuple):
 
 
 def look(path: Path, branch: Branch) -> Findings:
-    """Compare the schema of a journal with ours; changes nothing. An empty file has none. Raises
-    CannotStart, sqlite3.Error."""
+    """Compare the schema of a journal with ours, without changing it. An empty file has no
+    findings. Raise CannotStart for a database of another program, sqlite3.Error if it cannot be
+    read."""
     with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as connection:
         return _compared(connection, branch)
 
@@ -112,7 +113,7 @@ def _compared(connection: sqlite3.Connection, branch: Branch) -> Findings:
 
 
 def _may_go(found: SchemaObject, ours: Iterable[SchemaObject]) -> bool:
-    """Return whether nothing of ours has this name, so that it can be dropped by it."""
+    """Return whether a foreign object can be dropped by its name, since no object of ours has it."""
     return found.kind == "trigger" or found.name not in {each.name for each in ours}
 
 

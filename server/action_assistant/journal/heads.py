@@ -34,7 +34,8 @@ class LogHead(msgspec.Struct, frozen=True):
 async def head_at(
     journal: JournalReader, branch: Branch, position: int, read_kept: ReadKept
 ) -> LogHead:
-    """Return where a log ended at a position. Raises OSError, Refused."""
+    """Return the head of a whole log after the event at this position. Raise OSError or Refused if
+    an archive cannot be read."""
     return LogHead(
         position, digest_of(branch, position, await heads_at(journal, position, read_kept))
     )

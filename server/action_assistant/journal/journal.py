@@ -126,7 +126,8 @@ class Journal(JournalReader):
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Add events; their newest seq, after COMMIT. Raises Conflict, Unavailable."""
+        """Append events; return the newest seq after COMMIT. Raise Conflict if the stream has
+        another end than `expected`, Unavailable if the journal cannot be written."""
         (newest,) = await self.append_all([Addition(stream, tuple(drafts), expected)])
         return newest
 
@@ -188,8 +189,8 @@ class Journal(JournalReader):
         return await self._write(say)
 
     async def delete_some(self, stream: str, by: int) -> bool:
-        """Delete some events of a stream that was taken out; whether any are left. Raises Conflict,
-        Unavailable."""
+        """Delete some events of a stream that was taken out; return whether any are left. Raise
+        Conflict if the removal is not recorded, Unavailable if the journal cannot be written."""
         return await self._write(
             lambda transaction: delete_some(transaction.connection, stream, by)
         )

@@ -183,8 +183,8 @@ class Checkpoints:
             engine.dispose()
 
     def _copied(self, engine: Engine) -> int:
-        """Copy the log, again where commits came meanwhile: once all of it is there the next commit begins it anew.
-        Return the number of pages in it."""
+        """Copy the write-ahead log into the database, again after commits in between. Once all of
+        it is copied, the next commit restarts the log. Return its number of pages."""
         pages = 0
         try:
             with engine.connect() as connection:

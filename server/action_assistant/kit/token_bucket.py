@@ -35,7 +35,7 @@ class TokenBucket:
 
     @property
     def is_overdrawn(self) -> bool:
-        """Tell whether tokens were owed after the last `spend`."""
+        """Return whether tokens were owed after the last `spend`."""
         return self._tokens < 0
 
     def debt(self) -> float:

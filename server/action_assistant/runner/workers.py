@@ -47,6 +47,6 @@ class RunnerWorkers:
 
 
 def child(work: Callable[..., None], *args: Any, name: str, nice: int) -> "ForkServerProcess":
-    """Start a process of low priority that runs `work(*args)` and ends with this one; return when
-    it exists. Raises OSError, EOFError."""
+    """Start a process of low priority that runs `work(*args)` and ends with this one; wait until it
+    exists. Raise OSError or EOFError if it cannot be started."""
     return workers.child(work, *args, name=name, nice=nice, preloaded=_PRELOADED)

@@ -121,7 +121,7 @@ def _walked(graph: Graph) -> dict[Key, bool]:
 
 
 def _joined(arrows: Sequence[Relation]) -> bool | None:
-    """Tell whether an action waits for several parents, given all arrows that lead to it; None if
+    """Return whether an action waits for several parents, given all arrows that lead to it; None if
     these arrows may let it end more than once."""
     live = [each for each in arrows if any(_live(each, outcome) for outcome in PRECONDITIONS)]
     if len(live) <= 1:

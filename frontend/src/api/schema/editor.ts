@@ -834,7 +834,7 @@ export interface EditorApi {
     };
     /**
      * Inviting
-     * @description A link to be made; `label` says whom it is for.
+     * @description The request for a new invitation; `label`: a note for whom it is.
      */
     Inviting: {
         /** @enum {string} */

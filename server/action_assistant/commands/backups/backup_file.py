@@ -92,7 +92,7 @@ class Packer:
         self._progress = progress
 
     def journal(self, branch: Branch, path: Path, events: int) -> JournalCopy:
-        """Take in the copy of a journal."""
+        """Add the copy of a journal with `events` events."""
         held = self._take(f"{branch}.db", path)
         return JournalCopy(events, held.sha256, held.bytes)
 
@@ -102,7 +102,7 @@ class Packer:
         return self.files[name]
 
     def text(self, name: str, content: bytes) -> None:
-        """Take in a file that is nowhere."""
+        """Add `content` to the backup as a file of this name."""
         self._write(name, content)
         self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
 
@@ -118,7 +118,7 @@ class Packer:
         sync(target.parent)
 
     def abandon(self) -> None:
-        """Let go of the file."""
+        """Close the unfinished backup file."""
         self._raw.close()
 
     def _write(self, name: str, content: bytes) -> None:
@@ -197,7 +197,7 @@ class Package:
             raise self._damaged(f"{name} is not what was written")
 
     def close(self) -> None:
-        """Let go of the file."""
+        """Close the backup file after reading."""
         self._zip.close()
 
     def _read_about(self) -> BackupManifest:

@@ -143,7 +143,7 @@ class RunsCopier:
         return copied
 
     async def close(self) -> None:
-        """Let go of the database."""
+        """Close the connections to the copy's database."""
         await self._engine.dispose()
 
     async def _do(self, work: Any, *values: Any) -> Any:

@@ -371,8 +371,8 @@ def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
 
 
 async def _asked(database: Database, data: Path) -> _DatabaseFindings:
-    """Look into a database on a server without changing it. Raise its driver's errors,
-    TimeoutError, CannotStart."""
+    """Examine a database on a server without changing it. Raise its driver's errors or TimeoutError
+    if it does not answer, CannotStart for a database of another program."""
     seen = _DatabaseFindings()
 
     def question(connection: Connection) -> None:

@@ -43,7 +43,7 @@ class ProcessAnswer(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class _Health(msgspec.Struct):
-    """The part of the answer that says who it is."""
+    """The fields of `/healthz` that identify the process."""
 
     version: str
 

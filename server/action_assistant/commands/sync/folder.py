@@ -50,9 +50,10 @@ class Coming(msgspec.Struct, frozen=True):
 
 
 class SyncedFile(msgspec.Struct, frozen=True):
-    """A file and its graph when they were last in step: the change of the graph, and the SHA-256 of the
-    file, None once somebody has deleted it. `graph`: "" while the graph of a new file is being made.
-    `conflict`: the change of the copy that was put beside it; `copy`: the number of that copy."""
+    """A file and its graph when they were last in sync: the change of the graph, and the SHA-256 of
+    the file, None once the file was deleted. `graph`: "" while the graph of a new file is being
+    made. `conflict`: the change of the copy that was put beside the file; `copy`: the number of
+    that copy."""
 
     graph: Annotated[str, msgspec.Meta(pattern=r"\A[A-Za-z0-9_-]*\Z")]
     seq: _Seq
@@ -244,7 +245,7 @@ class Folder:
         self._at.remove(aside)
 
     def _kept(self, name: str, aside: str, text: bytes) -> str:
-        """Give a file that was put aside a name of its own."""
+        """Rename a file that was put aside to an unused name, and return the name."""
         names = (f"{name}.mine-{sha(text)[:8]}{more}" for more in _numbers())
         return next(
             kept for kept in names if self._move(aside, kept) or self._read_or_none(kept) == text

@@ -36,11 +36,8 @@ class ShownGraph(msgspec.Struct, frozen=True):
 
 
 def changes(before: ShownGraph, after: ShownGraph) -> list[GraphChange]:
-    """Return the differences between two states, one sentence each.
-
-    A difference that has no sentence of its own, for example of an order, is told as a change of
-    the graph.
-    """
+    """Return the differences between two states, one sentence each. A difference without a sentence
+    of its own, for example of an order, is described as a change of the graph."""
     found = [
         *_of_graph(difference((0, before.graph), (0, after.graph))),
         *_of_texts("note", dict(before.graph.notes), dict(after.graph.notes)),

@@ -172,11 +172,8 @@ class WatchedGraph:
 
 
 class QuietSocket(HttpxWebsocket):
-    """The provider's socket: asks for the document, and lets nothing pass that could change it.
-
-    A stock provider answers each update with its echo, which a room ignores; a program that only looks
-    sends none.
-    """
+    """The provider's socket, which drops every message that could change the document. A stock
+    provider answers each update with its echo, which the room ignores anyway."""
 
     def __init__(
         self,

@@ -34,7 +34,7 @@ class Sharing(msgspec.Struct, frozen=True):
 
 
 class Inviting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A link to be made; `label` says whom it is for."""
+    """The request for a new invitation; `label`: a note for whom it is."""
 
     role: Literal["viewer", "editor", "operator"]
     label: Annotated[str, msgspec.Meta(max_length=200)] = ""

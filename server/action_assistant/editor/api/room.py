@@ -38,9 +38,9 @@ class RoomConnection:
         self._rate_limits = rate_limits
 
     def receive(self, data: bytes | None) -> float:
-        """Handle one binary message; None stands for a text message, which is refused. Return for how many
-        seconds the socket is not to be read, beside the time in which it is far ahead of the room. Closes the
-        socket for a message that cannot be parsed."""
+        """Handle one binary message; None stands for a text message, which is refused. Return for
+        how many seconds the socket must not be read, in addition to the time while it is far
+        ahead of the room. Close the socket if the message is malformed."""
         member = self.member
         if data is None:
             member.refuse(messages.UNREADABLE)

@@ -78,7 +78,7 @@ class NamedInside(msgspec.Struct, frozen=True):
     hidden: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
-        """Tell whether a result depends on any graph inside."""
+        """Return whether a result depends on any graph inside."""
         return bool(self.members or self.hidden)
 
     def key(self) -> bytes:
@@ -184,8 +184,8 @@ class GraphChecks:
         return known[2:]
 
     async def _about(self, graph: str, newest: int) -> _About:
-        """Return the facts about a graph without its sub-graphs, from the cache or a worker. Raises
-        Unavailable, TooLarge."""
+        """Return the facts about a graph without its sub-graphs, from the cache or a worker. Raise
+        Unavailable if it cannot be read, TooLarge if it needs too much memory."""
         known = self._abouts.get(graph)
         if known is not None and known.newest >= newest:
             return known
@@ -219,7 +219,7 @@ class GraphChecks:
         return info.first[0] if info.first is not None else ""
 
     async def _names_at(self, sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
-        """Return the name of a graph at a moment, and the names of its actions."""
+        """Return the name of a graph at one seq of its log, and the names of its actions."""
         key = sight.graph, sight.seq
         found = self._uses.get(key)
         return found or self._uses.put(key, await self._reader.ask(contents.names, sight))

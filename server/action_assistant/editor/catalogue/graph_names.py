@@ -79,15 +79,15 @@ class GraphNames:
         return [name for name in names if name in graphs]
 
     def is_ambiguous(self, name: str) -> bool:
-        """Tell whether several graphs have this name."""
+        """Return whether several graphs have this name."""
         return len(self._graphs.get(name, ())) > 1
 
     def is_hidden(self, name: str) -> bool:
-        """Tell whether a graph has this name and an action of the library too; then the action counts."""
+        """Return whether a graph has this name and an action of the library too; then the action counts."""
         return bool(self._actions[name]) and name in self._graphs
 
     def is_taken(self, name: str) -> bool:
-        """Tell whether a graph or an action of the library has this name."""
+        """Return whether a graph or an action of the library has this name."""
         return name in self._graphs or bool(self._actions[name])
 
     async def refresh(self) -> None:
@@ -192,8 +192,8 @@ class GraphNames:
             self._call(graph, msgspec.structs.replace(document, name=name))
 
     def _call(self, graph: str, document: _Document | None) -> None:
-        """Replace what is known of a document by `document`. None means that the document no longer
-        counts, since it was deleted or is a draft."""
+        """Replace the known name of a document by `document`; None removes it, since it was deleted
+        or is a draft."""
         before = self._documents.pop(graph, None)
         if before is not None and before.name:
             if before.kind == "action":

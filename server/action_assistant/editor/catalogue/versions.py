@@ -129,7 +129,8 @@ class Versions:
         return await self.get(made), True
 
     async def inside(self, graph: str, seq: int | None) -> InsideView:
-        """Return the graphs that publishing a graph would include. Raises NotFound, Conflict, Unavailable."""
+        """Return the graphs that publishing a graph would include. Raise NotFound for an unknown
+        graph, Conflict for an unknown change, Unavailable if the journal cannot be read."""
         sight = await self._graph_reader.moment(graph, seq)
         inside = await self._checks.inside(sight)
         stamp = codec.Stamp(graph=graph)

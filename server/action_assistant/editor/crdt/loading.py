@@ -43,7 +43,8 @@ _ROWS: Final = (
 
 
 class LogTail:
-    """Reads on from `after`. At the end `damaged` says whether that was the end of the stream."""
+    """Reads the events of a stream after the event `after`. At the end, `damaged` is the damage
+    that ended it, None if that was the end of the stream."""
 
     def __init__(self, journal: Journal, stream: str, after: int, upto: int | None) -> None:
         self.seq = after
@@ -88,8 +89,8 @@ class LogTail:
         return good
 
     def _in_place(self, rows: Sequence[Sequence[Any]]) -> StoredColumns | None:
-        """Return the rows before the first row that is not the next event, as columns; None if
-        there is no such row. Only sequence numbers and the types of the bodies are checked here:
+        """Return, as columns, the rows before the first row that is not the next event; None if
+        there are no such rows. Only sequence numbers and types of the bodies are checked here;
         the chain check finds wrong types in other columns."""
         if not rows:
             return None
@@ -345,7 +346,7 @@ async def _folded(
 
 
 def _is_small(document: bytes, events: EventColumns) -> bool:
-    """Tell whether a snapshot and events are folded within milliseconds. A packed snapshot is large."""
+    """Return whether a snapshot and events are folded within milliseconds. A packed snapshot is large."""
     return not ReplicaState.is_packed(document) and len(document) + events.size <= _SMALL
 
 

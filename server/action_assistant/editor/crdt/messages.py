@@ -58,7 +58,7 @@ NO_CLOCKS: Final = b"\x00"  # the state vector of an empty document
 
 
 class Malformed(Exception):
-    """The bytes are no message of this protocol; the message says why."""
+    """Raised for bytes that are no message of this protocol; the text gives the reason."""
 
 
 class Question(msgspec.Struct, frozen=True):

@@ -62,7 +62,7 @@ class OpeningTime:
         self._came += structs
 
     def is_doubtful_with(self, size: int) -> bool:
-        """Tell whether the opening time has to be measured before updates of `size` bytes are applied."""
+        """Return whether the opening time has to be measured before updates of `size` bytes are applied."""
         return self._came + size / _SMALLEST > self._doubtful_from
 
     @property
@@ -92,5 +92,5 @@ class OpeningTime:
 
     @property
     def is_too_long(self) -> bool:
-        """Tell whether the last measured opening time exceeds the limit."""
+        """Return whether the last measured opening time exceeds the limit."""
         return self._seconds > self._limit

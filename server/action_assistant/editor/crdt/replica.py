@@ -59,7 +59,7 @@ class ForeignClient(Exception):
 
 
 class TooMuchWaits(Exception):
-    """An author has sent so many updates that wait for earlier ones that no more are kept"""
+    """An author has sent too many updates that wait for earlier ones"""
 
 
 class Replica:
@@ -225,7 +225,7 @@ class Replica:
         self._known = clocks(self.doc.get_state())
 
     def begin(self, kept: "ReplicaState") -> None:
-        """Take up where a snapshot was made. Raises Malformed, Panicked."""
+        """Restore the replica from a snapshot. Raise Malformed or Panicked if it cannot be applied."""
         self.open_piece(kept.state)
         self.go_on(kept, kept.state)
 
@@ -414,7 +414,8 @@ class Replica:
                 apply_updates(self.doc, *updates)
 
     def lacking(self, state: bytes) -> bytes:
-        """Return the update that a client with this state vector lacks. Raises Malformed, Panicked."""
+        """Return the update that a client with this state vector lacks. Raise Malformed or Panicked
+        if the vector cannot be read."""
         if ByteReader(state).number() * 2 > len(state):
             raise Malformed("more clients than bytes")
         if state == NO_CLOCKS:
@@ -490,10 +491,11 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @staticmethod
     def is_packed(kept: bytes) -> bool:
-        """Tell whether these bytes are those of a packed snapshot."""
+        """Return whether these bytes are those of a packed snapshot."""
         return kept[:1] == _ZLIB
 
     @classmethod
     async def read_aside(cls, kept: bytes) -> "ReplicaState | None":
-        """Decode a snapshot as `read` does, a packed one on a thread, so that the event loop goes on."""
+        """Decode a snapshot as `read` does; decode a packed one on a thread, so that the event loop
+        is not blocked."""
         return await asyncio.to_thread(cls.read, kept) if cls.is_packed(kept) else cls.read(kept)

@@ -68,8 +68,8 @@ def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> TriedOutlin
 
 
 def adds_nothing(state: bytes, update: bytes) -> bool:
-    """Tell whether an update would change nothing in a document with this state vector. Raises Malformed,
-    Panicked."""
+    """Return whether an update would change nothing in a document with this state vector. Raise
+    Malformed or Panicked if the update cannot be read."""
     if update == NOTHING_NEW:
         return True
     outline(update)

@@ -238,7 +238,7 @@ def _text(graph: Graph, stamp: codec.Stamp) -> bytes:
 
 
 def digest_at(sight: GraphAtSeq) -> str:
-    """Return the digest of a graph at a moment."""
+    """Return the digest of a graph at one seq of its log."""
     return digest(read(sight).moment.graph)
 
 

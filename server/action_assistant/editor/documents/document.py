@@ -63,8 +63,8 @@ def read(doc: Doc) -> Graph:  # type: ignore[type-arg]
 
 
 def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
-    """Return the maps of a document as plain values. Nested shared types, which no client of ours writes, are
-    left out."""
+    """Return the maps of a document as plain values, without nested shared types, which our page
+    never writes."""
     return {
         root: {key: value for key, value in _root(doc, root).items() if isinstance(value, PLAIN)}
         for root in ROOTS

@@ -19,8 +19,8 @@ from action_assistant.editor.documents.document import Maps
 
 
 class Fingerprint(msgspec.Struct, frozen=True):
-    """The number of entries of a document and the sum of their CRCs, which is below 2^53 for any document of
-    ours."""
+    """The number of entries of a document and the sum of their CRCs, which is below 2^53 for any
+    allowed document."""
 
     entries: int
     total: int

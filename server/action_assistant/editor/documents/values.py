@@ -38,7 +38,7 @@ class Ends(NamedTuple):
 
 
 def is_aid(text: str) -> bool:
-    """Tell whether this text can be the key of an action in a document."""
+    """Return whether this text can be the key of an action in a document."""
     return _AID.fullmatch(text) is not None
 
 

@@ -74,8 +74,9 @@ class Blame:
         self._index = index
 
     async def of(self, graph: str, owner: str, seq: int | None) -> bytes:
-        """Return every field of an action, arrow or note that has a value after the change `seq`, by field:
-        `FieldBlame`s. Raises NotFound, Unavailable."""
+        """Return the JSON of `FieldBlame`s: one for each field of an action, arrow or note that has
+        a value after the change `seq`, by field. Raise NotFound if it did not exist then,
+        Unavailable if the journal cannot be read."""
         upto = await bring_up(self._index, graph, seq)
         return await self._index.text(fields_of, graph, owner, upto if seq is None else seq)
 

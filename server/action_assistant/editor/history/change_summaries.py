@@ -178,7 +178,7 @@ def names(changes: Iterable[LoggedChange]) -> tuple[str, tuple[str, ...]]:
 
 
 def _is_name_of_action(change: LoggedChange) -> bool:
-    """Tell whether a change sets the name of an action, which is stored under its bare key."""
+    """Return whether a change sets the name of an action, which is stored under its bare key."""
     return change.root == "actions" and "|" not in change.key
 
 

@@ -297,7 +297,9 @@ class CourseSearch:
         self._people = people
 
     async def since(self, graph: str, asked: AskingSince) -> SinceWhen:
-        """Search between two changes of a graph. Raises BadInput, TooLarge, Unavailable."""
+        """Search between two changes of a graph for those that change its course. Raise BadInput
+        for a bad request, TooLarge for too many changes, Unavailable if the journal cannot be
+        read."""
         try:
             script = script_from(asked.script)
         except ValueError as error:

@@ -37,7 +37,7 @@ def field_of(root: Root, key: str) -> str:
 
 
 def proves(place: Place) -> bool:
-    """Tell whether the owner of a key exists because of this key."""
+    """Return whether the owner of a key exists because of this key."""
     root, key = place
     match root:
         case "actions":
@@ -49,7 +49,7 @@ def proves(place: Place) -> bool:
 
 
 def is_place_of_card(place: Place) -> bool:
-    """Tell whether a key holds the position of a card or of a line."""
+    """Return whether a key holds the position of a card or of a line."""
     root, key = place
     return root == "positions" and not key.startswith("g/")
 

@@ -90,7 +90,7 @@ class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
 
 
 class GraphHistory:
-    """Tells the past of graphs, as JSON that a worker wrote."""
+    """Answers what happened to graphs, as JSON that a worker wrote."""
 
     def __init__(self, index: ChangeIndex) -> None:
         self._index = index

@@ -155,7 +155,7 @@ class _EditSession:
         return self._latest[place] == mine.seq and self._now.get(place) == unpacked(mine.after)
 
     def _was_made(self, owner: str) -> bool:
-        """Tell whether a thing that exists now was made by these changes."""
+        """Return whether a thing that exists now was made by these changes."""
         proofs = [place for place in self._places.get(owner, ()) if proves(place)]
         return bool(proofs) and all(self._first.get(place, b"") is None for place in proofs)
 

@@ -49,11 +49,9 @@ class Rehearsal(msgspec.Struct, frozen=True):
 
 
 def rehearsed(sight: GraphAtSeq, wanted: Rehearsing, inside: Inside = NOTHING_INSIDE) -> bytes:
-    """Play a graph, with these graphs inside, to its end or as far as limits let it: JSON of a
-    `Rehearsal`. For workers.
-
-    Raises BadInput, Conflict.
-    """
+    """Simulate a graph, with these graphs inside, to its end or up to a limit; return the JSON of a
+    `Rehearsal`. For workers. Raise BadInput for a bad request, Conflict if the graph cannot be
+    simulated."""
     script = _script(wanted.script)
     if not 0 < wanted.for_ms <= 24 * HOUR_MS:
         raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})

@@ -60,17 +60,14 @@ def journal_of(data: Path, given: str | None) -> str | None:
 
 
 def is_own(data: Path, url: str) -> bool:
-    """Tell whether a URL names the SQLite file in the folder itself."""
+    """Return whether a URL names the SQLite file in the folder itself."""
     return same(url, _own(data))
 
 
 def remembered(data: Path) -> str | None:
-    """Return the URL of the database outside of the data folder that `remember` has written down
-    there. Return None if nothing is written down: the graphs are then in the folder itself, or
-    there are none yet.
-
-    Raise CannotStart if the file with the URL cannot be read or is damaged.
-    """
+    """Return the stored URL of the database outside of the data folder; None if none is stored: the
+    graphs are then in the folder itself, or do not exist yet. Raise CannotStart if the file with
+    the URL cannot be read or is damaged."""
     try:
         return msgspec.json.decode((data / FILE).read_bytes(), type=StoredLocation).database
     except FileNotFoundError:
@@ -138,7 +135,7 @@ def _own(data: Path) -> str:
 
 
 def same(one: str, other: str) -> bool:
-    """Tell whether two URLs name one database."""
+    """Return whether two URLs name one database."""
     return _address(one) == _address(other)
 
 
@@ -190,7 +187,7 @@ def _holds(url: str, mark: Path) -> bool:
 
 
 def _is_nowhere(url: str) -> bool:
-    """Tell whether a URL names a SQLite file that does not exist. Raises CannotStart for an invalid URL."""
+    """Return whether a URL names a SQLite file that does not exist. Raises CannotStart for an invalid URL."""
     database_of(url)
     parsed = make_url(url)
     return parsed.get_backend_name() == "sqlite" and not Path(parsed.database or "").exists()

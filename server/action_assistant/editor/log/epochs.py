@@ -35,7 +35,7 @@ Why: TypeAlias = Literal["the first", "a backup was restored", "the log had gone
 
 
 class EpochBegun(msgspec.Struct, frozen=True):
-    """An epoch began with the event that says so. `why` is for people who read the log."""
+    """A new epoch begins with this event. `why`: for people who read the log."""
 
     id: str
     why: Why
@@ -88,7 +88,7 @@ async def _epoch(journal: Journal, mark: Path) -> str:
 
 
 async def _follows(journal: Journal, mark: EpochMark | None) -> bool:
-    """Tell whether the log still holds the event of the mark."""
+    """Return whether the log still holds the event of the mark."""
     return mark is None or await _chain(journal, mark.position) == mark.chain
 
 

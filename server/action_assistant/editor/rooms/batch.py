@@ -59,8 +59,8 @@ class ComparisonRequest(msgspec.Struct, frozen=True):
 
 
 class ReadRequest(msgspec.Struct, frozen=True):
-    """The server calls `see(document, seq)` at a moment when the whole document is committed; `done` gets the
-    result."""
+    """A request of the server to call `see(document, seq)` when the whole document is committed;
+    `done` gets the result."""
 
     see: Callable[[Replica, int], Any]
     done: "asyncio.Future[Any]"
@@ -161,11 +161,10 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
 async def tried_first(
     edit: SubmittedEdit, replica: Replica, run_in_worker: RunInWorker
 ) -> UpdateOutline | None:
-    """Try an edit on a copy of the document in a worker where that is needed, and return its outline.
-
-    Return None where the outline has to be read again: in a document with nested types it depends on what
-    lies beside the new parts. Raises Malformed, Panicked, TooSlow, NotNow, QuotaExceeded.
-    """
+    """Try an edit on a copy of the document in a worker if needed, and return its outline. Return
+    None if the outline has to be read again, since in a document with nested types it depends on
+    the present neighbours. Raise Malformed, Panicked, TooSlow or QuotaExceeded for a bad edit,
+    NotNow if the trial itself fails."""
     read = None if len(edit.update) > LARGE else outline(edit.update)
     released = [] if read is None else replica.freed_by(read)
     freed = sum(map(len, released))
@@ -194,11 +193,9 @@ async def tried_for(
     update: bytes,
     released: Sequence[bytes] = (),
 ) -> TriedOutline:
-    """Try an update on a document of this state, and after it the updates that waited for it (`released`).
-    Return its outline.
-
-    Raises Malformed, Panicked, TooSlow; NotNow where the reason is not in the update.
-    """
+    """Try an update on a document of this state, and after it the updates that waited for it
+    (`released`). Return its outline. Raise Malformed, Panicked or TooSlow for a bad update,
+    NotNow if the trial itself fails."""
     return await _done_for(person, run_in_worker, tried, state, update, released)
 
 

@@ -67,7 +67,7 @@ class UpdateBroadcast:
             self._timer.cancel()
 
     def _announces_now(self) -> bool:
-        """Tell whether the newest sequence number is sent along with this batch. Otherwise a timer sends it
+        """Return whether the newest sequence number is sent along with this batch. Otherwise a timer sends it
         alone, unless another batch comes first."""
         now = self._loop.time()
         if now < self._next_announcement:

@@ -145,8 +145,8 @@ class Comparisons:
         self._task: asyncio.Task[None] | None = None
 
     def ask(self, compare: ComparisonRequest) -> None:
-        """Answer a client with the fingerprint of the document, unless the document has changed since the
-        client looked."""
+        """Answer a client with the fingerprint of the document, unless the document has changed
+        since the client's own."""
         if compare.shown.seq != self._room.seq:
             return
         self._waiting.append(compare)

@@ -155,7 +155,7 @@ class Member:
 
     @property
     def has_news(self) -> bool:
-        """Tell whether anything waits in the send queue."""
+        """Return whether anything waits in the send queue."""
         return bool(self._frames or self._presence is not None or self._ack is not None)
 
     def gather(self) -> list[bytes]:
@@ -174,7 +174,7 @@ class Member:
         return frames
 
     def send_heartbeat(self, silence: float) -> None:
-        """Send a heartbeat if nothing was sent for so many seconds (rule R10)."""
+        """Send a heartbeat if nothing was sent for `silence` seconds (rule R10)."""
         if self._loop.time() - self._taken_at >= silence:
             self.post(messages.BEAT)
 
@@ -188,11 +188,12 @@ class Member:
 
     @property
     def is_over_cpu_budget(self) -> bool:
-        """Tell whether edits of this socket took more of the loop than their share."""
+        """Return whether edits of this socket took more of the loop than their share."""
         return self._cpu.is_overdrawn
 
     def cpu_debt(self) -> float:
-        """Return for how many seconds the socket is not to be read, so that others get their share."""
+        """Return for how many seconds the socket must not be read, so that others get their share
+        of the processor."""
         return self._cpu.debt()
 
     def edit_handled(self) -> None:
@@ -230,7 +231,7 @@ class Member:
 
     @property
     def closed(self) -> bool:
-        """Tell whether the socket has been closed, by either side."""
+        """Return whether the socket has been closed, by either side."""
         return self._closed.done()
 
     async def ended(self) -> int:

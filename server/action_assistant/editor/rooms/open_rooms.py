@@ -106,7 +106,7 @@ class Rooms:
         self._deleted.discard(stream)
 
     def is_deleted(self, stream: str) -> bool:
-        """Tell whether this graph was deleted since this process began."""
+        """Return whether this graph was deleted since this process began."""
         return stream in self._deleted
 
     async def close(self) -> None:

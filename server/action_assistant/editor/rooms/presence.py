@@ -134,7 +134,7 @@ class RoomPresence:
         return tuple(self._entries.values())
 
     def _is_own(self, owner: PresenceOwner, entry: PresenceEntry) -> bool:
-        """Tell whether a socket may send this entry. Stock clients also echo the entries of others.
+        """Return whether a socket may send this entry. Stock clients also echo the entries of others.
 
         A socket sends for the first client id that it names. If another socket of the same person already
         sends for that id, it is the connection before this one.

@@ -54,8 +54,8 @@ class BackupFailed(msgspec.Struct, frozen=True):
 
 
 class BackupRehearsed(msgspec.Struct, frozen=True, kw_only=True):
-    """A backup that was restored into a scratch place and looked at. `made_at`: when it was made, None
-    when that cannot be read. `why`: it is not sound."""
+    """A trial restore of a backup. `made_at`: when the backup was made, None if that cannot be
+    read. `why`: what is wrong with it, None if it is sound."""
 
     at: float
     file: str

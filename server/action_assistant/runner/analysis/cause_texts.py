@@ -163,8 +163,8 @@ def _command_in_words(cause: ForeignCause) -> str:
 
 
 def short_name(run: Run, full_name: str) -> str:
-    """Return an action as people call it: with the actions around it, and each name without its
-    number where no other action of its level has the name."""
+    """Return an action's name for people: with the names of the actions around it, each without its
+    number if no other action of its level has that name."""
     found = places_of(run)
     place = found.get(full_name)
     if place is None:

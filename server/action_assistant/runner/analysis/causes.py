@@ -50,7 +50,7 @@ class WrongParameter(_Evidence, frozen=True, tag="wrong_parameter", tag_field="k
 
 
 class UnknownAction(_Evidence, frozen=True, tag="unknown_action", tag_field="kind"):
-    """The engine refused the graph, and has no such action, or one with other parameters."""
+    """The engine refused the graph: it lacks this action, or has it with other parameters."""
 
     robot: str
     why: str
@@ -304,7 +304,7 @@ _ENDS: Final[dict[str, frozenset[str]]] = {
 
 def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
     """Return whether a foreign command ended the run: it can end runs in this way, came before the
-    end, nobody here asked for one, and nothing else ended it."""
+    end, nobody at this runner requested the end, and nothing else caused it."""
     others = [
         each for each in run.alarms if each.code == RESTARTED and each.at <= (run.ended_at or 0)
     ]

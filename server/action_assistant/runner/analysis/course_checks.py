@@ -99,7 +99,7 @@ def check_courses(
     subgraphs: Sequence[SentSubgraph] = (),
 ) -> CheckedCourses:
     """Simulate the expected courses with this graph, for at most `budget_s` seconds of processor
-    time. Raises BadInput, NotUmrf, TooLarge."""
+    time. Raise BadInput, NotUmrf or TooLarge if the graph cannot be read."""
     _, reading = read_sent(umrf)
     _, inside = read_inside(subgraphs, "", None, approved=False)
     until = time.thread_time() + budget_s
@@ -139,7 +139,8 @@ def _checked(
 def propose(
     umrf: bytes, arrow: OutcomeArrow, subgraphs: Sequence[SentSubgraph] = ()
 ) -> ArrowProposal:
-    """Search for a script under which the arrow is taken. Raises BadInput, NotUmrf, TooLarge."""
+    """Search for a script under which the arrow is taken. Raise BadInput, NotUmrf or TooLarge if
+    the graph cannot be read."""
     _, reading = read_sent(umrf)
     _, inside = read_inside(subgraphs, "", None, approved=False)
     graph = reading.graph

@@ -257,8 +257,8 @@ def of_run(
 
 
 def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
-    """Return an expectation of the course that a graph takes in the simulator. Raises BadInput,
-    NotUmrf, TooLarge."""
+    """Return an expectation of the course that a graph takes in the simulator. Raise BadInput,
+    NotUmrf or TooLarge if the graph or script cannot be used."""
     if wanted.graph == "":
         raise BadInput("Of which graph?", where={"path": "/graph"})
     text, reading = read_sent(bytes(wanted.umrf))

@@ -93,10 +93,8 @@ class RunReplay(msgspec.Struct, frozen=True, kw_only=True):
 
 
 async def run_replay(keyframe_store: KeyframeStore, run: str, *, after: int) -> RunReplay:
-    """Return the page of events after `after`, which is rounded down to a keyframe.
-
-    Raises NotFound, Unavailable.
-    """
+    """Return the page of events after `after`, which is rounded down to a keyframe. Raise NotFound
+    if there is no such run, Unavailable if the journal cannot be read."""
     keyframes = await keyframe_store.keyframes(run)
     start = after - after % APART
     base = keyframes.before(start) if start else None

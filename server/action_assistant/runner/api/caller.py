@@ -56,7 +56,8 @@ async def body_of(
 
 
 async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -> bytes:
-    """Return the part of a body that arrives within so many seconds, `most` bytes of it at most."""
+    """Return the first `most` bytes of a body, or the part of them that arrives within so many
+    seconds."""
     found = b""
     with anyio.move_on_after(seconds):
         async for part in request.stream():

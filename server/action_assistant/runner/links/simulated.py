@@ -228,7 +228,8 @@ class SimulatedLink:
         self._reading = asyncio.create_task(self._read(reader))
 
     async def _told(self, command: str, *args: Any) -> Any:
-        """Send a command and return the engine's answer. Raises NotSent, EngineRefused, NoAnswer."""
+        """Send a command and return the engine's answer. Raise NotSent if its process does not run;
+        raise EngineRefused or NoAnswer as the engine in the process does."""
         number = next(self._numbers)
         future: asyncio.Future[Any] = asyncio.get_running_loop().create_future()
         self._asked[number] = future

@@ -130,7 +130,8 @@ class SimulatorLink:
         )
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Start a graph now. Raises EngineRefused, NoAnswer."""
+        """Start a graph now. Raise EngineRefused if the engine refuses it, NoAnswer if the engine
+        has crashed or hangs."""
         self._alive()
         leaves()
         graph = _whole(order)
@@ -161,7 +162,8 @@ class SimulatorLink:
             self._tell(self._engine.resume(graph_name, self._now(), continue_from=continue_from))
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Change a running graph now. Raises NotSent, EngineRefused."""
+        """Change a running graph now. Raise NotSent if the engine has crashed or hangs,
+        EngineRefused if it refuses the change."""
         if self._dead is not None:
             raise NotSent(self._dead)
         try:

@@ -381,8 +381,9 @@ class ReviewService:
         author: Author,
         now: int,
     ) -> expected_runs.Expected:
-        """Return the event that saves an expected course. Raises NotFound, BadInput, NotUmrf,
-        TooLarge, Conflict."""
+        """Return the event that saves an expected course. Raise NotFound for an unknown run;
+        BadInput, NotUmrf or TooLarge for a bad request; Conflict if the simulator takes another
+        course than the run."""
         if wanted.run == "":
             return expected_runs.of_dry_run(wanted, name, author, now)
         found = await self.known(wanted.run)

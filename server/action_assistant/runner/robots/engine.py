@@ -122,7 +122,7 @@ class KnownEngine:
 
     @property
     def pauses(self) -> bool:
-        """True where pausing is safe: the profile says so, and the link can."""
+        """True if pausing is safe: the profile says so, and the link supports it."""
         return self._link.pauses
 
     @property

@@ -153,9 +153,10 @@ def decoded(body: bytes, kind: type[T]) -> T:
 
 
 def admit(request: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
-    """Check text, digest, size and problems of a start. Each refusal of the graph itself, but for
-    its size, is a problem that the check shows everywhere else, too. Before a graph is `approved`
-    its digest may be left out. Raises BadInput, NotUmrf, TooLarge, Conflict."""
+    """Check text, digest, size and problems of a start. Each refusal of the graph itself, except
+    for its size, is a problem that checks also show elsewhere. Unless the graph is `approved`,
+    its digest may be missing. Raise BadInput, NotUmrf, TooLarge or Conflict if the start is
+    refused."""
     text, reading = read_sent(bytes(request.umrf))
     stamp = codec.stamp_of(text)
     found = digest(reading.graph)

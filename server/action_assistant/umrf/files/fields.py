@@ -89,8 +89,7 @@ def action_attributes(
 
 
 def direction_of(value: Json) -> Direction:
-    """Return the side on which later actions are drawn; down if the file says nothing or something
-    unknown."""
+    """Return the direction in which a graph is drawn; `down` for a missing or unknown value."""
     return "right" if value == "right" else "down"
 
 

@@ -31,7 +31,8 @@ class Unpacked(msgspec.Struct, frozen=True, tag="unpacked", tag_field="kind"):
 
 
 class Unpackable(msgspec.Struct, frozen=True, tag="unpackable", tag_field="kind"):
-    """The reasons for which no arrows say the same as those of the action: all that were found."""
+    """All reasons found for which no arrows of a flat graph do the same as the arrows of the
+    action."""
 
     reasons: tuple[FlatteningReason, ...]
 

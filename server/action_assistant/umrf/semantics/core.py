@@ -252,7 +252,7 @@ class Core(Clock):
             self._begin(graph, node)
 
     def _loaded(self, graph: Running, node: Node) -> None:
-        """Begin an action that has finished loading, whatever has become of its graph meanwhile."""
+        """Begin an action that has finished loading, even if its graph has ended meanwhile."""
         node.loading = False
         graph.loading -= 1
         if self.graphs.get(graph.name) is graph and not node.loaded and self._load(graph, node):

@@ -90,7 +90,7 @@ def require(connection: ASGIConnection[Any, Any, Any, Any], permission: Permissi
 
 
 class Needs:
-    """For `guards=[…]` of a route: who may not is refused before the request is looked at."""
+    """A guard of a route: it refuses a person without the permission before the request is read."""
 
     def __init__(self, permission: Permission) -> None:
         self.permission: Final = permission
@@ -292,7 +292,8 @@ class Access:
         return [each for each in tried if each is not None]
 
     def _device(self, headers: dict[str, str]) -> str:
-        """Return the id of the browser, by the first cookie whose seal is ours."""
+        """Return the id of the browser from the first cookie that this server sealed; "" without
+        one."""
         given = cookies.values(headers.get("cookie", ""), self._device_cookie)
         return next(filter(None, map(self._keys.device, given)), "")
 

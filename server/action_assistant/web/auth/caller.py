@@ -61,7 +61,8 @@ def set_caller(asking: Caller | None) -> None:
 
 
 def outlive_connection() -> None:
-    """Let this task go on when the connection ends for which it was started. It still counts for its person."""
+    """Let this task continue after the end of the connection for which it was started. It still
+    counts for its person."""
     asking = _CALLER.get()
     _CALLER.set(None if asking is None else asking._replace(receive=None))
 

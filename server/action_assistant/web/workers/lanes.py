@@ -83,7 +83,7 @@ class GaveUp(Unavailable):
 
     @property
     def type(self) -> str:
-        """The type of the problem for programs, the one of Unavailable."""
+        """The problem type for programs: that of Unavailable."""
         return "unavailable"
 
 

@@ -25,7 +25,7 @@ class PairedText(msgspec.Struct, frozen=True, array_like=True):
         return self.start + len(self.units) // 2
 
     def is_within(self, clock: int) -> bool:
-        """Tell whether this clock is the second of a character of two."""
+        """Return whether this clock is the second of a character of two."""
         return (
             self.start < clock < self.end and self.units[2 * (clock - self.start) + 1] >> 2 == 0x37
         )

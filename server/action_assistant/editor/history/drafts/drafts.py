@@ -144,7 +144,8 @@ class Drafts:
         return await self._view(await self._row(draft))
 
     async def pair(self, draft: str) -> DraftPair:
-        """Return both sides of a draft, and the state that they have in common. Raises NotFound, Unavailable."""
+        """Return both sides of a draft, and the last state in which they were equal. Raise NotFound
+        if a side does not exist, Unavailable if the journal cannot be read."""
         row = await self._row(draft)
         await self._catalogue.require(row.draft_of, "graph")
         await self._index.upto(row.base_graph, row.base_seq)
@@ -158,7 +159,7 @@ class Drafts:
     # --- proposals --------------------------------------------------------------------------------
 
     async def propose(self, draft: str, author: str, note: str) -> DraftView:
-        """Say that a draft is ready to be merged."""
+        """Propose a draft to be merged, with a note."""
         await self._row(draft)
         seq = (await self._graph_reader.now(draft)).seq
         body = h.DraftProposed(note.strip(), seq, caller.device())
@@ -299,6 +300,6 @@ class Drafts:
 
 
 def _ends_proposal(event: Row[Any], row: Row[Any]) -> bool:
-    """Tell whether an event is the merge of the draft into its origin."""
+    """Return whether an event is the merge of the draft into its origin."""
     merged = msgspec.json.decode(event.body, type=h.GraphMerged)
     return merged.draft == merged.source == str(row.id)

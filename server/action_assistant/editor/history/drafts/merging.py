@@ -52,7 +52,7 @@ class KeyMerge(msgspec.Struct, frozen=True):
 
 
 def merged(base: Places, ours: Places, theirs: Places, choices: Choices) -> KeyMerge:
-    """Merge the changes of `theirs` into `ours`, key by key."""
+    """Merge the changes of `theirs` into `ours`, key by key; `base` is their common origin."""
     merge = _Merge(_plain(base), _plain(ours), _plain(theirs), choices)
     return merge.outcome()
 
@@ -67,7 +67,7 @@ def _other(side: Side) -> Side:
 
 
 class _Merge:
-    """Merges two sides that both go on from a common base, key by key."""
+    """Merges two sides with a common base, key by key."""
 
     def __init__(
         self,
@@ -118,8 +118,8 @@ class _Merge:
     # --- what came or went ------------------------------------------------------------------------
 
     def _take_whole(self, owners: Iterable[str], matters: Callable[[str, Side], bool]) -> None:
-        """For things that one side removed, take all keys from that side, or from the chosen side where the
-        removal was a conflict."""
+        """Choose the side of each thing that one side removed: that side, or after a conflict the
+        chosen side. All its keys come from that side."""
         for owner in owners:
             there: list[Side] = [side for side in self._there if owner in self._there[side]]
             if owner in self._whole or owner not in self._was or len(there) != 1:
@@ -141,7 +141,7 @@ class _Merge:
         )
 
     def _is_changed(self, owner: str, side: Side) -> bool:
-        """Tell whether a side changed a thing otherwise than by moving it."""
+        """Return whether a side changed a thing other than its position."""
         now = self._sides[side]
         return any(
             not is_same(self._base.get(place, UNSET), now.get(place, UNSET))
