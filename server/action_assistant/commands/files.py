@@ -338,8 +338,8 @@ def _library(folder: Path | None) -> Mapping[str, Graph]:
 
 
 def actions_below(folder: Path) -> Mapping[str, Signature]:
-    """Return the signatures of a folder's actions by name. Like the engine, look at files
-    `*umrf.json`."""
+    """Return the signatures of a folder's actions by name. Only files `*umrf.json` are read, as
+    engines do."""
     found: dict[str, Signature] = {}
     for path in sorted(folder.rglob("*umrf.json")):
         try:

@@ -60,8 +60,8 @@ def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVer
 
 
 def _now(server: Server, each: Expectation, graph: str) -> VerifyVerdict:
-    """Compare an expected run with the present state of its graph; fail if the graph does not exist
-    any more."""
+    """Compare an expected run with the present state of its graph; the verdict is negative if the
+    graph does not exist any more."""
     try:
         umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
     except RequestRefused as error:

@@ -241,7 +241,7 @@ def _write(
     runs: Sequence[str],
     rows: dict[str, list[dict[str, Any]]],
 ) -> None:
-    """Insert events that the copy lacks, and replace the rows of some runs."""
+    """Insert events that the copy lacks, and replace the rows of these runs."""
     if events:
         values = [
             {name: getattr(each, name) for name in Event.__struct_fields__}

@@ -116,7 +116,8 @@ def check_courses(
 def _checked(
     saved: Expected, now: Graph, inside: Inner, *, looks: bool
 ) -> tuple[CheckedCourse, TakenArrows | None]:
-    """Check one course. Also return the arrows that it took, if it is as expected."""
+    """Check one course; without `looks` (no time is left) return it unchecked. Also return the
+    arrows that it took, if it is as expected."""
     unchecked = CheckedCourse(
         name=saved.name,
         run=saved.run,

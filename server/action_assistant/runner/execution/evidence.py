@@ -19,8 +19,8 @@ def newer_than_answers(run: Run, snapshots: Sequence[Snapshot]) -> tuple[Snapsho
     """Return those snapshots of feedback, oldest first, that are newer than the last answer.
 
     Feedback covers the last half second, and an answer may have shown an end already; older states
-    would then look like further visits. In a loop, a state that looks older may be a new lap; the
-    next answer decides that.
+    would then look like further visits. In a loop, a state that looks older may be a new lap, and
+    is left to the next answer.
     """
     known: dict[str, int] = {}
     for i, shown in enumerate(snapshots):

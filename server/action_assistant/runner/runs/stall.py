@@ -88,7 +88,7 @@ class Standstill:
         self._looks = 0
 
     def forget(self) -> None:
-        """Start over: the graph moves, or was not seen."""
+        """Start over, since the graph moves or was not in the answer."""
         self._since, self._looks = None, 0
 
     @property

@@ -88,5 +88,6 @@ class StopLoop:
 
 
 def _is_vain(run: Run) -> bool:
-    """Return whether the engine has obeyed as far as it ever will, and proves nothing by that."""
+    """Return whether further stop messages are in vain: nothing of the run moves any more, and the
+    engine can never prove that it is at rest."""
     return bool(run.unconfirmed) and not run.active and run.unknown_since is None

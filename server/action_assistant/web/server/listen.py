@@ -237,10 +237,10 @@ class ActivityTracker:
 
 
 def _waits_for_body(scope: Scope) -> bool:
-    """Return whether a request announced a body that is read.
+    """Return whether the server has to wait for the body of a request before it answers.
 
-    A method without a body is answered without waiting for one, since a client would take a failure
-    there for a failed request.
+    A method without a body is answered at once, since a client would take a failure of that wait
+    for a failed request.
     """
     if scope["type"] != ScopeType.HTTP or scope["method"] in _WITHOUT_BODY:
         return False

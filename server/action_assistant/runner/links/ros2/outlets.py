@@ -142,7 +142,7 @@ class Outlets:
             last.taken.set()
 
     def said(self, robot: str, line: str) -> None:
-        """Note a line of a robot's log: it may say that a start was taken in."""
+        """Note a line of a robot's log, which may report that a start was received."""
         last = self._untaken
         if last is not None and (last.robot, last.receipt) == (robot, line.strip()):
             last.taken.set()
