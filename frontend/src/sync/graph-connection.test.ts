@@ -356,6 +356,37 @@ test.each(refusals)(
   },
 );
 
+test("choices between two values stay open when an edit is refused, also after a reload", async () => {
+  const first = await come();
+  await arrive();
+  const look = addAction(docOf(first), { name: "Look" });
+  await comeAndGo();
+  refuse("Cursed", 1007);
+  server.last.end(1006);
+  setField(docOf(first), look, "description", "mine");
+  addAction(docOf(first), { name: "Cursed" });
+  server.broadcast((doc) => setField(doc, look, "description", "theirs"));
+  await vi.advanceTimersByTimeAsync(400);
+  await comeAndGo();
+  expect(link(first)).toMatchObject({ state: "live", unsaved: 0 });
+  expect(first.now().stranded).toMatchObject([{ refused: "not-accepted", edits: 1 }]);
+  const values = (connection: GraphConnection) =>
+    connection
+      .now()
+      .open.room.changedTwice.now()
+      .map(({ mine, theirs }) => [mine, theirs]);
+  expect(values(first)).toEqual([["mine", "theirs"]]);
+  first.leave();
+  await settle();
+  const second = await come();
+  await comeAndGo();
+  expect(values(second)).toEqual([["mine", "theirs"]]);
+  const { changedTwice } = second.now().open.room;
+  for (const each of changedTwice.now()) changedTwice.choose(each, "theirs");
+  await comeAndGo();
+  expect(docOf(second).getMap("actions").get(`${look}|description`)).toBe("theirs");
+});
+
 test("an edit that is refused alone is laid aside at once, and the next ones are stored", async () => {
   const connection = await come();
   await arrive();

@@ -185,7 +185,7 @@ export class GraphConnection {
         this.follower(otherEpoch(room));
         break;
       case "other-client":
-        this.follower(newEpoch(room.histories().theirs));
+        this.followerWithChoices(room);
         if (aside === null) void room.forget();
         else void this.makeUnderOtherClient(aside);
         break;
@@ -193,7 +193,7 @@ export class GraphConnection {
         this.differences += 1;
         if (this.differences > MOST_DIFFERENCES) return;
         this.notice = "differed";
-        this.follower(newEpoch(room.histories().theirs));
+        this.followerWithChoices(room);
         void room.forget();
         break;
       case "not-accepted":
@@ -213,6 +213,13 @@ export class GraphConnection {
     old.leave();
   }
 
+  /** Opens a room on the same history. The choices that the person has not made yet are about it, too. */
+  private followerWithChoices(room: Room): void {
+    const choices = room.changedTwice.undecided();
+    this.follower(newEpoch(room.histories().theirs));
+    this.opened.room.changedTwice.restore({ choices });
+  }
+
   /**
    * Opens the next room after a refusal. The edits that waited are made anew there, each by itself, so
    * that only what is refused by itself is laid aside. False when that has been of no use before.
@@ -225,7 +232,7 @@ export class GraphConnection {
       this.differences += 1;
       if (this.differences > MOST_DIFFERENCES) return false;
     }
-    this.follower(newEpoch(room.histories().theirs));
+    this.followerWithChoices(room);
     if (waiting.length === 0) {
       void room.forget();
       return true;
