@@ -9,6 +9,7 @@ from typing import Any
 
 import anyio
 import httpx
+import msgspec
 import pytest
 from httpx_ws import aconnect_ws
 from pycrdt import Doc, Map, Provider
@@ -16,6 +17,7 @@ from pycrdt.websocket.websocket import HttpxWebsocket
 
 from action_assistant.commands.client import Server
 from action_assistant.commands.remote import insisting, verdict
+from action_assistant.runner.runs.views import RunShown
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from support.product import TOKEN, Product, running
@@ -219,6 +221,20 @@ def test_without_a_server_it_says_how_to_start_one(tmp_path: Path) -> None:
     assert "action-assistant serve" in answer.stderr
 
 
+def run_shown(state: str, result: str | None, visits: list[str | None]) -> RunShown:
+    """Return a run of one action as the runner shows it, with the results of its visits."""
+    at = "2026-11-27T20:00:00Z"
+    unknown = {"not_before": at, "not_after": None, "until": None, "how": "observed"}
+    shown = [{"from": at, "result": each, **unknown} for each in visits]
+    known: dict[str, Any] = dict.fromkeys(RunShown.__struct_fields__)
+    known |= {"id": "R", "number": 1, "graph_name": "pair", "digest": "", "engine": "David"}
+    known |= {"author": {"id": "A", "name": "Ada"}, "desired": "running", "requested_at": at}
+    known |= {"state": state, "result": result, "detail": "", "alarms": [], "log": []}
+    known |= dict.fromkeys(("simulated", "recorded", "behaviours"), False)
+    action = {"aid": None, "state": "", "visits": shown, "older": 0, "messages": []}
+    return msgspec.convert(known | {"actions": {"Work_0": action}}, RunShown)
+
+
 @pytest.mark.parametrize(
     ("state", "result", "visits", "code"),
     [
@@ -238,8 +254,7 @@ def test_without_a_server_it_says_how_to_start_one(tmp_path: Path) -> None:
 def test_a_run_fails_the_command_only_if_it_did_not_finish_or_is_known_to_have_failed(
     state: str, result: str | None, visits: list[str | None], code: int
 ) -> None:
-    actions = {"Work_0": {"visits": [{"result": each} for each in visits]}}
-    found, words = verdict({"state": state, "result": result, "actions": actions})
+    found, words = verdict(run_shown(state, result, visits))
     assert found == code
     assert words.startswith(state)
     assert ("does not tell" in words) == (state == "finished" and result is None and code == 0)

@@ -1,13 +1,17 @@
 """`people`: who may come in by which link, and the end of a link; `link`: the owner's own."""
 
 import argparse
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+import msgspec
 
 from action_assistant.commands.client import (
     RequestRefused,
     Server,
     add_server,
     command,
+    decoded,
     print_json,
     refused,
     running,
@@ -17,6 +21,9 @@ from action_assistant.private_files import own_folder
 from action_assistant.safe_text import one_line
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revocations
+
+if TYPE_CHECKING:  # slow to load, and most calls do not need it
+    from action_assistant.editor.people.invitations import Invitation
 
 
 def _add_people(people: argparse.ArgumentParser) -> None:
@@ -54,38 +61,44 @@ COMMANDS: Final = {"people": _add_people, "link": _add_link}
 def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
-            sharing = server.editor("GET", "/api/invitations").json()
+            answer = server.editor("GET", "/api/invitations")
         except RequestRefused as error:
             return refused(error)
         if options.json:
-            print_json(sharing)
+            print_json(answer.json())
             return 0
-        for each in sharing["invitations"]:
-            _show(sharing["origins"], each)
+        from action_assistant.editor.api.invitations import Sharing
+
+        sharing = decoded(answer, Sharing)
+        for each in sharing.invitations:
+            _show(sharing.origins, each)
     return 0
 
 
 def _invite(options: argparse.Namespace) -> int:
+    from action_assistant.editor.api.invitations import Sharing
+    from action_assistant.editor.people.invitations import Invitation
+
     with running(options) as server:
         try:
             wanted = {"role": options.role, "label": options.label}
-            made = server.editor("POST", "/api/invitations", json=wanted).json()
-            _show(server.editor("GET", "/api/invitations").json()["origins"], made)
+            made = decoded(server.editor("POST", "/api/invitations", json=wanted), Invitation)
+            _show(decoded(server.editor("GET", "/api/invitations"), Sharing).origins, made)
         except RequestRefused as error:
             return refused(error)
     return 0
 
 
-def _show(origins: list[str], invitation: dict[str, Any]) -> None:
-    label = f"  {invitation['label']}" if invitation["label"] else ""
-    over = "  (revoked)" if "revoked_at" in invitation else ""
-    print(one_line(f"{invitation['id']}  {invitation['role']}{label}{over}"))
-    for guest in invitation["guests"]:
-        who = one_line(guest["person"]["name"]) or "somebody without a name"
-        print(f"    {who}, since {guest['at']}")
-    if "path" in invitation:
+def _show(origins: Sequence[str], invitation: "Invitation") -> None:
+    label = f"  {invitation.label}" if invitation.label else ""
+    over = "  (revoked)" if invitation.revoked_at is not None else ""
+    print(one_line(f"{invitation.id}  {invitation.role}{label}{over}"))
+    for guest in invitation.guests:
+        who = one_line(guest.person.name) or "somebody without a name"
+        print(f"    {who}, since {msgspec.to_builtins(guest.at)}")
+    if invitation.path is not None:
         for origin in origins[:1]:
-            print(f"    {origin}{invitation['path']}")
+            print(f"    {origin}{invitation.path}")
 
 
 def _revoke(options: argparse.Namespace) -> int:
@@ -108,7 +121,7 @@ def _revoke(options: argparse.Namespace) -> int:
 
 
 def _revoke_at(server: Server, invitation: str) -> int:
-    gone = server.editor("POST", f"/api/invitations/{invitation}/revoke").json()
+    answer = server.editor("POST", f"/api/invitations/{invitation}/revoke")
     try:
         server.runner("POST", "/api/revocations", json={"invitation": invitation})
     except (RequestRefused, CannotStart) as error:
@@ -117,8 +130,11 @@ def _revoke_at(server: Server, invitation: str) -> int:
                 f"Revoked, but a runner with a data folder of its own has not been told: {error}"
             )
         )
-    print(f"{gone['id']}  {gone['role']} is revoked; {len(gone['guests'])} came in by it.")
-    if gone.get("unrecorded"):
+    from action_assistant.editor.people.invitations import Invitation
+
+    gone = decoded(answer, Invitation)
+    print(f"{gone.id}  {gone.role} is revoked; {len(gone.guests)} came in by it.")
+    if gone.unrecorded:
         print("The log could not take that up yet; the server tries again until it can.")
     return 0
 
@@ -128,10 +144,13 @@ def _link(options: argparse.Namespace) -> int:
     token, so only addresses of a server that has proven to know it are printed."""
     with running(options) as server:
         try:
-            sharing = server.editor("GET", "/api/invitations").json()
+            answer = server.editor("GET", "/api/invitations")
         except RequestRefused as error:
             return refused(error)
-    public = sharing["origins"][:1] if sharing.get("proxied") else []
+    from action_assistant.editor.api.invitations import Sharing
+
+    sharing = decoded(answer, Sharing)
+    public = sharing.origins[:1] if sharing.proxied else ()
     token = Keys.known(options.data.resolve()).token
     for address in dict.fromkeys([*public, server.url]):
         print(f"{address}/#t={token}")

@@ -5,7 +5,7 @@ import sys
 import time
 import uuid
 from pathlib import Path
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import msgspec
 
@@ -14,6 +14,7 @@ from action_assistant.commands.client import (
     Server,
     add_server,
     command,
+    decoded,
     print_json,
     refused,
     running,
@@ -23,7 +24,11 @@ from action_assistant.commands.runs import add_archives, add_since
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line, told
 
+if TYPE_CHECKING:  # slow to load, and Stop needs none of them
+    from action_assistant.runner.runs.views import RunShown
+
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
+_TIME: Final = "%Y-%m-%dT%H:%M:%S"
 _POLL: Final = 0.2  # seconds
 _INSIST_S: Final = 5.0
 _LOOK_AT_ROBOT: Final = "Look at the robot; use its hardware stop."
@@ -125,12 +130,14 @@ def _export(options: argparse.Namespace) -> int:
 
 def _graphs(options: argparse.Namespace) -> int:
     with running(options) as server:
-        graphs = server.editor("GET", "/api/graphs").json()
+        answer = server.editor("GET", "/api/graphs")
     if options.json:
-        print_json(graphs)
+        print_json(answer.json())
         return 0
-    for graph in graphs:
-        print(one_line(f"{graph['id']}  {graph['updated_at'][:19]}  {graph['name']}"))
+    from action_assistant.editor.catalogue.catalogue import GraphView
+
+    for graph in decoded(answer, list[GraphView]):
+        print(one_line(f"{graph.id}  {graph.updated_at:{_TIME}}  {graph.name}"))
     return 0
 
 
@@ -143,7 +150,7 @@ def _verify(options: argparse.Namespace) -> int:
 def _examples(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
-            taken = server.runner("POST", "/api/examples").json()
+            taken = decoded(server.runner("POST", "/api/examples"), list[str])
         except RequestRefused as error:
             return refused(error)
     print(f"{len(taken)} examples are there, with the label “example”.")
@@ -154,16 +161,18 @@ def _runs(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             query = {"graph": server.graph_id(options.graph)} if options.graph else {}
-            runs = server.runner("GET", "/api/runs", params=query).json()
+            answer = server.runner("GET", "/api/runs", params=query)
         except RequestRefused as error:
             return refused(error)
     if options.json:
-        print_json(runs)
+        print_json(answer.json())
         return 0
-    for run in runs:
-        what = run["state"] + (f" ({run['result']})" if run["result"] else "")
-        when = (run["started_at"] or "")[:19]
-        print(one_line(f"{run['id']}  {when}  {run['graph_name']}  {run['engine']}  {what}"))
+    from action_assistant.runner.runs.views import Listed
+
+    for run in decoded(answer, list[Listed]):
+        what = run.state + (f" ({run.result})" if run.result else "")
+        when = f"{run.started_at:{_TIME}}" if run.started_at else ""
+        print(one_line(f"{run.id}  {when}  {run.graph_name}  {run.engine}  {what}"))
     return 0
 
 
@@ -174,6 +183,8 @@ def _run(options: argparse.Namespace) -> int:
             script = msgspec.json.decode(options.script.read_bytes())
         except (OSError, msgspec.DecodeError) as error:
             raise CannotStart(f"Cannot read the script {options.script}: {error}.") from error
+    from action_assistant.runner.runs.views import RunShown
+
     with running(options) as server:
         try:
             graph = server.graph_id(options.graph)
@@ -191,23 +202,25 @@ def _run(options: argparse.Namespace) -> int:
                 order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
             if script is not None:
                 order["script"] = script
-            run = server.runner("POST", "/api/runs", json=order).json()
-            print(run["id"], flush=True)
-            return 0 if options.no_wait else _watch(server, run["id"])
+            run = decoded(server.runner("POST", "/api/runs", json=order), RunShown)
+            print(run.id, flush=True)
+            return 0 if options.no_wait else _watch(server, run.id)
         except RequestRefused as error:
             return refused(error)
 
 
 def _watch(server: Server, run: str) -> int:
     """Print each change until the run has ended."""
+    from action_assistant.runner.runs.views import RunShown
+
     seen: dict[str, str] = {}
     while True:
-        now = server.runner("GET", f"/api/runs/{run}").json()
-        for name, action in now["actions"].items():
-            if seen.get(name) != action["state"]:
-                seen[name] = action["state"]
-                print(one_line(f"{name}: {action['state']}"), flush=True)
-        if now["state"] in _ENDED:
+        now = decoded(server.runner("GET", f"/api/runs/{run}"), RunShown)
+        for name, action in now.actions.items():
+            if seen.get(name) != action.state:
+                seen[name] = action.state
+                print(one_line(f"{name}: {action.state}"), flush=True)
+        if now.state in _ENDED:
             code, words = verdict(now)
             print(told(words))
             return code
@@ -229,21 +242,24 @@ def _at_rest(options: argparse.Namespace) -> int:
     with running(options) as server:
         try:
             path = f"/api/runs/{options.run}/at_rest"
-            run = server.runner("POST", path, json={"how": options.how}).json()
+            answer = server.runner("POST", path, json={"how": options.how})
         except RequestRefused as error:
             return refused(error)
-    print(one_line(f"run {run['number']} of {run['graph_name']} is over: {run['state']}"))
+    from action_assistant.runner.runs.views import RunShown
+
+    run = decoded(answer, RunShown)
+    print(one_line(f"run {run.number} of {run.graph_name} is over: {run.state}"))
     return 0
 
 
-def verdict(run: dict[str, Any]) -> tuple[int, str]:
+def verdict(run: "RunShown") -> tuple[int, str]:
     """Return the exit code for a run that is over, and its end in words. A robot reports no result,
     so a finished run counts as good unless an action failed."""
-    if run["state"] != "finished" or run["result"] is not None:
-        words = f"{run['state']} ({run['result']})" if run["result"] else str(run["state"])
-        return 0 if run["state"] == "finished" and run["result"] == "on_true" else 1, words
-    visits = [visit for each in run["actions"].values() for visit in each["visits"]]
-    if any(visit["result"] == "error" for visit in visits):
+    if run.state != "finished" or run.result is not None:
+        words = f"{run.state} ({run.result})" if run.result else run.state
+        return 0 if run.state == "finished" and run.result == "on_true" else 1, words
+    visits = [visit for each in run.actions.values() for visit in each.visits]
+    if any(visit.result == "error" for visit in visits):
         return 1, "finished, after an action had ended in error"
     return 0, "finished; nothing is known to have failed, but the robot does not tell the result"
 

@@ -7,11 +7,11 @@ import time
 from collections.abc import Callable, Collection, Iterator
 from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from msgspec.structs import replace
 
-from action_assistant.commands.client import RequestRefused, Server, add_server, running
+from action_assistant.commands.client import RequestRefused, Server, add_server, decoded, running
 from action_assistant.commands.directories import why
 from action_assistant.commands.sync.folder import Folder, SyncedFile, sha
 from action_assistant.errors import CannotStart
@@ -19,6 +19,9 @@ from action_assistant.safe_text import one_line
 from action_assistant.system.posix import fcntl
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
+
+if TYPE_CHECKING:  # slow to load, and needed only once there is a server
+    from action_assistant.editor.catalogue.catalogue import GraphView
 
 _JSON: Final = {"content-type": "application/json"}
 _CONFLICT: Final = 409
@@ -118,9 +121,9 @@ class SyncRound:
             if name not in barred and (known is None or not known.graph):
                 self._try(name, self._bring, name, graphs.keys() - here)
         here = {file.graph for file in self._folder.known.values()}
-        for graph in sorted(graphs.values(), key=lambda each: str(each["name"])):
-            if graph["id"] not in here:
-                self._try(str(graph["name"]), self._fetch_new, graph)
+        for graph in sorted(graphs.values(), key=lambda each: each.name):
+            if graph.id not in here:
+                self._try(graph.name, self._fetch_new, graph)
 
     def _try(self, name: str, step: Callable[..., None], *given: Any) -> None:
         """Synchronise one file or graph by `step`; a refusal or error is reported and does not stop
@@ -132,13 +135,15 @@ class SyncRound:
         except OSError as error:
             self._leave(f"{name}: cannot be kept in step: {why(error)}")
 
-    def _graphs(self) -> dict[str, dict[str, Any]]:
+    def _graphs(self) -> "dict[str, GraphView]":
         """Return the graphs of the server by id. Ids become parts of paths, so others than plain
         ones are dropped."""
-        found = self._server.editor("GET", "/api/graphs").json()
-        return {each["id"]: each for each in found if _ID.fullmatch(str(each["id"]))}
+        from action_assistant.editor.catalogue.catalogue import GraphView
 
-    def _one(self, name: str, file: SyncedFile, graph: dict[str, Any] | None) -> None:
+        found = decoded(self._server.editor("GET", "/api/graphs"), list[GraphView])
+        return {each.id: each for each in found if _ID.fullmatch(each.id)}
+
+    def _one(self, name: str, file: SyncedFile, graph: "GraphView | None") -> None:
         if file.conflict is not None:
             if copy := self._folder.copy_of(name, file):
                 self._leave(_conflict_words(name, copy))
@@ -154,19 +159,21 @@ class SyncRound:
                 )
         elif text is None:
             if file.sha is not None:
-                self._tell(f"{name}: was deleted here; the graph {graph['name']} stays")
+                self._tell(f"{name}: was deleted here; the graph {graph.name} stays")
                 self._folder.remember(name, replace(file, sha=None))
         elif sha(text) != file.sha:
             self._send(name, file, text)
-        elif graph["seq"] != file.seq:
+        elif graph.seq != file.seq:
             self._fetch(name, file)
 
     def _send(self, name: str, file: SyncedFile, text: bytes) -> None:
         """Merge a changed file into its graph."""
+        from action_assistant.editor.api.graphs import MergedGraph
+
         try:
             path = f"/api/graphs/{file.graph}/umrf"
             asked = {"params": {"seq": file.seq}, "content": text, "headers": _JSON}
-            merged = self._server.editor("PUT", path, **asked).json()
+            merged = decoded(self._server.editor("PUT", path, **asked), MergedGraph)
         except RequestRefused as error:
             if error.status != _CONFLICT:
                 raise
@@ -176,11 +183,11 @@ class SyncRound:
             self._folder.remember(name, held)
             self._leave(_conflict_words(name, self._folder.copy_of(name, held) or ""))
             return
-        for problem in merged["problems"]:
-            self._tell(f"{name}: {problem['message']}")
+        for problem in merged.problems:
+            self._tell(f"{name}: {problem.message}")
         self._tell(f"{name}: sent")
-        sent = SyncedFile(file.graph, merged["seq"], sha(text))
-        if merged["merged"]:
+        sent = SyncedFile(file.graph, merged.seq, sha(text))
+        if merged.merged:
             self._fetch(name, sent)
         else:
             self._folder.remember(name, sent)
@@ -209,12 +216,15 @@ class SyncRound:
                     return
         self._folder.remember(name, SyncedFile("", 0, sha(text)))
         try:
-            made = self._server.editor("POST", "/api/graphs", content=text, headers=_JSON).json()
+            answer = self._server.editor("POST", "/api/graphs", content=text, headers=_JSON)
         except RequestRefused:
             self._folder.forget(name)
             raise
-        self._tell(f"{name}: is the graph {made['name']} now")
-        self._brought(name, SyncedFile(made["id"], made["seq"], sha(text)), text)
+        from action_assistant.editor.api.graphs import MadeGraph
+
+        made = decoded(answer, MadeGraph)
+        self._tell(f"{name}: is the graph {made.name} now")
+        self._brought(name, SyncedFile(made.id, made.seq, sha(text)), text)
 
     def _brought(self, name: str, file: SyncedFile, text: bytes) -> None:
         """Record that a file has become a graph."""
@@ -228,12 +238,12 @@ class SyncRound:
         path = f"/api/graphs/{graph}/umrf"
         return self._server.editor("GET", path, params={"at": _FIRST}).content
 
-    def _fetch_new(self, graph: dict[str, Any]) -> None:
+    def _fetch_new(self, graph: "GraphView") -> None:
         """Make a file for a new graph."""
-        seq, now = self._text(graph["id"])
-        name = self._folder.free_name(graph["name"])
-        if self._folder.make(name, graph["id"], seq, now):
-            self._tell(f"{name}: is the file of the graph {graph['name']} now")
+        seq, now = self._text(graph.id)
+        name = self._folder.free_name(graph.name)
+        if self._folder.make(name, graph.id, seq, now):
+            self._tell(f"{name}: is the file of the graph {graph.name} now")
 
     def _text(self, graph: str) -> tuple[int, bytes]:
         answer = self._server.editor("GET", f"/api/graphs/{graph}/umrf")
