@@ -1073,14 +1073,31 @@ export interface RunnerApi {
         by?: string;
         /** @default  */
         text?: string;
-        /** @default {} */
-        head?: Record<string, unknown>;
+        head?: RunnerApi["ReplayHead"];
         /** @default {} */
         actions?: {
             [key: string]: RunnerApi["ActionFrame"];
         };
         /** @default [] */
         alarms?: RunnerApi["AlarmShown"][];
+    };
+    /**
+     * ReplayHead
+     * @description The fields of a run that one event changed; the others are left out.
+     */
+    ReplayHead: {
+        /** @enum {string} */
+        state?: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
+        /** @enum {string} */
+        desired?: "paused" | "running" | "stopped";
+        result?: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
+        proof_at?: string | null;
+        unknown_since?: string | null;
+        moves_again_at?: string | null;
+        started_at?: string | null;
+        ended_at?: string | null;
+        detail?: string;
+        stopped_by?: RunnerApi["Author"];
     };
     /**
      * ReplayPageStart

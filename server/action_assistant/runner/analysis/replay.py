@@ -6,7 +6,7 @@ what the live view showed then, without later knowledge.
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import Any, Final
+from typing import Any
 
 import msgspec
 
@@ -19,21 +19,9 @@ from action_assistant.runner.analysis.keyframes import (
     fold,
 )
 from action_assistant.runner.runs import views
-from action_assistant.runner.runs.events import RunEvent
-from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.events import Author, RunEvent
+from action_assistant.runner.runs.run import Desired, Result, Run, State
 from action_assistant.runner.runs.visits import ActionRun
-
-_HEAD: Final = (
-    "state",
-    "desired",
-    "result",
-    "proof_at",
-    "unknown_since",
-    "moves_again_at",
-    "started_at",
-    "ended_at",
-    "detail",
-)
 
 
 class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -47,6 +35,21 @@ class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
     aid: str | None = None
 
 
+class ReplayHead(msgspec.Struct, frozen=True, kw_only=True):
+    """The fields of a run that one event changed; the others are left out."""
+
+    state: State | msgspec.UnsetType = msgspec.UNSET
+    desired: Desired | msgspec.UnsetType = msgspec.UNSET
+    result: Result | msgspec.UnsetType | None = msgspec.UNSET
+    proof_at: datetime | msgspec.UnsetType | None = msgspec.UNSET
+    unknown_since: datetime | msgspec.UnsetType | None = msgspec.UNSET
+    moves_again_at: datetime | msgspec.UnsetType | None = msgspec.UNSET
+    started_at: datetime | msgspec.UnsetType | None = msgspec.UNSET
+    ended_at: datetime | msgspec.UnsetType | None = msgspec.UNSET
+    detail: str | msgspec.UnsetType = msgspec.UNSET
+    stopped_by: Author | msgspec.UnsetType = msgspec.UNSET
+
+
 class ReplayFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The changes by one event. `head`: the changed fields of the run; `actions`: the changed
     actions."""
@@ -56,7 +59,7 @@ class ReplayFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
     kind: str
     by: str = ""
     text: str = ""
-    head: dict[str, Any] = {}
+    head: ReplayHead | msgspec.UnsetType = msgspec.UNSET
     actions: dict[str, ActionFrame] = {}
     alarms: list[views.AlarmShown] = []
 
@@ -158,15 +161,15 @@ def frame(event: Event, decoded: RunEvent, before: Run | None, after: Run, at: i
     )
 
 
-def _head(before: Run | None, after: Run) -> dict[str, Any]:
+def _head(before: Run | None, after: Run) -> ReplayHead | msgspec.UnsetType:
     changed: dict[str, Any] = {}
-    for name in _HEAD:
+    for name in ReplayHead.__struct_fields__[:-1]:
         now = getattr(after, name)
         if before is None or getattr(before, name) != now:
             changed[name] = views.time(now) if name.endswith(("_at", "_since")) and now else now
     if after.stopped_by is not None and (before is None or before.stopped_by is None):
         changed["stopped_by"] = after.stopped_by
-    return changed
+    return ReplayHead(**changed) if changed else msgspec.UNSET
 
 
 def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
