@@ -252,7 +252,8 @@ class FakeNetwork:
                     self._later(self.chance.random() * self.old_s, lambda: _put(event, got, said))
             case FeedbackMessage(actor=actor, history=history):
                 late = self.chance.random() * self.feedback_s
-                self._shown_at = max(self._shown_at, now() + late)  # one after the other
+                # One after the other: the loop keeps no order among equal times.
+                self._shown_at = max(self._shown_at + 1e-6, now() + late)
                 if late:
                     self._at(self._shown_at, self.show, actor, history)
                 else:
