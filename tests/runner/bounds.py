@@ -1,5 +1,6 @@
 """Runs on an emulated robot, with what the code of its actions really did beside what was recorded."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import anyio
@@ -214,3 +215,19 @@ def fits(visit: Visit, real: Real) -> bool:
     if over is None:
         return visit.not_after is None
     return visit.until <= over <= (visit.not_after if visit.not_after is not None else over)
+
+
+def fit_apart(visits: Sequence[Visit], real: Sequence[Real]) -> bool:
+    """Return whether all of these visits may be executions, each another one."""
+    taken: dict[int, int] = {}
+
+    def place(visit: int, tried: set[int]) -> bool:
+        for each in range(len(real)):
+            if each not in tried and fits(visits[visit], real[each]):
+                tried.add(each)
+                if each not in taken or place(taken[each], tried):
+                    taken[each] = visit
+                    return True
+        return False
+
+    return all(place(visit, set()) for visit in range(len(visits)))

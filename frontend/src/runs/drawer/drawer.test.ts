@@ -96,6 +96,11 @@ test("values say whether they were seen or only sent, and what an action began a
   const found = valuesOf(run({ actions }), graph, grip, { Grip_0: { force: "4" } });
   expect(found?.values).toEqual([{ name: "force", text: "5", from: "ran" }]);
   expect(found?.after).toEqual([{ name: "Look_0", result: "true", at: 2_000 }]);
+  const [seen] = actions.Look_0.visits;
+  const bounded = { ...actions, Look_0: action(look, "FINISHED", [{ ...seen, not_after: null }]) };
+  expect(valuesOf(run({ actions: bounded }), graph, grip, undefined)?.after).toEqual([
+    { name: "Look_0", result: "true", at: null },
+  ]);
   const sent = valuesOf(run({ actions }), graph, look, { Look_0: { place: '"door"' } });
   expect(sent?.values).toEqual([{ name: "place", text: '"door"', from: "sent" }]);
   expect(valueText('{"pvf_type":"number","pvf_value":3}')).toBe("3");

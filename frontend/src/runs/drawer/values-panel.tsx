@@ -62,7 +62,7 @@ export function ValuesPanel({ run, graph, aid }: Props) {
           {found.after.map(({ name, result, at }, i) => (
             <span key={name}>
               {i > 0 && ", "}
-              <b>{spaced(name)}</b> {result} {stopwatch(at)}
+              <b>{spaced(name)}</b> {result} {at !== null && stopwatch(at)}
             </span>
           ))}
         </p>
@@ -82,8 +82,8 @@ interface KnownValue {
 interface BeganAfter {
   readonly name: string;
   readonly result: string;
-  /** ms after the run's start. */
-  readonly at: number;
+  /** ms from the run's start to its end; null if that end was not seen exactly. */
+  readonly at: number | null;
 }
 
 export interface ActionValues {
@@ -118,7 +118,8 @@ function beganAfter(run: Run, graph: Graph, key: Key, begun: number | null): Beg
     const end = last ? visitEnd(last) : null;
     const outcome = last?.result ? (`on_${last.result}` as const) : null;
     if (end === null || outcome === null || relation.conditions[outcome] === "ignore") return [];
-    return [{ name, result: last?.result ?? "", at: end - start }];
+    const exact = last?.not_after === last?.until;
+    return [{ name, result: last?.result ?? "", at: exact ? end - start : null }];
   });
 }
 

@@ -29,7 +29,7 @@ from action_assistant.umrf.model import Graph
 _PREFIX: Final = "about/"
 _WORDS: Final = 20_000  # characters of a run that are searched
 #: Raise it when the sum of a run changes: older sums are made again then.
-FIGURES: Final = 5
+FIGURES: Final = 6
 #: Key beside the results of an action in the table: its number of visits is a lower bound.
 AT_LEAST: Final = "at_least"
 _TOOK: Final = 100  # durations kept per action and run

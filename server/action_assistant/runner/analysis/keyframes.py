@@ -39,7 +39,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.web.workers.lanes import RunInWorker
 
 #: Raise it when `runs.fold` gives another run for the same events: older keyframes are not used then.
-FOLD: Final = 4
+FOLD: Final = 5
 #: Events between two keyframes, and in one page of a replay.
 APART: Final = 2_000
 _READ: Final = 5 * APART  # events that are read at once

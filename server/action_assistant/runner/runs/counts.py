@@ -1,9 +1,9 @@
 """Counts how often each action of a run ran, as far as that is known. Pure.
 
 An engine counts nothing: it shows states, and an action that runs again between two snapshots is
-seen once. So a number of visits is a lower bound, except where transitions were seen, or where the
-graph rules out that the action runs more than once. Arrows force some of the missed visits: an
-action that only one other one can start ran no more often than that one.
+seen once. So a number of visits is a lower bound (`ActionRun.proven`), except where transitions
+were seen, or where the graph rules out that the action runs more than once. Arrows force some of
+the missed visits: an action that only one other one can start ran no more often than that one.
 
 See docs/decisions/099-visits-that-were-missed.md.
 """
@@ -37,7 +37,11 @@ def visit_counts(run: Run) -> dict[str, VisitCount]:
         if around in exact and node in laps.once and node not in laps.barring_errors:
             exact.add(name)
     needs = () if run.reshaped else (*run.needs, *_needs_inside(inside))
-    least = _forced(seen, needs) if needs else seen
+    proven = {
+        name: number if name in exact else max(number, run.actions[name].proven)
+        for name, number in seen.items()
+    }
+    least = _forced(proven, needs) if needs else proven
     return {
         name: VisitCount(least[name], name not in exact, number) for name, number in seen.items()
     }
@@ -90,9 +94,9 @@ def _needs_inside(inside: Iterable[tuple[str, str, Laps]]) -> Iterator[tuple[str
             yield name, f"{part}/{alone[node]}", 0
 
 
-def _forced(seen: Mapping[str, int], needs: Iterable[tuple[str, str, int]]) -> dict[str, int]:
-    """Return the numbers of visits that were seen or that the arrows force."""
-    least = dict(seen)
+def _forced(proven: Mapping[str, int], needs: Iterable[tuple[str, str, int]]) -> dict[str, int]:
+    """Return the numbers of visits that are proven or that the arrows force."""
+    least = dict(proven)
     parents: dict[str, list[tuple[str, int]]] = {}
     for child, parent, besides in needs:
         parents.setdefault(child, []).append((parent, besides))

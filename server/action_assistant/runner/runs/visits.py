@@ -15,10 +15,12 @@ begin and of its end. A bound that nothing proves is not set:
   while it is paused is shown running until it is resumed.
 - ERROR is no end where a stop may have reached the action, which did not obey or threw: its code may go
   on, so that nothing bounds the end from above.
-- Feedback may be older than an answer that came before it. An action that runs at most once only goes
-  forward, so that a state which looks older is older. For any other action, feedback does not prove the
-  end of a visit that an answer has shown, and borrows no lower bound from a recent answer (`_OLD_US`).
-  Answers do both, since they are in order, and one is asked for as soon as feedback comes.
+- Answers are in order, and so is feedback, but feedback may be older than an answer that came before it.
+  An action that runs at most once only goes forward, so that a state which looks older is older. For any
+  other action, feedback proves neither the end of a visit that an answer has shown nor a visit besides
+  those, and borrows no lower bound from a recent answer (`_OLD_US`). The next answer does, which is asked
+  for as soon as feedback comes.
+- The number of visits is the smallest one that explains both orders, however they are mixed (`Changes`).
 - The engine calls an action RUNNING a moment before its code begins, and a moment after it has ended;
   `MOMENT_US` is added to what such a snapshot proves.
 
@@ -41,6 +43,8 @@ How: TypeAlias = Literal["observed", "inferred"]
 KEPT: Final = 100
 #: Messages of one action that an engine keeps.
 _RING: Final = 10
+#: States of feedback that an action keeps, so that an answer finds those that came before it was asked for.
+_FED: Final = 8
 #: Microseconds that the engine's state may be ahead of, or behind, the action's code.
 MOMENT_US: Final = 100_000
 #: Microseconds within which feedback of an action that may run again is taken to have come: twice as long as a
@@ -134,6 +138,24 @@ class RestEvidence(msgspec.Struct, frozen=True, gc=False, array_like=True):
         return next((each for each in kept if each <= moment), 0)
 
 
+class Changes(msgspec.Struct, frozen=True, gc=False, array_like=True):
+    """A state of an action that one source, answers or feedback, showed at `at` (microseconds UTC),
+    and the smallest number of changes between rest and motion that can have led to it, `least`. In
+    its n-th visit an action has made 2n - 1 changes, and 2n when that visit has ended."""
+
+    state: str = "UNINITIALIZED"
+    least: int = 0
+    at: int = 0
+
+    def to(self, state: str) -> int:
+        """Return the smallest number of changes that can have led to a later `state`."""
+        moves, moved = state in ACTIVE, self.least % 2 == 1
+        if moves is not moved:
+            return self.least + 1
+        ran = not moves and state != self.state and state in {"FINISHED", "ERROR"}
+        return self.least + 2 if ran else self.least
+
+
 class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     """The state of one action of a run. `older` counts visits that are not listed any more.
 
@@ -141,6 +163,8 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     later. `since`: answers asked for until then showed the states before the present one. `by`,
     `changed_at`: what showed the present state first ("" for a transition), and when that came.
     `held`: it may have been paused during the visit. `joined`: it runs once unless an action fails.
+    `doubted`: the present state is of feedback that may be older than the last answer; it may
+    contradict `visits` until the next one. `answers`, `feedback`: the changes that each has shown.
     """
 
     aid: str | None = None
@@ -158,6 +182,16 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     changed_at: int = 0
     held: bool = False
     rests: RestEvidence = RestEvidence()
+    doubted: bool = False
+    answers: Changes = Changes()
+    feedback: tuple[Changes, ...] = ()
+
+    @property
+    def proven(self) -> int:
+        """The smallest number of visits that explains everything that answers and feedback
+        showed."""
+        fed = self.feedback[-1].least if self.feedback else 0
+        return (max(self.answers.least, fed) + 1) // 2
 
 
 def after_transition(
@@ -215,17 +249,26 @@ def after_snapshot(
     action: ActionRun, state: str, sight: SnapshotEvidence, inputs: dict[str, str] | None = None
 ) -> ActionRun:
     """Return the action after a snapshot, which shows a state but not when that began."""
-    if state == action.state:
+    is_same = state == action.state
+    if is_same and (sight.asked is None or not awaits_answer(action)):
+        return action
+    action = _counted(action, state, sight)
+    if is_same and not action.doubted:
         return _confirmed(action, sight)
     action = _looked_at(action, sight)
     if _is_no_news(action, state, sight):
         asked = sight.asked or 0  # until then the known state was not shown
         return replace(action, since=max(action.since, asked)) if asked else action
-    if state in ACTIVE:
+    doubted = _may_be_old(action, sight)
+    if (doubted or action.doubted) and not sight.followed:
+        after = _blurred(action, state, sight)
+    elif doubted:
+        after = action
+    elif state in ACTIVE:
         after = action if is_open(action) else _opened(action, sight, inputs)
     elif is_open(action):
         after = _closed(action, state, sight)
-    elif state in {"FINISHED", "ERROR"} and _ran_meanwhile(action, sight):
+    elif state in {"FINISHED", "ERROR"} and not action.doubted:
         after = _missed(action, state, sight)
     else:
         after = action
@@ -238,12 +281,28 @@ def after_snapshot(
         changed_at=sight.at,
         held=is_open(after) and (after.held or state in {"PAUSE_REQUESTED", "PAUSED"}),
         once=action.once and not _goes_back(action, state),
+        doubted=doubted,
     )
+
+
+def _counted(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
+    """Count the changes that led to the state of a snapshot. The earlier snapshots of its source
+    come before it, and those of the other source where the times prove that."""
+    fed, answers = action.feedback, action.answers
+    if sight.asked is None:
+        last = fed[-1] if fed else Changes()
+        old = answers if answers.at <= sight.at - _OLD_US else Changes()
+        shown = Changes(state, max(last.to(state), old.to(state)), sight.at)
+        return replace(action, feedback=(*fed[1 - _FED :], shown))
+    asked = sight.asked
+    before = next((each for each in reversed(fed) if each.at <= asked), Changes())
+    least = max(answers.to(state), before.to(state))
+    return replace(action, answers=Changes(state, least, sight.at))
 
 
 def awaits_answer(action: ActionRun) -> bool:
     """Return whether an answer that repeats the state of feedback would still prove more."""
-    return not action.once and action.by == "feedback" and is_open(action)
+    return not action.once and action.by == "feedback" and (action.doubted or is_open(action))
 
 
 def is_open(action: ActionRun) -> bool:
@@ -255,7 +314,7 @@ def _looked_at(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
     """Apply the proofs of earlier answers that showed the present state."""
     if sight.looked <= action.since:
         return action
-    if not is_open(action):
+    if action.state not in ACTIVE:
         return replace(action, rests=action.rests.and_at(sight.looked), since=sight.looked)
     if not sight.once or action.held or action.state not in {"RUNNING", "STOPPING"}:
         return action
@@ -269,9 +328,18 @@ def _is_no_news(action: ActionRun, state: str, sight: SnapshotEvidence) -> bool:
         return sight.asked is None or sight.asked < action.changed_at
     if sight.asked is not None:
         overtaken = action.by == "feedback" and sight.asked < action.changed_at
-        return overtaken and not sight.once and state != action.state
+        return overtaken and not sight.once
     is_superseded = sight.followed and action.by == "get" and FAR.get(action.state, 0) > 0
     return is_superseded and not sight.once and state not in ACTIVE
+
+
+def _may_be_old(action: ActionRun, sight: SnapshotEvidence) -> bool:
+    """Return whether a snapshot is of feedback that may be older than the last answer: then no visit
+    that it shows is known to be another one than those that answers have shown."""
+    if sight.once or sight.asked is not None or not action.visits:
+        return False
+    is_recent = sight.at - action.answers.at < _OLD_US
+    return is_recent and (action.doubted or action.by == "get")
 
 
 def _goes_back(action: ActionRun, state: str) -> bool:
@@ -282,7 +350,7 @@ def _confirmed(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
     """Return an action whose visit only feedback has shown so far, after an answer shows it
     running: the visit is the one of that answer, and began after the last answer that showed
     rest."""
-    if sight.asked is None or not awaits_answer(action) or sight.asked < action.changed_at:
+    if (sight.asked or 0) < action.changed_at:
         return action
     last = action.visits[-1]
     before = min(sight.at, max(last.not_before, action.rests.newest))
@@ -299,10 +367,6 @@ def _opened(action: ActionRun, sight: SnapshotEvidence, inputs: dict[str, str] |
 
 def _closed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
     last = action.visits[-1]
-    if action.by == "get" and sight.asked is None and not sight.once:
-        # The feedback may be of this visit, or of an older one.
-        before = min(last.not_before, max(action.rests.by(sight.at - _OLD_US), sight.begun))
-        last, action = replace(last, not_before=before), replace(action, going=before)
     implied = last.result or _implied(action.state, state)
     how: How = "inferred" if implied is not None and last.result is None else last.how
     after = _not_after(state, sight)
@@ -317,15 +381,25 @@ def _closed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun
     return replace(action, visits=_and(action.visits[:-1], ended))
 
 
-def _ran_meanwhile(action: ActionRun, sight: SnapshotEvidence) -> bool:
-    """Return whether an action that goes from one state of rest to another ran in between. It may
-    not have, where feedback that was older than an answer told the first state."""
-    return sight.once or action.by != "feedback" or FAR.get(action.state, 0) == 0
+def _blurred(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
+    """Return an action of an older stream, in which no answer tells whether feedback is of the last
+    visit or of another one: the last visit gets bounds that hold for each of them."""
+    last = action.visits[-1]
+    if state in ACTIVE and sight.asked is not None:
+        last = replace(last, until=None, not_after=None, result=None)
+    elif state in {"FINISHED", "ERROR"}:
+        before, after = min(last.not_before, sight.begun), _not_after(state, sight)
+        if after is not None and last.until is not None:
+            after = None if last.not_after is None else max(after, last.not_after)
+        last = replace(last, not_before=before, until=before, not_after=after)
+    return replace(action, visits=_and(action.visits[:-1], last))
 
 
 def _missed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
     """Return the action with a visit that has ended and was never seen going on."""
     before = _not_before(action, sight)
+    if action.by == "feedback" and not sight.once:  # its state may be older than the last answer
+        before = min(before, max(action.rests.by(action.changed_at - _OLD_US), sight.begun))
     visit = Visit(
         start=sight.at,
         not_before=before,
