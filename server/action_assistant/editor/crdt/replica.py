@@ -480,7 +480,7 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @staticmethod
     async def packed_aside(kept: bytes) -> bytes:
-        """Compress a large snapshot to about a tenth: all edits wait for as long as the writer stores it. A thread
+        """Compress a large snapshot to a third or less: all edits wait for as long as the writer stores it. A thread
         does it, since compressing needs no interpreter lock."""
         return kept if len(kept) < _LARGE else await asyncio.to_thread(ReplicaState.packed, kept)
 
