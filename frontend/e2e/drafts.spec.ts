@@ -106,6 +106,22 @@ test("what is done in a draft changes nothing in its graph", async () => {
   await compared.getByRole("button", { name: "Close" }).last().click();
 });
 
+test("words typed in a dialog are there again after a reload of the page", async () => {
+  const { page } = mari;
+  const open = () => bar(page).getByRole("button", { name: "Propose…" }).press("Enter");
+  const words = page.getByRole("dialog").getByRole("textbox", { name: "What is it for?" });
+  await open();
+  await expect(words).toBeFocused();
+  await page.keyboard.type("Slips less");
+  await page.reload(); // before anything has paused
+  await expect(bar(page)).toBeVisible();
+  await expect(words).toHaveCount(0);
+  await open();
+  await expect(words).toHaveValue("Slips less");
+  await page.keyboard.press("Escape");
+  await expect(words).toHaveCount(0);
+});
+
 test("it is proposed, and the other says yes", async () => {
   await bar(mari.page).getByRole("button", { name: "Propose…" }).click();
   await mari.page.getByRole("textbox", { name: "What is it for?" }).fill("It <b>slips</b> less.");

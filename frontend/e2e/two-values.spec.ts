@@ -219,6 +219,53 @@ test("a value of others that the server had collected is read from the history",
   await mari.context.close();
 });
 
+test("a value that lost at once is in the history, with its author and what stayed", async ({
+  browser,
+}) => {
+  const ada = await product.person(browser, "Ada", { loadsAhead: true });
+  const mari = await product.person(browser, "Mari", { loadsAhead: true });
+  await clientIds(ada.page, 1_000);
+  await clientIds(mari.page, 3_000_000_000);
+  const graph = await newGraph("lost-at-once");
+  await enter(ada.page, graph);
+  await add(ada.page, "Look");
+  await saved(ada.page);
+  await enter(mari.page, graph);
+  await ada.context.setOffline(true);
+  await put(ada.page, "left of the door");
+  await expect(ada.page.getByText(/Offline with 1 change/i).first()).toBeVisible();
+  await put(mari.page, "right of the door");
+  await saved(mari.page);
+  await ada.context.setOffline(false);
+  await saved(ada.page);
+  expect((await umrf(graph)).actions[0]?.description).toBe("right of the door");
+
+  const { page } = mari;
+  await page.keyboard.press("Escape");
+  const listed = page.getByRole("radiogroup", { name: "What is listed" });
+  await listed.getByRole("radio", { name: "History" }).focus();
+  await page.keyboard.press("Space");
+  const lost = page.getByRole("region", { name: "History" }).getByRole("listitem");
+  await expect(lost.filter({ hasText: "overwritten at once" })).toContainText(
+    /Ada.*set Look description to left of the door, overwritten at once by right of the door/,
+  );
+  await page.screenshot({ path: test.info().outputPath("history.png") });
+  await card(page, "Look").click({ position: { x: 50, y: 30 } });
+  const fields = page.getByRole("list", { name: "Who set what" }).getByRole("listitem");
+  const set = fields.filter({ hasText: "description" }).getByRole("button").first();
+  await expect(set).toContainText(/right of the door.*Mari/); // it stands, and is hers
+  await set.focus();
+  await page.keyboard.press("Enter");
+  const row = page.getByRole("table", { name: "Values of description" }).getByRole("row");
+  await expect(row.filter({ hasText: "left of the door" })).toContainText(
+    /left of the door.*Ada.*overwritten at once by right of the door/,
+  );
+  await page.screenshot({ path: test.info().outputPath("values.png") });
+  expect([...ada.failures, ...mari.failures]).toEqual([]);
+  await ada.context.close();
+  await mari.context.close();
+});
+
 test("1,200 actions are deleted and brought back by keys, and the next edit is stored, also after a reload", async ({
   browser,
 }) => {
