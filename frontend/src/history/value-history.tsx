@@ -63,13 +63,13 @@ interface TableProps {
 function OverwrittenRow({ lost, color }: { lost: OverwrittenValue; color: string }) {
   return (
     <tr>
-      <td className={style.lost}>
+      <td>
         <code>{lost.text}</code>
       </td>
       <td>
         <By value={lost.value} color={color} />
       </td>
-      <td className={style.ran}>
+      <td className={style.lost}>
         overwritten at once by <code>{lost.stayed}</code>
       </td>
     </tr>
