@@ -42,11 +42,12 @@ class Interpreter(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def for_runner(environ: Mapping[str, str] = os.environ) -> Interpreter:
-    """Choose the Python interpreter that runs the runner: the one that the environment names; else
-    the running one if it finds an rclpy that fits; else the one that `make ros` made, if it is
-    up to date; else the running one, with a remark why it fits badly.
+    """Choose the Python interpreter for the runner, the first of these that there is: the program
+    that the variable `VARIABLE` names; the interpreter that runs this code, if it finds an rclpy
+    that fits; the interpreter that `make ros` made, if it is up to date. If there is none of them,
+    return the interpreter that runs this code, with a remark that says what does not fit.
 
-    Raise CannotStart if the environment names no program.
+    Raise CannotStart if `VARIABLE` names something that is not a program.
     """
     named = environ.get(VARIABLE)
     if named:

@@ -233,7 +233,11 @@ def _convert(options: argparse.Namespace) -> int:
 
 
 def _with_examples(path: Path, graph: Graph) -> Graph:
-    """Return the graph with examples as values, and print which inputs got one."""
+    """Return the graph in which each input, for which the checks offer to take its declared example
+    as value, has this value. Print the names of these inputs to stderr.
+
+    `path`: the file of the graph, printed before each name.
+    """
     offered = [problem for problem in checks.check(graph) if problem.fix == "take-example"]
     for problem in offered:
         name = problem.where.path.partition("/input_parameters/")[2].replace("/", "::")

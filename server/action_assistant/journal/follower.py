@@ -32,7 +32,7 @@ class Follower:
         self._news.set()
 
     def wake(self) -> None:
-        """Drop the queue, and tell the reader to read the log."""
+        """Empty the queue of events, and have the reader read the events from the log instead."""
         self._waiting.clear()
         self._missed = True
         self._news.set()

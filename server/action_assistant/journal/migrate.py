@@ -117,9 +117,13 @@ def _name_of(connection: Connection) -> str:
 
 
 def _is_foreign(connection: Connection, current: set[str]) -> bool:
-    """Return whether a database has tables that this program did not make.
+    """Return whether a database belongs to another program. `current`: the revisions of the schema
+    that the database has stored.
 
-    On a server, tables of other names than ours do not count.
+    That is so if the database has tables but no stored revision, a revision of another form than
+    ours, or no table `event` with our columns. In a SQLite file all tables count; on a server only
+    those that have the name of one of our tables. A SQLite file with an application id also belongs
+    to another program.
     """
     there = set(inspect(connection).get_table_names()) - {VERSIONS.name}
     if connection.dialect.name == "sqlite":

@@ -93,7 +93,8 @@ class SqliteSession:
             raise
 
     def run(self, work: Callable[[], T]) -> T:
-        """Run work that uses this session, and return its result."""
+        """Call `work`, which uses this session, and return its result. Errors of `work` are passed
+        on."""
         return work()
 
     def alive(self) -> bool:
@@ -111,7 +112,8 @@ class SqliteSession:
             self._checkpoints.committed()
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
-        """Write events; the ends of their streams follow."""
+        """Write events, each with its link of the hash chain. In the same transaction a trigger
+        writes the new heads of their streams."""
         rows = [
             (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, link)
             for e, link in events

@@ -50,12 +50,13 @@ def laps(graph: Graph, *, inside: bool = False) -> Laps:
 def _needs(
     graph: Graph, once: Collection[str], names: Mapping[str, int]
 ) -> Iterator[tuple[str, str, int]]:
-    """Yield (action, parent, count) as in `Laps.needs`: each run of the action was started by a run
-    of its parent or by the entry.
+    """Yield (action, parent, count), with full names, for each action that only this one parent
+    starts. The entry starts the action `count` times in addition, as in `Laps.needs`.
 
-    Actions of `once` are left out, and so are actions that could start without a run of the parent,
-    because the parent can be bypassed with an outcome that starts them. `names`: how many actions
-    have each full name.
+    `once`: full names of actions to leave out. `names`: how many actions have each full name; a
+    name that several actions have is left out. An action is also left out if a bypass of its parent
+    could start it: the parent then does not run, but passes on an outcome for which the action
+    runs.
     """
     called = {each.key: each.full_name for each in graph.actions if names[each.full_name] == 1}
     arriving: dict[Key, list[Relation]] = {}

@@ -90,7 +90,11 @@ def is_database(path: Path) -> bool:
 
 
 def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> None:
-    """Copy a consistent state of a SQLite file while other processes may write to it."""
+    """Copy the SQLite file `source` to `target`, as it is at one moment, even if other processes
+    write to it meanwhile. Only the owner may read the copy.
+
+    `progress` is told how many pages are copied, with the name `name` for the file.
+    """
 
     def tell(_: int, remaining: int, total: int) -> None:
         progress.tell(f"{name}: {total - remaining} of {total} pages copied")

@@ -60,10 +60,11 @@ def moment_of(path: Path) -> datetime | None:
 
 
 def superfluous(paths: Iterable[Path], keep: RetentionRule, now: datetime) -> list[Path]:
-    """Return the backups that may be deleted.
+    """Return those of `paths` that are backups and that the rule `keep` does not keep at the time
+    `now`.
 
-    The newest one always stays. Backups dated after `now` come from a wrong clock: they stay, and
-    none is deleted for them.
+    The newest backup dated before `now` always stays. Backups dated after `now` were made while a
+    clock was wrong: they stay, and they do not take the place of one that the rule keeps.
     """
     if keep.days is None:
         return []

@@ -10,7 +10,7 @@ from action_assistant.errors import CannotStart
 
 
 def add_to(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command to `runs`."""
+    """Add the command `copy` to `runs`, the commands of `action-assistant runs`."""
     copy = runs.add_parser(
         "copy",
         help="copy runs into the schema action_assistant_runs of a Postgres database, for your own "

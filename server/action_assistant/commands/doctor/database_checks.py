@@ -195,7 +195,9 @@ _NEWER: Final = (
 
 
 def graphs_are_there(place: Installation) -> Iterator[Diagnostic]:
-    """Check the editor's database, in the data folder or on a server."""
+    """Check whether the database of graphs is there and can be read: the one that `place` names, or
+    else the one that the data folder remembers. Yield what is wrong, or one result that says that
+    all is well."""
     data = place.data
     try:
         url = place.database or database_location.of(data)

@@ -27,7 +27,11 @@ async def _whole(
     services: EditorServices, graph: str, seq: int | None
 ) -> tuple[GraphAtSeq, Inside]:
     """Return a graph after its change `seq` (None: the newest), with the present state of all
-    graphs inside. Raise Conflict if there are too many."""
+    graphs inside. `graph`: its id.
+
+    Raise NotFound if there is no such graph, and Conflict if more graphs are inside of it than are
+    looked at.
+    """
     await services.catalogue.require(graph, "graph")
     sight = await services.graph_reader.moment(graph, seq)
     inside = await services.graph_checks.inside(sight)

@@ -73,7 +73,11 @@ async def _previewed(services: EditorServices, body: bytes) -> bytes:
 
 
 async def _inside_with(services: EditorServices, then: GraphAtSeq, text: bytes) -> Inside:
-    """Return the graphs inside of a graph, including those that only the edited text uses."""
+    """Return the graphs inside of the graph `then`, as they are now. `text`: UMRF text that was
+    edited from this graph; graphs that only the text uses are returned, too.
+
+    Raise BadInput, NotUmrf or TooLarge if the text cannot be read.
+    """
     _, uses = await services.workers.files(importing.names, text)
     return await services.graph_checks.inside(then, more=uses)
 

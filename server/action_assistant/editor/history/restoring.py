@@ -128,7 +128,9 @@ class _EditSession:
             self._kept |= more
 
     def targets(self) -> dict[Place, Packed]:
-        """Return the values that keys get back."""
+        """Return the old value of each key that is reverted: the one from before this person's
+        changes, or the one that another person gave it in between. None stands for a key that had
+        no value."""
         return {p: old for p, old in self._first.items() if self._goes_back(p)}
 
     def left(self) -> tuple[str, ...]:

@@ -116,8 +116,12 @@ def _actions(graph: Graph, kind: DocumentKind) -> tuple[Action, ...]:
 
 
 def _chosen(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> tuple[Action, ...]:
-    """Return the actions whose packages are named, or all actions that have a package, in the order
-    of the graph. Raise NotFound if there is no such action."""
+    """Return one action for each of `packages`, in their order; if `packages` is empty, return all
+    actions that a package can be made for, in the order of the graph.
+
+    `kind`: whether `sight` is a graph or an action of the library. Raise NotFound if one of
+    `packages` belongs to no action, or if no package can be made for any action.
+    """
     graph = _of(sight, kind)
     refused = {refusal.action for refusal in _refusals(graph, kind)}
     able = {

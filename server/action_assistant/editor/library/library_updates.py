@@ -98,7 +98,9 @@ def written(sight: GraphAtSeq) -> bytes:
 
 
 def uses(sight: GraphAtSeq, graphs: Sequence[GraphAtSeq], renames: Renames) -> bytes:
-    """Return the JSON of an `ActionUse` for each graph that uses the action."""
+    """Return a JSON list with an `ActionUse` for each of `graphs` that uses a library action.
+    `sight`: the document of the action; `renames`: parameters that the library has renamed, and
+    that an update of the uses would rename in the graphs."""
     action = _action_of(sight)
     found = (_use(action, each, renames) for each in graphs)
     return msgspec.json.encode([use for use in found if use is not None])

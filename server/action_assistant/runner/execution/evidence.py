@@ -70,8 +70,13 @@ class SubGraphs:
         ] = {}  # the newest look before those that were left out
 
     def ours(self, own: Snapshot, parts: Sequence[Snapshot]) -> list[Snapshot]:
-        """Return those of `parts` that this run has begun, outer ones first. The others count for
-        whether anything moves, but not for the run's history."""
+        """Return those of `parts` whose sub-graph this run has begun, outer ones first. `own`: the
+        snapshot of the run's graph; `parts`: the snapshots of sub-graphs in the same answer of the
+        engine.
+
+        A sub-graph that may be left over from an earlier run is not returned, so that it does not
+        get into the run's history.
+        """
         held = {own.graph: own}
         for part in sorted(parts, key=lambda each: len(each.graph)):
             whose = self._whose(part, held)

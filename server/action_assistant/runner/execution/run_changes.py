@@ -77,8 +77,12 @@ class RunChanges:
             self.tell(Ended(self._clock_us(), state, self._result(), detail))
 
     def lose(self, why: str) -> None:
-        """Note that the engine does not hold the run any more, so that it is unknown whether its
-        code has ended. A simulated run ends then."""
+        """Note that the engine does not hold the run any more. A simulated run ends as “lost”. On a
+        real robot the code of the actions may go on, so the run does not end: it is marked as lost,
+        with an alarm.
+
+        `why`: the reason, as a sentence. A second call with the same reason adds nothing.
+        """
         if self.run.simulated:
             self.end("lost", why)
         elif self.run.lost != why:

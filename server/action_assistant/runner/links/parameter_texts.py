@@ -23,8 +23,12 @@ Values = dict[str, str]
 
 
 def values_of(slots: Iterable[Slot]) -> Values:
-    """Return the values of these parameters as JSON texts by flat name; parameters without a value are left
-    out."""
+    """Return the values of parameters as JSON texts by flat name. `slots`: the parameters with
+    their values.
+
+    Parameters without a value, or with an `Opaque` one, are left out, and so are those after the
+    first `MOST`. Names and texts are cut to `LONGEST` characters.
+    """
     found: Values = {}
     for slot in slots:
         if slot.has_value() and not isinstance(slot.value, Opaque) and len(found) < MOST:

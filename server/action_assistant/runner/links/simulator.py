@@ -221,7 +221,8 @@ class SimulatorLink:
             await anyio.to_thread.run_sync(self._performer.end, abandon_on_cancel=True)
 
     def wake(self) -> None:
-        """Process what is due; called on the thread of the event loop."""
+        """Wake the task that processes what is due. Call this only on the thread of the event
+        loop."""
         self._wake.set()
 
     def _now(self) -> float:

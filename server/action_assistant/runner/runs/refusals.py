@@ -73,7 +73,9 @@ def words_of(line: str) -> str:
 
 
 def in_words(engine: str, words: str) -> str:
-    """Return the text of the alarm for a refusal, before its effect is known."""
+    """Return the text of the alarm that an engine has refused a start, while it is not known yet
+    whether some of the graph runs all the same. `engine`: its name; `words`: what it wrote as the
+    reason."""
     return f"{engine} says of this start: “{words}”"
 
 

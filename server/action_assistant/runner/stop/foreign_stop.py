@@ -96,7 +96,8 @@ class ForeignStopLoop:
         self._going: dict[tuple[str, str], _ForeignStop] = {}
 
     def trouble(self, robot: str, graph: str) -> str | None:
-        """Return why the stop of a graph is not proven yet, "" at first; None when it is not being stopped."""
+        """Return why it is not proven yet that the graph has stopped; the text is empty until a
+        reason is known. Return None if the graph is not being stopped, or no longer."""
         found = self._going.get((robot, graph))
         return None if found is None else found.why
 

@@ -101,7 +101,11 @@ class LoadingWatch:
         self._meddled = self._meddled or beside
 
     def recalls(self, umrf: str) -> None:
-        """Note that this graph was sent by an earlier process, or before the run ended once."""
+        """Note that `umrf`, the text of the graph, was sent before this watch began: by an earlier
+        process, or before the run ended and then moved again.
+
+        This changes nothing if a graph was sent since, or if somebody else may have changed it.
+        """
         if not self._sent and not self._meddled:
             self._sent.append(umrf)
             self._read.pop(self._main, None)

@@ -314,8 +314,11 @@ def _mended(graph: Graph, lacking: set[str]) -> Graph:
 
 
 def _never_stuck(mended: Graph) -> bool:
-    """Return whether the graph ends in every trial, and never while an action still runs. Both
-    orders in which concurrent actions can end are tried."""
+    """Return whether all courses of the graph were tried, and each of them ends, and none while an
+    action still runs. Each course is tried with both orders in which concurrent actions can end.
+
+    `mended`: the graph after a fix. Return False if there are too many courses to try all.
+    """
     for slower_first in (False, True):
         trials = Trials(mended, slower_first=slower_first)
         if any(trial.end.kind == "stuck" or trial.end.early for trial in trials):

@@ -82,7 +82,8 @@ class Instant:
         self.others: list[int] = []
 
     def begin(self) -> None:
-        """Start the graph, whose entry then asks its children for their responses."""
+        """Start the graph: the entry gives its children the result `on_true`. All that follows from
+        it at the same moment is done before the call returns."""
         self._inform(-1, "on_true", self._net.entry)
         self._settle()
 

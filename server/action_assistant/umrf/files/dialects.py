@@ -96,8 +96,11 @@ def _is_d2(action: dict[str, Json]) -> bool:
 
 
 def translated(file: dict[str, Json], dialect: str) -> Translation:
-    """Translate a file into D3, with notes on what was translated and the reasons for which the
-    engine refuses the original."""
+    """Translate a UMRF file of this dialect into D3, the dialect of current graphs. The result also
+    has notes on what was translated, and the problems for which the engine refuses the original.
+
+    A file that is in D3 already is returned unchanged.
+    """
     match dialect:
         case "D3-designer":
             old = _from_designer(file)

@@ -102,7 +102,8 @@ class Drawing:
         return tuple((each, _each_point(text, self._shifted_inner)) for each, text in ways)
 
     def outer_ways(self, ways: _Ways) -> _Ways:
-        """Return the waypoints of an arrow around the sub-graph at their new positions."""
+        """Return the waypoints of an arrow that lies outside of the sub-graph, moved outwards to
+        make room for the actions of the sub-graph."""
         return tuple((each, _each_point(text, self._shifted_outer)) for each, text in ways)
 
     def _shifted_inner(self, point: Json) -> Json:

@@ -75,7 +75,8 @@ def possible_files(package: str) -> frozenset[str]:
 
 
 def is_source(path: str) -> bool:
-    """Return whether the generated file is a beginning that people continue."""
+    """Return whether a generated file is source code or a test, which people edit. `path`: its
+    place in the package."""
     return path.startswith(_SOURCES)
 
 

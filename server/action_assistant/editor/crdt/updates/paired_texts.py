@@ -40,8 +40,12 @@ class PairedTexts:
         return [each for found in self._by_client.values() for each in found]
 
     def check(self, update: bytes, read: UpdateOutline, known: Mapping[int, int]) -> None:
-        """Raise Malformed for an update that would split a surrogate pair, or that has more of them
-        than can be stored. `known`: the next clock of each client in the document."""
+        """Raise Malformed for an update that would split a surrogate pair, or whose new texts with
+        surrogate pairs would need more memory, together with those of the document, than
+        `MOST_BYTES`.
+
+        `read`: the outline of the update. `known`: the next clock of each client in the document.
+        """
         if not self._by_client and not read.paired:
             return
         news = _new(read, known)

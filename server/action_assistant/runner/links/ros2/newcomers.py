@@ -36,11 +36,13 @@ class Newcomers:
         others: Callable[[], frozenset[str]],
         at: float,
     ) -> tuple[str, ...]:
-        """Return the names of the nodes among `listeners` that may be a second engine.
+        """Return the names of those nodes that may be a second engine of a path, as the class
+        describes, sorted. `listeners`: all that receive starts on this path.
 
-        `servers`: serve the path. `others`: returns the processes that serve another path, publish
-        starts or receive feedback; called only if needed. `at`: now, in seconds of a monotonic
-        clock.
+        `servers`: the engines that serve the get of this path; they are not returned. `others`:
+        returns the processes that serve another path, publish starts or receive feedback, which a
+        starting engine does not do; they are not returned either. It is called only if a listener
+        is not known yet. `at`: now, in seconds of a monotonic clock.
         """
         present = {each.gid for each in listeners}
         self._known &= present
