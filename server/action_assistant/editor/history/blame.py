@@ -111,7 +111,8 @@ def fields_of(connection: Connection, graph: str, owner: str, at: int) -> list[F
 def values_of(
     connection: Connection, graph: str, owner: str, field: str, at: int
 ) -> list[FieldValue]:
-    """Return all values of a field up to the change `at`, newest first."""
+    """Return all values of a field up to the change `at`, newest first. The value that stood last
+    comes before those that it overwrote."""
     changes: list[LoggedChange] = []
     lost: list[OverwrittenValue] = []
     for root, key in keys_of(owner, field):
@@ -119,8 +120,10 @@ def values_of(
         lost += index_queries.overwritten_of_key(connection, graph, root, key, at)
     alone = grafts_of(connection, graph).keys()
     found = _values(connection, graph, in_one_go(changes, alone)[::-1][:_MOST])
+    latest = found[0].seq if found else 0
     found += _overwritten(connection, lost)
-    return sorted(found, key=lambda each: each.seq, reverse=True)[:_MOST]
+    newest_first = sorted(found, key=lambda each: each.seq, reverse=True)
+    return sorted(newest_first, key=lambda each: each.seq != latest or each.overwritten)[:_MOST]
 
 
 def steps(
