@@ -29,8 +29,8 @@ async def _whole(
     """Return a graph after its change `seq` (None: the newest), with the present state of all
     graphs inside. `graph`: its id.
 
-    Raise NotFound if there is no such graph, and Conflict if more graphs are inside of it than are
-    looked at.
+    Raise NotFound if there is no such graph; Conflict if it has no such change, or if more graphs
+    are inside of it than are looked at; Unavailable if the log cannot be read.
     """
     await services.catalogue.require(graph, "graph")
     sight = await services.graph_reader.moment(graph, seq)

@@ -100,7 +100,8 @@ def written(sight: GraphAtSeq) -> bytes:
 def uses(sight: GraphAtSeq, graphs: Sequence[GraphAtSeq], renames: Renames) -> bytes:
     """Return a JSON list with an `ActionUse` for each of `graphs` that uses a library action.
     `sight`: the document of the action; `renames`: parameters that the library has renamed, and
-    that an update of the uses would rename in the graphs."""
+    that an update of the uses would rename in the graphs. Raise NotFound if the document has no
+    action."""
     action = _action_of(sight)
     found = (_use(action, each, renames) for each in graphs)
     return msgspec.json.encode([use for use in found if use is not None])
