@@ -60,6 +60,9 @@ export function useKnownColors(ids: readonly string[]): (id: string) => string {
   return useCallback((id: string) => colorsOf([], known)(id), [known]);
 }
 
+/** The name of a person whose name is not known. */
+export const NAMELESS = "somebody";
+
 interface Named {
   readonly id: string;
   readonly name: string;
@@ -74,9 +77,9 @@ export function currentName(
   me: Named,
   known: readonly Named[],
 ): string {
-  if (!author) return "somebody";
+  if (!author) return NAMELESS;
   const now = author.id === me.id ? me : known.find(({ id }) => id === author.id);
-  return now?.name || author.name || "somebody";
+  return now?.name || author.name || NAMELESS;
 }
 
 /** Return the present name of the author of a run. */

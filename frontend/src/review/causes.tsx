@@ -7,6 +7,7 @@ import { Link } from "wouter";
 import { authorName } from "../api/graphs";
 import { type SinceAnswer, type SinceWhen, useSince } from "../api/history";
 import { errorText } from "../api/http";
+import { NAMELESS, useCurrentName } from "../api/people";
 import { type Cause, needsExplanation, useCauses } from "../api/review";
 import type { Run } from "../api/runs";
 import { DifferenceView } from "../differences/difference-view";
@@ -30,8 +31,15 @@ interface CauseLineProps extends Pick<Props, "onShow"> {
   inside: boolean;
 }
 
+/** Return the sentence of a cause with the present `name` of a person who had none at that time. */
+export function causeSentence({ text, author }: Pick<Cause, "text" | "author">, name: string) {
+  const hasName = author && author.name === "" && name !== NAMELESS;
+  return hasName ? text.replace(/^Somebody\b/, () => isolated(name)) : text;
+}
+
 function Line({ cause, inside, onShow }: CauseLineProps) {
   const at = instant(cause.at) ?? 0;
+  const sentence = causeSentence(cause, useCurrentName(cause.author));
   const show = () => onShow(at, cause.action);
   return (
     <li>
@@ -39,7 +47,7 @@ function Line({ cause, inside, onShow }: CauseLineProps) {
         {clock(at)}
       </button>
       <span>
-        {cause.text}
+        {sentence}
         {inside && (
           <button type="button" className={style.into} onClick={show}>
             Show it inside

@@ -304,6 +304,8 @@ def test_examples_are_taken_in_once_marked_and_tell_their_cause(
             named = client.get(f"/api/runs/{each['id']}/causes").json()
             assert named[0]["text"] == each["cause"]
             assert named[0]["seq"] > 0
+            by = "Ben" if each["cause"].startswith("Ben ") else None
+            assert by == (named[0]["author"] or {}).get("name")
         wrong = client.get("/api/runs/example-wrong-parameter").json()
         assert wrong["override"]["reason"] == "The new gripper takes words, too."
         assert [each["code"] for each in wrong["despite"]] == ["parameter-type"]

@@ -283,7 +283,8 @@ export interface RunnerApi {
     /**
      * CauseShown
      * @description One cause in a sentence, with its evidence: the time, the event `seq` by which it was seen,
-     *     the action, and a quoted text.
+     *     the action, a quoted text, and the person at this runner who caused it (`author`). The sentence
+     *     begins with the name that the person had then, or with *Somebody*.
      */
     CauseShown: {
         kind: string;
@@ -294,6 +295,7 @@ export interface RunnerApi {
         action: string | null;
         aid: string | null;
         quote: string;
+        author: RunnerApi["Author"] | null;
     };
     /**
      * CheckRequest

@@ -22,9 +22,12 @@ from action_assistant.runner.analysis.causes import (
     WrongParameter,
 )
 from action_assistant.runner.analysis.levels import INTO, LevelPlace, places_of
+from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.safe_text import sentence
 
+#: The page puts the present name of a person here who had none at that time.
+NOBODY: Final = "Somebody"
 _NAMED: Final = 3  # actions in one sentence
 _TENTH_US: Final = 100_000
 _SAME_S: Final = 0.101  # bounds that are no further apart are told as one figure
@@ -77,7 +80,7 @@ def _in_words(cause: Cause, run: Run) -> str:
 
 def _stop_in_words(cause: OperatorStop, run: Run) -> str:
     who = _named(cause.by)
-    lead = f"{who} sent Stop from a program" if cause.program else f"{who} pressed Stop"
+    lead = f"{who} sent Stop from a program" if cause.by.by == "program" else f"{who} pressed Stop"
     if cause.restarted:
         return f"{lead} after the engine of {run.engine} had been restarted."
     until_then = _while_in_words(cause.ran, run, ": before that ")
@@ -127,8 +130,8 @@ def _lasted(ran: RunningAction) -> str:
     return f"≤ {most} s" if not least else f"{least}–{most} s"
 
 
-def _named(by: str) -> str:
-    return by or "Somebody"
+def _named(by: Author) -> str:
+    return by.name or NOBODY
 
 
 def _refusal_in_words(engine: str, quote: str, *, sent: bool) -> str:

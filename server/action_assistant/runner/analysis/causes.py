@@ -13,7 +13,7 @@ import msgspec
 
 from action_assistant.runner.analysis.levels import LevelPlace, places_of, within
 from action_assistant.runner.runs import refusals, stall
-from action_assistant.runner.runs.events import Overridden
+from action_assistant.runner.runs.events import Author, Overridden
 from action_assistant.runner.runs.run import Alarm, Intervention, Run, State
 from action_assistant.runner.runs.visits import ActionRun, Message, Visit
 from action_assistant.umrf.json.text import parse_small
@@ -68,12 +68,11 @@ class RunningAction(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class OperatorStop(_Evidence, frozen=True, tag="operator_stop", tag_field="kind"):
-    """A person pressed Stop. `program`: by a program. `state`: of the run then, as far as was
-    known; `ran`: the actions that ran; `begun`: any action had begun. `restarted`: the engine had
-    been restarted before."""
+    """A person pressed Stop, maybe by a program. `state`: of the run then, as far as was known;
+    `ran`: the actions that ran; `begun`: any action had begun. `restarted`: the engine had been
+    restarted before."""
 
-    by: str
-    program: bool
+    by: Author
     state: State
     ran: tuple[RunningAction, ...] = ()
     begun: bool = True
@@ -83,7 +82,7 @@ class OperatorStop(_Evidence, frozen=True, tag="operator_stop", tag_field="kind"
 class OperatorPause(_Evidence, frozen=True, tag="operator_pause", tag_field="kind"):
     """A person paused the run and nobody resumed it. `seen`: the engine showed the run paused."""
 
-    by: str
+    by: Author
     ran: tuple[RunningAction, ...] = ()
     seen: bool = False
 
@@ -91,7 +90,7 @@ class OperatorPause(_Evidence, frozen=True, tag="operator_pause", tag_field="kin
 class OperatorChange(_Evidence, frozen=True, tag="operator_change", tag_field="kind"):
     """A person gave the run another version of its graph while it was running."""
 
-    by: str
+    by: Author
 
 
 class Waiting(_Evidence, frozen=True, tag="waiting", tag_field="kind"):
@@ -214,10 +213,8 @@ def operator(run: Run) -> tuple[OperatorStop | OperatorPause | OperatorChange, .
             seen = run.graph_state == "PAUSED" or any(
                 action.state == "PAUSED" for action in run.actions.values()
             )
-            found.append(OperatorPause(at=each.at, by=each.by.name, ran=_ran(run, each), seen=seen))
-    found += [
-        OperatorChange(at=each.at, by=each.by.name) for each in asked if each.kind == "modify"
-    ]
+            found.append(OperatorPause(at=each.at, by=each.by, ran=_ran(run, each), seen=seen))
+    found += [OperatorChange(at=each.at, by=each.by) for each in asked if each.kind == "modify"]
     return tuple(found)
 
 
@@ -227,8 +224,7 @@ def _stop(run: Run, asked: Intervention) -> OperatorStop:
     return OperatorStop(
         at=asked.at,
         action=ran[0].action if ran else None,
-        by=asked.by.name,
-        program=asked.by.by == "program",
+        by=asked.by,
         state=asked.state,
         ran=ran,
         begun=any(

@@ -14,7 +14,7 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
 from action_assistant.runner.analysis.cause_texts import cause_sentence
-from action_assistant.runner.analysis.causes import causes
+from action_assistant.runner.analysis.causes import OPERATOR, causes
 from action_assistant.runner.analysis.comparison import RunComparison, SentTree, compare
 from action_assistant.runner.analysis.course_checks import CheckedCourses, check_courses
 from action_assistant.runner.analysis.keyframes import KeyframeStore
@@ -64,7 +64,8 @@ class RunMarks(msgspec.Struct, frozen=True):
 
 class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
     """One cause in a sentence, with its evidence: the time, the event `seq` by which it was seen,
-    the action, and a quoted text."""
+    the action, a quoted text, and the person at this runner who caused it (`author`). The sentence
+    begins with the name that the person had then, or with *Somebody*."""
 
     kind: str
     text: str
@@ -73,6 +74,7 @@ class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
     action: str | None
     aid: str | None
     quote: str
+    author: Author | None
 
 
 class ReviewQueries(Protocol):
@@ -207,6 +209,7 @@ class ReviewService:
                     action=each.action,
                     aid=action.aid if action is not None else None,
                     quote=each.quote,
+                    author=each.by if isinstance(each, OPERATOR) else None,
                 )
             )
         return shown
