@@ -256,7 +256,7 @@ def lively(value: Graph, *names: str) -> Graph:
 
 
 def endless(value: Graph) -> tuple[str, str]:
-    (problem,) = (each for each in found(value, "H12") if "is spontaneous" in each.message)
+    (problem,) = found(value, "H12")
     return problem.severity, problem.message
 
 
@@ -264,11 +264,6 @@ LEADS_TO_EXIT = {
     "it leads to the exit itself": graph(action("A"), exits=["A"]),
     "behind another one": graph(action("B", children=["A"]), action("A", ["B"]), entry=["B"], exits=["A"]),
     "another one stands before the exit": graph(action("A", children=["B"]), action("B", ["A"]), exits=["B"]),
-    "two others stand before the exit": graph(
-        action("A", children=["B"]), action("B", ["A"], ["C"]), action("C", ["B"]), exits=["C"]),
-    "only an end with true of the last one is taken": graph(
-        action("A", children=["B"]), action("B", ["A"], ["C"]), action("C", ["B"]),
-        exits=[{"name": "C", "conditions": ["on_true -> run", "on_false -> ignore", *SAFE]}]),
     "beside the way to the exit": graph(
         action("C", children=["A", "B"]), action("A", ["C"]), action("B", ["C"]), entry=["C"], exits=["B"]),
     "the exit waits for both": graph(action("A"), action("B"), entry=["A", "B"], exits=["A", "B"]),
@@ -283,9 +278,8 @@ def test_a_spontaneous_action_that_outlasts_the_graph_when_all_goes_well_is_an_e
     severity, message = endless(value)
     assert severity == "error"
     assert message.startswith("If all goes well, the graph is FINISHED, and A_0")
-    quick = Behaviour(after_s=0.3)
     traces = list(
-        simulate(value, max_events=400, script=Script({"B_0": (quick,), "C_0": (quick,)}))
+        simulate(value, max_events=400, script=Script({"B_0": (Behaviour(after_s=0.5),)}))
     )
     finished = next(
         n

@@ -272,22 +272,15 @@ def _endless_when_well(graph: Graph) -> set[str]:
     ended with on_true and the graph is FINISHED.
 
     An action is returned only if it continues in both simulated orders, in which the earlier or the
-    later of two concurrent actions ends first. If none does, spontaneous actions that take longer
-    than all others together are simulated: as quick ones they may stop the others at every end.
+    later of two concurrent actions ends first.
     """
-    for spontaneous_rounds in (0, len(graph.actions)):
-        found: list[set[str]] = []
-        for slower_first in (False, True):
-            net = Network(graph, slower_first=slower_first)
-            end, _ = simulated_outcome(
-                net, graph, "", "on_true", spontaneous_rounds=spontaneous_rounds
-            )
-            if end.kind == "finished":
-                found.append({net.names[place] for place in nodes_in(end.endless)})
-        certain = set.intersection(*found) if found else set()
-        if certain:
-            return certain
-    return set()
+    found: list[set[str]] = []
+    for slower_first in (False, True):
+        net = Network(graph, slower_first=slower_first)
+        end, _ = simulated_outcome(net, graph, "", "on_true")
+        if end.kind == "finished":
+            found.append({net.names[place] for place in nodes_in(end.endless)})
+    return set.intersection(*found) if found else set()
 
 
 class _EarlyExit(msgspec.Struct, frozen=True):

@@ -26,19 +26,17 @@ from action_assistant.umrf.semantics.trace import (
 
 class _Timed(Engine):
     """An engine whose actions end at the times of a network, and that bypasses an action once for
-    each result in an instant. Spontaneous actions take `spontaneous_rounds` rounds more."""
+    each result in an instant."""
 
-    def __init__(self, net: Network, script: Script, spontaneous_rounds: int) -> None:
+    def __init__(self, net: Network, script: Script) -> None:
         super().__init__(script=script, serial=False)
         self.net = net
-        self._longer_ms = spontaneous_rounds * net.round_ms
         self.circles = False
         self._bypassed: set[tuple[str, str]] = set()
         self._instant = -1.0
 
     def _takes_ms(self, node: Node) -> float:
-        longer = self._longer_ms if node.type == "spontaneous" else 0.0
-        return self.net.due(self.net.index[node.full_name], self.now) - self.now + longer
+        return self.net.due(self.net.index[node.full_name], self.now) - self.now
 
     def _stops_ms(self, node: Node) -> float:
         return self.net.stopping_ms[self.net.index[node.full_name]]
@@ -55,19 +53,18 @@ class _Timed(Engine):
 
 
 def simulated_outcome(
-    net: Network, graph: Graph, full_name: str, result: str, *, spontaneous_rounds: int = 0
+    net: Network, graph: Graph, full_name: str, result: str
 ) -> tuple[Outcome, int]:
     """Simulate a graph in which the first run of the action `full_name` ends with `result`, and
     every other run with on_true. Return how the graph ends, and the number of trace events of
     the simulation.
 
-    If `full_name` is empty, every run ends with on_true. Spontaneous actions take
-    `spontaneous_rounds` rounds longer than others.
+    If `full_name` is empty, every run ends with on_true.
     """
     calls: dict[str, tuple[Behaviour, ...]] = {}
     if full_name:
         calls[full_name] = (Behaviour(result=result), Behaviour())
-    engine = _Timed(net, Script(calls), spontaneous_rounds)
+    engine = _Timed(net, Script(calls))
     seen = _TraceReader(net)
     try:
         traces = engine.start(graph, 0.0)
