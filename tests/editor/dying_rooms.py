@@ -153,7 +153,7 @@ async def _speak(pipe: Pipe, member: Member, trap: Trap) -> None:
 def main(folder: Path) -> None:
     # From the second commit on, and as often as there are any. They are Final to all but this process,
     # which is to die in commits on the loop as often as in those of the thread.
-    commit_metrics._KNOWN, commit_metrics._SHARE = 1, 2  # type: ignore[misc]
+    commit_metrics._KNOWN, commit_metrics._SHARE = 1, float("inf")  # type: ignore[misc]
     for line, at_once in zip(sys.stdin, itertools.cycle((False, True)), strict=False):
         stream, count, point = line.rstrip("\n").split(" ", 2)
         (folder / "socket").unlink(missing_ok=True)
