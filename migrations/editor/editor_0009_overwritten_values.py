@@ -1,5 +1,5 @@
-"""Which values another one overwrote at once, and of what form an index of changes is: those from before, which
-lack these values, are derived again."""
+"""Store the values that another one overwrote at once, and the form of each index of changes. An index of an earlier
+form lacks these values and is derived again."""
 
 from collections.abc import Sequence
 

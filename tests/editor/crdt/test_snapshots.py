@@ -230,7 +230,7 @@ async def test_a_packed_snapshot_that_is_damaged_makes_no_difference(tmp_path: P
 
 
 async def test_a_large_document_travels_packed_between_processes(tmp_path: Path) -> None:
-    """Whatever the event loop pickles for a worker, and gets back, it copies."""
+    """The event loop copies all values that it pickles for a worker and gets back."""
     journal = await Journal.open(
         f"sqlite:///{tmp_path / 'editor.db'}", branch="editor", fold=nothing
     )
