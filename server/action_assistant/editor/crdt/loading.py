@@ -22,6 +22,7 @@ from action_assistant.errors import Refused, Unavailable
 from action_assistant.journal.chain import START, StoredColumns, linked
 from action_assistant.journal.events import StreamSnapshot
 from action_assistant.journal.journal import Journal
+from action_assistant.kit.packing import is_packed
 from action_assistant.schema import editor_tables
 from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker, run_here
 
@@ -347,7 +348,7 @@ async def _folded(
 
 def _is_small(document: bytes, events: EventColumns) -> bool:
     """Return whether a snapshot and events are folded within milliseconds. A packed snapshot is large."""
-    return not ReplicaState.is_packed(document) and len(document) + events.size <= _SMALL
+    return not is_packed(document) and len(document) + events.size <= _SMALL
 
 
 def _heard(folding: "asyncio.Future[Folded | None]") -> None:

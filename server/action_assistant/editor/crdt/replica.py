@@ -3,7 +3,6 @@
 import asyncio
 import logging
 import time
-import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from enum import Enum
@@ -34,6 +33,7 @@ from action_assistant.editor.crdt.updates.update_outline import PairedText, Upda
 from action_assistant.editor.crdt.updates.update_scan import outline, stored_outline
 from action_assistant.editor.log.document_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Event
+from action_assistant.kit.packing import is_packed, packed, unpacked
 
 log: Final = logging.getLogger(__name__)
 
@@ -41,9 +41,6 @@ WAITING_BYTES: Final = 4 << 20  # of one author, for something that may never co
 WAITING_UPDATES: Final = 256
 _KEPT_BYTES: Final = 256 * 1024
 _LARGE: Final = 1 << 20  # bytes, from which on it is stored packed
-_ZLIB: Final = (
-    b"\x78"  # the first byte of a packed snapshot; one that is not packed begins with an array
-)
 
 
 class UpdateEffect(Enum):
@@ -473,29 +470,23 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
     def read(cls, kept: bytes) -> "ReplicaState | None":
         """Decode a snapshot, packed or not; return None if the bytes are no snapshot."""
         try:
-            plain = zlib.decompress(kept) if cls.is_packed(kept) else kept
-            return msgspec.msgpack.decode(plain, type=cls)
-        except (zlib.error, msgspec.DecodeError, UnicodeDecodeError):
+            return msgspec.msgpack.decode(unpacked(kept), type=cls)
+        except (msgspec.DecodeError, UnicodeDecodeError):
             return None
 
     @staticmethod
-    async def packed_aside(kept: bytes) -> bytes:
-        """Compress a large snapshot to a third or less: all edits wait for as long as the writer stores it. A thread
-        does it, since compressing needs no interpreter lock."""
-        return kept if len(kept) < _LARGE else await asyncio.to_thread(ReplicaState.packed, kept)
-
-    @staticmethod
     def packed(kept: bytes) -> bytes:
-        """Compress a large snapshot as `packed_aside` does. For workers."""
-        return kept if len(kept) < _LARGE else zlib.compress(kept, 1)
+        """Compress a large snapshot, for which all edits wait while the writer stores it. For threads and
+        workers."""
+        return packed(kept, least=_LARGE)
 
     @staticmethod
-    def is_packed(kept: bytes) -> bool:
-        """Return whether these bytes are those of a packed snapshot."""
-        return kept[:1] == _ZLIB
+    async def packed_aside(kept: bytes) -> bytes:
+        """Compress a large snapshot as `packed` does, on a thread; return a small one at once."""
+        return kept if len(kept) < _LARGE else await asyncio.to_thread(ReplicaState.packed, kept)
 
     @classmethod
     async def read_aside(cls, kept: bytes) -> "ReplicaState | None":
         """Decode a snapshot as `read` does; decode a packed one on a thread, so that the event loop
         is not blocked."""
-        return await asyncio.to_thread(cls.read, kept) if cls.is_packed(kept) else cls.read(kept)
+        return await asyncio.to_thread(cls.read, kept) if is_packed(kept) else cls.read(kept)

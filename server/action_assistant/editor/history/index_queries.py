@@ -1,6 +1,5 @@
 """Queries of the index of key changes, over a connection. Their results are as large as a graph: for workers."""
 
-import zlib
 from collections.abc import Collection, Iterable, Sequence
 from typing import Any, Final
 
@@ -17,6 +16,7 @@ from action_assistant.editor.history.key_changes import (
 )
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.journal.events import Event
+from action_assistant.kit.packing import packed, unpacked
 from action_assistant.schema.editor_tables import (
     editor_event,
     key_change,
@@ -27,10 +27,9 @@ from action_assistant.schema.editor_tables import (
 _EVENTS: Final = 1000  # observed in one go
 _BYTES: Final = 4 << 20  # of them
 _OWNERS: Final = 400  # that one question names
-_LARGE: Final = 64 * 1024  # bytes of a document, from which on it is kept packed
-_ZLIB: Final = (
-    b"\x78"  # how what is packed begins; a document is an array of MessagePack, and does not
-)
+_LARGE: Final = (
+    64 * 1024
+)  # bytes of a document, from which on it is stored packed: storing it blocks the writer
 
 _c = key_change.c
 _CHANGE: Final = select(_c.seq, _c.author, _c.at, _c.root, _c.key, _c.before, _c.after)
@@ -66,7 +65,7 @@ class IndexGrowth(msgspec.Struct, frozen=True):
 def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth | None:
     """Return what the next events of a graph add to its index; None if there are no more events."""
     seq, kept = _head(connection, graph)
-    document = _unpacked(kept)
+    document = unpacked(kept)
     leftovers = any(
         connection.execute(select(literal(1)).where(c.graph == graph, c.seq > seq).limit(1)).first()
         for c in (_c, _o)
@@ -83,7 +82,7 @@ def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth |
     lost = [(graph, *each) for each in found.overwritten]
     slices, overwritten = (_slices(each, slice_rows) for each in (rows, lost))
     return IndexGrowth(
-        *(seq, found.seq, _packed(found.document), slices, overwritten),
+        *(seq, found.seq, packed(found.document, least=_LARGE), slices, overwritten),
         damaged=found.damaged,
         leftovers=leftovers,
     )
@@ -159,24 +158,6 @@ def of_key(
 def _slices(rows: Sequence[tuple[Any, ...]], most: int) -> tuple[bytes, ...]:
     parts = (rows[start : start + most] for start in range(0, len(rows), most))
     return tuple(map(msgspec.msgpack.encode, parts))
-
-
-def _packed(document: bytes) -> bytes:
-    """Return the document as the head stores it. A large one is compressed to about a tenth, since
-    storing it blocks the writer."""
-    return document if len(document) < _LARGE else zlib.compress(document, level=1)
-
-
-def _unpacked(kept: bytes) -> bytes:
-    """Decompress the document in a stored head of the change index. Older versions stored the
-    document uncompressed; such bytes are returned as they are. Damaged bytes are returned as
-    they are, too: the caller finds that they are no document, and builds the index anew."""
-    if kept[:1] != _ZLIB:
-        return kept
-    try:
-        return zlib.decompress(kept)
-    except zlib.error:
-        return kept
 
 
 def _head(connection: Connection, graph: str) -> tuple[int, bytes]:

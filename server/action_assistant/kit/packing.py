@@ -1,0 +1,32 @@
+"""Compresses large documents before they are stored or sent to another process.
+
+What is packed must not begin with the byte 0x78, as MessagePack of an array does not: then bytes that were stored
+plain are told from packed ones, and both are read.
+"""
+
+import zlib
+from typing import Final
+
+_ZLIB: Final = b"\x78"  # the first byte of everything that zlib compresses
+
+
+def packed(plain: bytes, *, least: int) -> bytes:
+    """Return the bytes compressed to a third or less, or as they are if there are fewer than `least`.
+    Compressing needs no interpreter lock, so a thread can do it."""
+    return plain if len(plain) < least else zlib.compress(plain, level=1)
+
+
+def is_packed(stored: bytes) -> bool:
+    """Return whether `packed` compressed these bytes."""
+    return stored[:1] == _ZLIB
+
+
+def unpacked(stored: bytes) -> bytes:
+    """Return what was packed. Return plain bytes and damaged ones as they are: whoever decodes damaged
+    bytes finds that they are no document."""
+    if not is_packed(stored):
+        return stored
+    try:
+        return zlib.decompress(stored)
+    except zlib.error:
+        return stored
