@@ -97,10 +97,10 @@ def test_a_link_that_breaks_while_a_graph_of_somebody_else_is_stopped_ends_nothi
             setattr(david, fault, True)
             control.stop_robot("David", BEN)
             await anyio.sleep(10)
-            assert control.robots.foreign_stops.trouble("David", "cleaning")
+            assert control.foreign_stops.trouble("David", "cleaning")
             assert control.open[run.id].run.state == "running"
             setattr(david, fault, False)
-            await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+            await until(lambda: not control.foreign_stops.is_stopping("David"))
             assert not await david.moving("cleaning")
 
     lived()

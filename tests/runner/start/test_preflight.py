@@ -97,8 +97,8 @@ async def test_a_graph_of_somebody_else_is_in_the_way_until_it_is_stopped() -> N
         assert verdicts(look)["quiet"] == "blocked"
         (same,) = await control.look(group(sequence("cleaning"), "David"))
         assert same.never
-        assert control.robots.stop_foreign_graphs(BEN, lambda _: ()) == ["David: cleaning"]
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+        assert control.foreign_stops.stop(BEN, lambda _: ()) == ["David: cleaning"]
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
         assert not await david.moving("cleaning")
         told = [event for _, event in await control.robots.robot_log.newest("David", 9)]
         assert isinstance(told[-1], StopWasProven)

@@ -20,11 +20,11 @@ async def test_no_answer_proves_that_it_stopped_where_several_engines_answer_or_
         david.servers = 2
         control.stop_robot("David", BEN)
         await until(
-            lambda: "2 engines" in (robots.foreign_stops.trouble("David", "cleaning") or "")
+            lambda: "2 engines" in (control.foreign_stops.trouble("David", "cleaning") or "")
         )
-        assert robots.foreign_stops.is_stopping("David")
+        assert control.foreign_stops.is_stopping("David")
         david.engine, david.servers = engine(NEVER), 1
-        await until(lambda: not robots.foreign_stops.is_stopping("David"))
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
         told = [event for _, event in await robots.robot_log.newest("David", 20)]
         (given_up,) = [event for event in told if isinstance(event, StopUnproven)]
         assert "restarted" in given_up.why

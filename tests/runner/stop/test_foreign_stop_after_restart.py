@@ -55,7 +55,7 @@ async def test_it_goes_on_until_it_is_proven(crash: bool) -> None:
     harness = Harness({"David": david})
     sent = await _left(harness, david, crash=crash)
     async with harness.runner() as control:
-        stops = control.robots.foreign_stops
+        stops = control.foreign_stops
         assert "started anew" in (stops.trouble("David", "cleaning") or "")
         await anyio.sleep(10)
         assert len(david.stops) == sent  # nothing has shown yet that it is the same engine
@@ -67,7 +67,7 @@ async def test_it_goes_on_until_it_is_proven(crash: bool) -> None:
         assert isinstance(asked, StopAsked)
         assert isinstance(proven, StopWasProven)
     async with harness.runner() as control:
-        assert not control.robots.foreign_stops.is_stopping("David")
+        assert not control.foreign_stops.is_stopping("David")
 
 
 @virtual
@@ -78,7 +78,7 @@ async def test_an_engine_that_was_restarted_meanwhile_is_told_nothing() -> None:
     david.engine, david.loss = engine(NEVER), 0.0
     await _cleaning(david)
     async with harness.runner() as control:
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
         assert len(david.stops) == sent
         _, given_up = await _told(control)
         assert isinstance(given_up, StopUnproven)
@@ -93,7 +93,7 @@ async def test_one_that_was_asked_for_before_lives_were_recorded_is_sent_to_nobo
     old = draft_of(StopAsked(at=0, graph="cleaning", author=BEN), BEN.id)
     await harness.journal.append(stream_of_robot("David"), [old])
     async with harness.runner() as control:
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
         assert david.stops == []
         _, given_up = await _told(control)
         assert isinstance(given_up, StopUnproven)
@@ -107,9 +107,9 @@ async def test_after_a_minute_without_an_answer_it_is_given_up() -> None:
     sent = await _left(harness, david)
     async with harness.runner() as control:
         await anyio.sleep(55)
-        assert control.robots.foreign_stops.is_stopping("David")
+        assert control.foreign_stops.is_stopping("David")
         await anyio.sleep(10)
-        assert not control.robots.foreign_stops.is_stopping("David")
+        assert not control.foreign_stops.is_stopping("David")
         assert len(david.stops) == sent
         assert isinstance((await _told(control))[-1], StopUnproven)
 
@@ -126,8 +126,8 @@ async def test_without_a_link_it_is_given_up_and_says_so() -> None:
     async with ExecutionService.opened(
         harness.journal, Robots(reach="rclpy is not here."), clock_us=clock_us
     ) as control:
-        assert control.robots.foreign_stops.graphs() == {"David": ["cleaning"]}
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"), patience=70)
+        assert control.foreign_stops.graphs() == {"David": ["cleaning"]}
+        await until(lambda: not control.foreign_stops.is_stopping("David"), patience=70)
         given_up = (await _told(control))[-1]
         assert isinstance(given_up, StopUnproven)
         assert given_up.why == "there is no link to this robot"
@@ -161,12 +161,12 @@ async def test_a_log_that_cannot_be_read_holds_up_no_stop(caplog: pytest.LogCapt
     async with harness.runner() as control:
         assert eve.stops[sent][0] - began < 0.1
         assert control.open[run].run.desired == "stopped"
-        assert not control.robots.foreign_stops.is_stopping("David")
-        assert control.robots.foreign_stops.trouble("Farah", "cleaning")
+        assert not control.foreign_stops.is_stopping("David")
+        assert control.foreign_stops.trouble("Farah", "cleaning")
         assert "on David cannot be read" in caplog.text
         eve.loss = farah.loss = 0.0
         await until(lambda: not control.open)
-        await until(lambda: not control.robots.foreign_stops.is_stopping("Farah"))
+        await until(lambda: not control.foreign_stops.is_stopping("Farah"))
 
 
 @virtual
@@ -181,9 +181,9 @@ async def test_it_is_kept_although_the_runner_ends_at_once() -> None:
         control.stop_robot("David", BEN)
         await anyio.sleep(0.1)
     async with harness.runner() as control:
-        assert control.robots.foreign_stops.is_stopping("David")
+        assert control.foreign_stops.is_stopping("David")
         david.loss = 0.0
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
         assert not await david.moving("cleaning")
 
 

@@ -180,8 +180,8 @@ async def test_the_stop_of_a_graph_of_others_follows_the_same_rule() -> None:
     async with here.played() as control:
         text = codec.write(PATROL)
         here.network.carry(Start(graph_name="patrol", targets=("David",), graph_json=text), "cli")
-        await until(lambda: control.robots.stop_foreign_graphs(BEN, lambda _: ()) != [])
-        stops = control.robots.foreign_stops
+        await until(lambda: control.foreign_stops.stop(BEN, lambda _: ()) != [])
+        stops = control.foreign_stops
         await anyio.sleep(3)
         assert stops.trouble("David", "patrol") == NAME
         await until(lambda: here.nodes["David"].robot.moving == ("patrol",))

@@ -39,7 +39,7 @@ async def test_a_graph_with_the_mark_of_a_run_on_another_robot_is_stopped_too() 
         (look,) = await control.look(group(sequence(), "Eve"))
         assert {each.code: each.verdict for each in look.items}["quiet"] == "blocked"
         assert control.stop_robot("Eve", BEN) == ([], ["Eve: cleaning"])
-        await until(lambda: not control.robots.foreign_stops.is_stopping("Eve"))
+        await until(lambda: not control.foreign_stops.is_stopping("Eve"))
         assert not await eve.moving("cleaning")
         assert control.open[run.id].run.desired == "running"
 
@@ -82,7 +82,7 @@ async def test_a_graph_that_somebody_started_a_moment_ago_is_stopped(after_s: fl
         await anyio.sleep(after_s)
         control.stop_all(BEN)
         await until(lambda: scene.nodes["David"].robot.moving == (), patience=5)
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
 
 
 @virtual
@@ -107,7 +107,7 @@ async def test_a_stop_of_it_that_is_pressed_again_goes_on_for_another_minute() -
         control.stop_robot("David", BEN)
         await anyio.sleep(20)
         david.loss = 0.0
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
         assert not await david.moving("cleaning")
 
 
@@ -179,7 +179,7 @@ async def test_a_robot_is_neither_changed_nor_forgotten_while_something_is_stopp
         with pytest.raises(Conflict, match="being stopped"):
             await control.remove("David", BEN)
         david.loss = 0.0
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
         await control.remove("David", BEN)
 
 
@@ -207,7 +207,7 @@ async def test_a_stop_that_is_pressed_while_its_robot_is_registered_anew_goes_th
         control.stop_robot("David", BEN)
         await until(lambda: control.robots.robot("David").domain == 3)
         david.loss = 0.0
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"), patience=10)
+        await until(lambda: not control.foreign_stops.is_stopping("David"), patience=10)
         assert not await david.moving("cleaning")
 
 
@@ -219,7 +219,7 @@ async def test_a_stop_that_is_pressed_while_its_robot_is_removed_ends_and_says_s
         await anyio.sleep(0.5)
         control.stop_robot("David", BEN)
         await until(lambda: not control.robots.names)
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"), patience=10)
+        await until(lambda: not control.foreign_stops.is_stopping("David"), patience=10)
         await until(lambda: not control.robots.robot_log.waiting)
         told = [event for _, event in await control.robots.robot_log.newest("David", 20)]
         (given_up,) = [event for event in told if isinstance(event, StopUnproven)]

@@ -29,7 +29,7 @@ async def test_graphs_of_others_and_robots_of_which_nothing_is_known_are_named()
         await _cleaning(david)
         told = control.stop_all(BEN)
         assert told == StoppedAll([run], {"David": ["cleaning"]}, {"Eve": _SILENT})
-        await until(lambda: not control.robots.foreign_stops.is_stopping("David"))
+        await until(lambda: not control.foreign_stops.is_stopping("David"))
         assert not await david.moving("cleaning")
         assert control.stop_all(BEN).graphs == {}
 

@@ -277,10 +277,10 @@ async def begun_anew_after(wait_s: float) -> bool:
         theirs = Start(graph_name="patrol", targets=("David",), graph_json=codec.write(PATROL))
         scene.network.carry(theirs, "terminal")
         await until(lambda: "patrol" in robot.moving)
-        await until(lambda: control.robots.stop_foreign_graphs(BEN, lambda _: ()) != [])
+        await until(lambda: control.foreign_stops.stop(BEN, lambda _: ()) != [])
         scene.network.old_s = 0.5
         again = now() + wait_s
-        while control.robots.foreign_stops.is_stopping("David"):
+        while control.foreign_stops.is_stopping("David"):
             if now() >= again:
                 scene.network.carry(theirs, "terminal")
                 again = float("inf")

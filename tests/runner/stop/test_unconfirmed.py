@@ -171,7 +171,7 @@ async def test_what_a_stranger_s_graph_left_blocks_a_start_until_somebody_answer
         await anyio.sleep(2)
         control.stop_robot("David", BEN)
         await anyio.sleep(70)
-        assert not control.robots.foreign_stops.is_stopping("David")  # given up, without a proof
+        assert not control.foreign_stops.is_stopping("David")  # given up, without a proof
         with pytest.raises(Conflict, match="other on David did not obey"):
             await control.start(asked(), ANN)
         over = Override(codes=("rest",), reason="I stand beside it.")

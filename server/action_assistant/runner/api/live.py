@@ -144,7 +144,7 @@ class Hub:
     def engines(self) -> str:
         """Return all engines as a message; it is encoded once per change."""
         if self._engines is None:
-            message = EnginesMessage(list(self.control.robots.all()))
+            message = EnginesMessage(self.control.robot_views())
             self._engines = msgspec.json.encode(message).decode()
         return self._engines
 
@@ -185,7 +185,7 @@ class Hub:
         for opened in tuple(self.control.open.values()):
             await self.prepare_view(opened)
         runs = [self.run_view(opened) for opened in self.control.open.values()]
-        return msgspec.json.encode(Hello(list(self.control.robots.all()), runs)).decode()
+        return msgspec.json.encode(Hello(self.control.robot_views(), runs)).decode()
 
     async def prepare_view(self, opened: OpenRun) -> None:
         """Fill the cache of a run's view, so that encoding it takes little time."""

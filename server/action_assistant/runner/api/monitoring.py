@@ -119,7 +119,7 @@ class RunMetrics(Collector):
             for run in open_runs
             if run.lost or any(alarm.code == _UNCONFIRMED for alarm in run.alarms)
         )
-        for robot, why in self._control.robots.foreign_stops.pending():
+        for robot, why in self._control.foreign_stops.pending():
             found[robot] += bool(why)
         return found
 
@@ -127,7 +127,7 @@ class RunMetrics(Collector):
         open_runs = (each.run for each in self._control.open.values() if each.run.end is None)
         engines = [SIMULATOR, *self._control.robots.names]
         stopping = Counter(run.engine for run in open_runs if run.desired == "stopped")
-        stopping.update(robot for robot, _ in self._control.robots.foreign_stops.pending())
+        stopping.update(robot for robot, _ in self._control.foreign_stops.pending())
         unconfirmed = self.unconfirmed
         yield Family(
             "stops_pending",

@@ -12,7 +12,7 @@ from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder, BehaviourList
-from action_assistant.runner.links.port import SIMULATOR, Candidate, Registration, Sighting
+from action_assistant.runner.links.port import Candidate, Registration, Sighting
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.robots.robot_events import (
@@ -154,7 +154,7 @@ def routes(services: RobotServices) -> list[ControllerRouterHandler]:
 def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
     @get("/api/robots", summary="Engines that runs can go to", operation_id="listRobots")
     async def robots() -> list[Robot]:
-        return list(services.control.robots.all())
+        return services.control.robot_views()
 
     @get(
         "/api/reach",
@@ -162,8 +162,10 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
         operation_id="getReach",
     )
     async def reach() -> ReachStatus:
-        robots = services.control.robots
-        return ReachStatus(list(robots.all()), robots.no_reach, await _behaviours(services))
+        control = services.control
+        return ReachStatus(
+            control.robot_views(), control.robots.no_reach, await _behaviours(services)
+        )
 
     @get(
         "/api/candidates",
@@ -222,9 +224,7 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
 def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     @get("/api/robots/{name:str}", summary="One engine", operation_id="getRobot")
     async def robot(name: str) -> Robot:
-        if name == SIMULATOR:
-            return next(services.control.robots.all())
-        return services.control.robots.robot(name)
+        return services.control.robot_view(name)
 
     @get(
         "/api/robots/{name:str}/known",

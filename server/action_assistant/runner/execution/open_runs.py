@@ -6,24 +6,26 @@ from typing import Final
 import anyio
 
 from action_assistant.kit.clock import ClockUs
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.logs.context import begin
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.links.port import Link, Order
+from action_assistant.runner.links.port import ForeignCommand, Link, Order
 from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import MovesAgain
 from action_assistant.runner.runs.history import RunHistory, RunnerJournal
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.start.preflight import Settled
-from action_assistant.runner.stop.late_activity import LateActivity
 from action_assistant.runner.stop.loading import LoadingTimes
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
 
+_CLOSED: Final = 200  # newest runs that are over and kept in memory
+
 
 class OpenRuns:
     """Opens runs and drives each in a task until it is over and stored. `by_id`: the runs that are
-    still driven; `late_activity` reopens a run that was over and moves again."""
+    still driven; `closed`: the newest ones that were driven to their end, each with the seq of its
+    last event."""
 
     def __init__(
         self,
@@ -37,9 +39,7 @@ class OpenRuns:
     ) -> None:
         self.by_id: Final[dict[str, OpenRun]] = {}
         self.last_number = 0
-        self.late_activity: Final = LateActivity(
-            self.by_id, history, robots, tasks, clock_us=clock_us, reopen=self._reopen
-        )
+        self.closed: Final[LruCache[str, tuple[Run, int]]] = LruCache(_CLOSED)
         self._journal = journal
         self._robots = robots
         self._history = history
@@ -49,7 +49,6 @@ class OpenRuns:
         self._loading_times = LoadingTimes()
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
-        self._settled: dict[str, Settled] = {}
 
     def next_number(self) -> int:
         """Return the number for a new run. Each number is given once."""
@@ -88,11 +87,11 @@ class OpenRuns:
         begin({"run": opened.run.id})
         await opened.drive(order, incarnation)
         self.by_id.pop(opened.run.id, None)
-        self.late_activity.ended(opened.run, opened.recorder.seq)
+        self.closed.put(opened.run.id, (opened.run, opened.recorder.seq))
         self._news.set()
         self._news = anyio.Event()
 
-    def _reopen(self, run: Run, seq: int, event: MovesAgain) -> None:
+    def reopen(self, run: Run, seq: int, event: MovesAgain) -> None:
         """Open a run that was over and stored, since it moves again."""
         opened = self.open(run, self._robots.link(run.engine), owns_link=False, seq=seq)
         opened.tell(event)
@@ -112,15 +111,20 @@ class OpenRuns:
     def _changed(self, opened: OpenRun) -> None:
         self._news.set()
         self._news = anyio.Event()
-        run = opened.run
-        if run.end is not None and run.at_rest is not None and not run.simulated:
-            life = run.incarnation or ""
-            self._settled[run.id] = Settled(run.engine, run.id, life, opened.failed)
         engine = self._robots.link(opened.run.engine)
         if engine is not None and opened.run.end is not None:
             engine.look_closely()
         for watcher in self._watchers:
             watcher(opened)
+
+    def hear_of(self, robot: str, command: ForeignCommand) -> Run | None:
+        """Pass a command that somebody else has sent to a robot on to the runs there. Return the run
+        that it concerns, if any: one of its graph before others."""
+        opened = self.on(robot).values()
+        for each in opened:
+            each.hear_of(command)
+        runs = (each.run for each in opened)
+        return min(runs, key=lambda run: run.graph_name != command.graph, default=None)
 
     # --- queries ------------------------------------------------------------------------------
 
@@ -145,11 +149,3 @@ class OpenRuns:
         return min(
             runs, key=lambda run: (bool(run.loading), run.graph_name != graph_name), default=None
         )
-
-    def settled_on(self, engine: str) -> tuple[Settled, ...]:
-        """Return the runs on an engine that ended since this process began because they were at
-        rest, by a person's word or the end of their code. Runs whose start message somebody else
-        has sent again are left out."""
-        found = (each for each in self._settled.values() if each.engine == engine)
-        is_of_others = self.late_activity.is_of_others
-        return tuple(each for each in found if not is_of_others(engine, each.run))

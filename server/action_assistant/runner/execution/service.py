@@ -14,6 +14,7 @@ from sqlalchemy import Row
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution import interventions
+from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.start_pipeline import (
@@ -23,7 +24,8 @@ from action_assistant.runner.execution.start_pipeline import (
     StartPipeline,
     StartSources,
 )
-from action_assistant.runner.links.port import ForeignCommand, Registration
+from action_assistant.runner.links.observations import Snapshot
+from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registration import Robot, registration_of
@@ -72,6 +74,9 @@ class ExecutionService:
         self._tasks, self._run_in_worker = tasks, run_in_worker
         self._robot_watchers: list[Callable[[], None]] = []
         self._stops = StopOrder()
+        self.foreign_stops: Final = ForeignStopLoop(
+            robots, tasks, clock_us, run_in_worker, self._robots_changed
+        )
         self._runs = OpenRuns(
             journal,
             robots,
@@ -81,9 +86,12 @@ class ExecutionService:
             run_in_worker=run_in_worker,
         )
         self.open: Final = self._runs.by_id
+        self._late_activity = LateActivity(self._runs, self.history, robots, tasks, clock_us)
         self._starts = StartPipeline(
             self._runs,
+            self._late_activity,
             robots,
+            self.foreign_stops,
             journal,
             approvals=self.approvals,
             stops=self._stops,
@@ -177,14 +185,14 @@ class ExecutionService:
         graphs are being stopped. The call never waits."""
         self._stops.note("", author, stop_id)
         runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
-        self.robots.stop_foreign_graphs(author, self._runs.on)
-        return StoppedAll(runs, self.robots.foreign_stops.graphs(), self.robots.unheard())
+        self.foreign_stops.stop(author, self._runs.on)
+        return StoppedAll(runs, self.foreign_stops.graphs(), self.robots.unheard())
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
         """Begin to stop all runs on a robot and all graphs that others have started there. Return
         the ids of the runs and the names of the graphs. Raise NotFound if the robot is not
         registered."""
-        graphs = self.robots.stop_foreign_graphs(author, self._runs.on, name)
+        graphs = self.foreign_stops.stop(author, self._runs.on, name)
         self._stops.note(name, author)
         return [run for run in self._runs.on(name) if self._stop(run, author, "")], graphs
 
@@ -266,6 +274,16 @@ class ExecutionService:
             raise NotFound("There is no such run.")
         return rows[0]
 
+    def robot_views(self) -> list[Robot]:
+        """Return all engines as people see them, the simulator first."""
+        return list(self.robots.all(self.foreign_stops.trouble))
+
+    def robot_view(self, name: str) -> Robot:
+        """Return one engine as people see it. Raise NotFound if there is none of this name."""
+        if name == SIMULATOR:
+            return next(self.robots.all())
+        return self.robots.robot(name, self.foreign_stops.trouble)
+
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Register a robot, or change its registration. Raise BadInput if the registration is not
         valid, Conflict if the robot is in use or has the simulator's name, Unavailable if the
@@ -288,20 +306,21 @@ class ExecutionService:
                 f"Run {run.number} goes on {robot}; stop it first. Its Stop would get lost.",
                 where={"path": "/name", "run": run.id},
             )
-        if self.robots.foreign_stops.is_stopping(robot):
+        if self.foreign_stops.is_stopping(robot):
             raise Conflict(
                 f"Something is being stopped on {robot}; wait until it is.", where={"path": "/name"}
             )
 
-    def _foreign(self, engine: KnownEngine, command: ForeignCommand) -> Commanded:
-        """Pass a command that somebody else sent to a robot on to the runs on that robot. Return
-        the event that records the command, with the run that it concerns."""
-        self._runs.late_activity.sent_by_others(command)
-        runs = [each.run for each in self._runs.on(engine.registration.name).values()]
-        for each in runs:
-            self.open[each.id].hear_of(command)
-        run = min(runs, key=lambda each: each.graph_name != command.graph, default=None)
-        return Commanded(
+    # --- what robots report -------------------------------------------------------------------
+
+    def _hear_of(self, engine: KnownEngine, command: ForeignCommand) -> None:
+        """Process a command that somebody else has sent to a robot: runs and Stops there take note
+        of it, and it is recorded with the run that it concerns."""
+        robot = engine.registration.name
+        self.foreign_stops.hear_of(robot, command)
+        self._late_activity.sent_by_others(command)
+        run = self._runs.hear_of(robot, command)
+        event = Commanded(
             at=command.at,
             command=command.command,
             graph=command.graph,
@@ -311,6 +330,12 @@ class ExecutionService:
             run=None if run is None else run.id,
             number=None if run is None else run.number,
         )
+        self.robots.robot_log.note(robot, event, command.sender)
+
+    def _show(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
+        """Process the graphs that an engine shows, in an answer or by feedback."""
+        self.foreign_stops.shows(engine, snapshots)
+        self._late_activity.shows(engine, snapshots)
 
     # --- after a restart ----------------------------------------------------------------------
 
@@ -324,11 +349,10 @@ class ExecutionService:
             self._clock_us,
             self._run_in_worker,
             self._robots_changed,
-            self._foreign,
-            self._runs.late_activity.shows,
-            ForeignStopLoop,
+            self._hear_of,
+            self._show,
         )
-        self._tasks.start_soon(self._runs.late_activity.run)
+        self._tasks.start_soon(self._late_activity.run)
         self.robots.open(context)
         for row in await self._journal.query(queries.all_robots()):
             self.robots.add(registration_of(row))
@@ -338,7 +362,7 @@ class ExecutionService:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)
                 continue
             self._adopt(run, seq, is_whole=is_whole)
-        await self.robots.take_up_stops()
+        await self.foreign_stops.take_up()
 
     def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
         """Follow a run that an earlier process left open; nothing of the run is started. `seq` is

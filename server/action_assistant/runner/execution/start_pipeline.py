@@ -29,6 +29,7 @@ from action_assistant.kit.clock import ClockUs
 from action_assistant.random_ids import random_id
 from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.analysis.course_checks import CheckedCourses
+from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import (
@@ -56,6 +57,7 @@ from action_assistant.runner.start.admission import (
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
+from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
@@ -122,7 +124,9 @@ class StartPipeline:
     def __init__(
         self,
         runs: OpenRuns,
+        late_activity: LateActivity,
         robots: Robots,
+        foreign_stops: ForeignStopLoop,
         journal: RunnerJournal,
         *,
         approvals: Approvals,
@@ -134,7 +138,9 @@ class StartPipeline:
         sources: StartSources,
     ) -> None:
         self._runs = runs
+        self._late_activity = late_activity
         self._robots = robots
+        self._foreign_stops = foreign_stops
         self._approvals = approvals
         self._stops = stops
         self._clock_us = clock_us
@@ -289,7 +295,7 @@ class StartPipeline:
         await self._approvals.require(robot.registration, ready.tree_digest, starter)
         overridden = request.override.codes if request.override else ()
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
-        if self._robots.foreign_stops.is_stopping(request.engine):
+        if self._foreign_stops.is_stopping(request.engine):
             raise Conflict(
                 f"Something is being stopped on {request.engine}; a start would be stopped with it.",
                 where={"path": "/engine", "item": "quiet"},
@@ -317,7 +323,7 @@ class StartPipeline:
             index=await robot.index(self._run_in_worker),
             took_ms=took_ms,
             open_runs=open_runs,
-            settled=self._runs.settled_on(name),
+            settled=self._late_activity.settled_on(name),
             index_folder=self._sources.index_folders.get(name),
         )
 

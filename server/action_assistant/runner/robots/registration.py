@@ -23,6 +23,9 @@ _NAME: Final = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 _SERVICE: Final = re.compile(r"(?!.*__)/?[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 
 RobotState: TypeAlias = EngineState | Literal["no_link"]
+#: Returns why it is not proven yet that a graph has stopped, given its robot and name: "" until a
+#: reason is known, None if it is not being stopped.
+StopTrouble: TypeAlias = Callable[[str, str], str | None]
 
 
 class RobotRegistered(msgspec.Struct, frozen=True, kw_only=True):
@@ -118,11 +121,12 @@ def check_registration(registration: Registration) -> None:
         raise BadInput(wrong.message, where={"path": f"/profile{wrong.path}"}) from wrong
 
 
-def with_engine(
-    plain: Robot, engine: KnownEngine, stopping: Callable[[str, str], str | None]
-) -> Robot:
-    """Return a robot with what is known of its engine. `stopping(robot, graph)` returns why a Stop
-    of that graph is not proven, None if no Stop of it is wanted."""
+def no_stops(_robot: str, _graph: str) -> None:
+    """Return None: no graph is being stopped."""
+
+
+def with_engine(plain: Robot, engine: KnownEngine, stopping: StopTrouble) -> Robot:
+    """Return a robot with what is known of its engine."""
     answer, standing = engine.answer, engine.standing
     known = replace(
         plain,

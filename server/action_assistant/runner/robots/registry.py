@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from typing import Final, Protocol, TypeAlias
+from typing import Final
 
 import anyio
 import msgspec
@@ -21,23 +21,21 @@ from action_assistant.runner.links.port import (
     Registration,
     Sighting,
 )
-from action_assistant.runner.robots.engine import EngineIndex, KnownEngine, foreign_graphs
+from action_assistant.runner.robots.engine import EngineIndex, KnownEngine
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registration import (
     STREAM,
     Robot,
     RobotRegistered,
     RobotRemoved,
+    StopTrouble,
     check_registration,
+    no_stops,
     with_engine,
 )
 from action_assistant.runner.robots.robot_events import (
-    Commanded,
     EngineBecame,
-    RobotEvent,
     RobotLog,
-    StopAsked,
-    left_unproven,
 )
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.history import RunnerJournal
@@ -50,67 +48,20 @@ log: Final = logging.getLogger(__name__)
 _NO_LINK: Final = "This runner cannot start or stop anything on it."
 _NOT_YET: Final = "It has not answered yet."
 _ANSWERS: Final = frozenset({"answering", "restarted"})
-_TOLD: Final = 500  # newest entries of a flight record
-
-
-class ForeignStops(Protocol):
-    """The part of `ForeignStopLoop` that the registry uses: it stops graphs that others have
-    started."""
-
-    def trouble(self, robot: str, graph: str) -> str | None:
-        """Return why a Stop of this graph is not proven yet; "" as long as no reason is known, None
-        when no Stop of the graph is wanted."""
-        ...
-
-    def is_stopping(self, robot: str) -> bool:
-        """Return whether any graph on this robot is being stopped."""
-        ...
-
-    def graphs(self) -> dict[str, list[str]]:
-        """Return the graphs that are being stopped, by robot."""
-        ...
-
-    def pending(self) -> Iterator[tuple[str, str]]:
-        """Yield, for each graph that is being stopped, its robot and the reason why the Stop is not
-        proven yet."""
-        ...
-
-    def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
-        """Begin to stop a graph. The call never waits."""
-        ...
-
-    def take_up(self, robot: str, asked: StopAsked) -> None:
-        """Continue a Stop that an earlier process has left without a proof. The call never waits."""
-        ...
-
-    def hear_of(self, robot: str, command: ForeignCommand) -> None:
-        """Note a command of somebody else that may have started the graph again."""
-        ...
-
-    def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Note the graphs that an engine shows in an answer or by feedback. The call never waits."""
-        ...
-
-
-Note: TypeAlias = Callable[[str, RobotEvent, str], None]
-Present: TypeAlias = Callable[[str], KnownEngine | None]
 
 
 class RegistryContext(msgspec.Struct, frozen=True):
-    """The services that the registry uses. `foreign`: called with each command of somebody else,
-    returns its event; `shows`: called with all graphs that an engine shows; `stops`: makes the
-    object that stops foreign graphs."""
+    """The services that the registry uses, and the subscribers of what robots report. `changed` is
+    called when the page has to show something else; `commanded` with each command that somebody
+    else has sent to a robot; `shows` with all graphs that an engine shows."""
 
     journal: RunnerJournal
     tasks: BackgroundTasks
     clock_us: ClockUs
     run_in_worker: RunInWorker
     changed: Callable[[], None]
-    foreign: Callable[[KnownEngine, ForeignCommand], Commanded]
+    commanded: Callable[[KnownEngine, ForeignCommand], None]
     shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
-    stops: Callable[
-        [BackgroundTasks, ClockUs, RunInWorker, Note, Callable[[], None], Present], ForeignStops
-    ]
 
 
 class Robots:
@@ -134,36 +85,15 @@ class Robots:
         self._scopes: dict[str, anyio.CancelScope] = {}
         self._context: RegistryContext | None = None
         self._robot_log: RobotLog | None = None
-        self._foreign_stops: ForeignStops | None = None
 
     def open(self, context: RegistryContext) -> None:
         """Start to watch the robots of `links`, and from now on every robot that is added."""
         self._context = context
         self._robot_log = RobotLog(context.journal, context.tasks)
-        self._foreign_stops = context.stops(
-            context.tasks,
-            context.clock_us,
-            context.run_in_worker,
-            self._robot_log.note,
-            lambda: context.changed(),
-            self.present,
-        )
         if self.recordings is not None:
             context.tasks.start_soon(self.recordings.run)
         for name in self._given:
             self.add(Registration(name=name))
-
-    async def take_up_stops(self) -> None:
-        """Continue the Stops of foreign graphs that an earlier process left without a proof. The
-        call waits for no engine. A robot whose log cannot be read is skipped."""
-        for name in self.names:
-            try:
-                stored = await self.robot_log.newest(name, _TOLD)
-            except Exception:  # the Stops on other robots must go on
-                log.exception("whether something was being stopped on %s cannot be read", name)
-                continue
-            for asked in left_unproven(event for _, event in stored):
-                self.foreign_stops.take_up(name, asked)
 
     # --- the registry -------------------------------------------------------------------------
 
@@ -211,8 +141,8 @@ class Robots:
             clock_us=context.clock_us,
             changed=context.changed,
             became=self._note_state,
-            foreign=self._note_command,
-            shows=self._show,
+            foreign=self._pass_on,
+            shows=context.shows,
             recordings=self.recordings,
             indexes=name in self._indexing,
         )
@@ -249,43 +179,19 @@ class Robots:
             raise RuntimeError("the registry is not open")
         return self._context
 
-    @property
-    def foreign_stops(self) -> ForeignStops:
-        """The Stops of graphs that others run on robots."""
-        if self._foreign_stops is None:
-            raise RuntimeError("the registry is not open")
-        return self._foreign_stops
-
-    def stop_foreign_graphs(
-        self, author: Author, own_runs: Callable[[str], Collection[str]], name: str | None = None
-    ) -> list[str]:
-        """Begin to stop all graphs that others have started, on the robot `name` or on all robots,
-        and return each as "robot: graph". `own_runs(robot)` returns the ids of this runner's
-        open runs on a robot. The call never waits. Raise NotFound if the robot is not
-        registered."""
-        if name is not None:
-            self.registration(name)
-        stopped: list[str] = []
-        for robot, engine in self._engines.items():
-            if name in {None, robot}:
-                answer = engine.answer
-                for graph in [] if answer is None else foreign_graphs(answer, own_runs(robot)):
-                    self.foreign_stops.stop(engine, graph, author)
-                    stopped.append(f"{robot}: {graph}")
-        return stopped
-
     # --- what there is ------------------------------------------------------------------------
 
-    def all(self) -> Iterator[Robot]:
-        """Yield every engine, the simulator first."""
+    def all(self, stopping: StopTrouble = no_stops) -> Iterator[Robot]:
+        """Yield every engine, the simulator first. `stopping`: as for `robot`."""
         yield Robot(
             name=SIMULATOR, simulated=True, state="answering", generation="current", pauses=True
         )
         for name in sorted(self._registered):
-            yield self.robot(name)
+            yield self.robot(name, stopping)
 
-    def robot(self, name: str) -> Robot:
-        """Return one robot as people see it. Raise NotFound if the robot is not registered."""
+    def robot(self, name: str, stopping: StopTrouble = no_stops) -> Robot:
+        """Return one robot as people see it. `stopping` tells which of its graphs are being stopped.
+        Raise NotFound if the robot is not registered."""
         known = self.registration(name)
         engine = self._engines.get(name)
         plain = Robot(
@@ -300,7 +206,7 @@ class Robots:
         )
         if engine is None:
             return plain
-        return with_engine(plain, engine, self.foreign_stops.trouble)
+        return with_engine(plain, engine, stopping)
 
     def unheard(self) -> dict[str, str]:
         """Return the robots whose running graphs are unknown now: name → reason."""
@@ -354,6 +260,14 @@ class Robots:
         is not registered."""
         self.registration(name)
         return self._engines.get(name)
+
+    def engines(self, name: str | None = None) -> list[KnownEngine]:
+        """Return all linked engines, or that of the robot `name` if it has one. Raise NotFound if
+        that robot is not registered."""
+        if name is None:
+            return list(self._engines.values())
+        engine = self.present(name)
+        return [] if engine is None else [engine]
 
     def link(self, name: str) -> KnownEngine | None:
         """Return the engine of a robot; None if there is no link to it or the robot is not
@@ -420,16 +334,10 @@ class Robots:
         became = EngineBecame(at=at, state=engine.state, why=engine.why, incarnation=incarnation)
         self.robot_log.note(name, became, name)
 
-    def _show(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        self.foreign_stops.shows(engine, snapshots)
-        self._open_context().shows(engine, snapshots)
-
-    def _note_command(self, engine: KnownEngine, command: ForeignCommand) -> None:
-        name = engine.registration.name
-        if not command.targets or name in command.targets:
-            self.foreign_stops.hear_of(name, command)
-            event = self._open_context().foreign(engine, command)
-            self.robot_log.note(name, event, command.sender)
+    def _pass_on(self, engine: KnownEngine, command: ForeignCommand) -> None:
+        """Pass a command of somebody else on, if it is for this robot."""
+        if not command.targets or engine.registration.name in command.targets:
+            self._open_context().commanded(engine, command)
 
     @property
     def robot_log(self) -> RobotLog:

@@ -6,8 +6,8 @@ name. What an earlier process left is gone on with once the engine has shown tha
 """
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
-from typing import Final, TypeAlias
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import Final
 
 import anyio
 import msgspec
@@ -16,12 +16,14 @@ from action_assistant.errors import NotFound, Refused
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
-from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import (
     RobotEvent,
     StopAsked,
     StopUnproven,
     StopWasProven,
+    left_unproven,
 )
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
@@ -37,14 +39,13 @@ _SLOWEST_S: Final = 1.0
 _GET_S: Final = 1.0
 _PATIENCE_S: Final = 60.0
 _LOUD_S: Final = 2.0
+_TOLD: Final = 500  # newest entries of a robot's log
 
 _TAKEN_UP: Final = "the runner was started anew, and it is not proven yet"
 _RESTARTED: Final = "the engine was restarted: look at the robot"
 _UNKNOWN_LIFE: Final = "nobody knows whether this is the engine that ran it: look at the robot"
 _NO_LINK: Final = "there is no link to this robot"
 _REMOVED: Final = "the robot was taken out of the registry meanwhile: look at it"
-
-Present: TypeAlias = Callable[[str], KnownEngine | None]
 
 
 class StoppedAll(msgspec.Struct, frozen=True):
@@ -74,25 +75,22 @@ class _ForeignStop:
 
 
 class ForeignStopLoop:
-    """Carries out all Stops of graphs that others have started. `note` records an event; `changed`
-    is called when the page has to show something else; `present` returns the present engine of a
-    robot, None without a link, and raises NotFound for an unregistered robot."""
+    """Carries out all Stops of graphs that others have started on `robots`. `changed` is called when
+    the page has to show something else."""
 
     def __init__(
         self,
+        robots: Robots,
         tasks: BackgroundTasks,
         clock_us: ClockUs,
         run_in_worker: RunInWorker,
-        note: Callable[[str, RobotEvent, str], None],
         changed: Callable[[], None],
-        present: Present,
     ) -> None:
+        self._robots = robots
         self._tasks = tasks
         self._clock_us = clock_us
         self._run_in_worker = run_in_worker
-        self._note = note
         self._changed = changed
-        self._present = present
         self._going: dict[tuple[str, str], _ForeignStop] = {}
 
     def trouble(self, robot: str, graph: str) -> str | None:
@@ -116,8 +114,21 @@ class ForeignStopLoop:
         """Return, for each graph that is being stopped, its robot and why the stop is not proven yet."""
         return ((each.robot, each.why) for each in self._going.values())
 
-    def stop(self, engine: KnownEngine, graph: str, author: Author) -> None:
-        """Begin to stop a graph, and return at once."""
+    def stop(
+        self, author: Author, own_runs: Callable[[str], Collection[str]], robot: str | None = None
+    ) -> list[str]:
+        """Begin to stop all graphs that others have started, on one robot or on all robots, and
+        return each as "robot: graph". `own_runs(robot)` returns the ids of this runner's open runs
+        on a robot. The call never waits. Raise NotFound if the robot is not registered."""
+        stopped: list[str] = []
+        for engine in self._robots.engines(robot):
+            name, answer = engine.registration.name, engine.answer
+            for graph in [] if answer is None else foreign_graphs(answer, own_runs(name)):
+                self._stop_graph(engine, graph, author)
+                stopped.append(f"{name}: {graph}")
+        return stopped
+
+    def _stop_graph(self, engine: KnownEngine, graph: str, author: Author) -> None:
         robot = engine.registration.name
         known = self._going.get((robot, graph))
         if known is not None:
@@ -125,13 +136,21 @@ class ForeignStopLoop:
             return
         life = engine.answer.incarnation if engine.answer is not None else ""
         asked = StopAsked(at=self._clock_us(), graph=graph, author=author, life=life)
-        self._note(robot, asked, author.id)
+        self._robots.robot_log.note(robot, asked, author.id)
         self._begin(_ForeignStop(robot, graph, life, ""), engine)
 
-    def take_up(self, robot: str, asked: StopAsked) -> None:
-        """Continue a Stop that an earlier process has left unproven, and return at once."""
-        if (robot, asked.graph) not in self._going:
-            self._begin(_ForeignStop(robot, asked.graph, asked.life, _TAKEN_UP), None)
+    async def take_up(self) -> None:
+        """Continue the Stops that an earlier process has left unproven. The call waits for no
+        engine. A robot whose log cannot be read is skipped."""
+        for robot in self._robots.names:
+            try:
+                stored = await self._robots.robot_log.newest(robot, _TOLD)
+            except Exception:  # the Stops on other robots must go on
+                log.exception("whether something was being stopped on %s cannot be read", robot)
+                continue
+            for asked in left_unproven(event for _, event in stored):
+                if (robot, asked.graph) not in self._going:
+                    self._begin(_ForeignStop(robot, asked.graph, asked.life, _TAKEN_UP), None)
 
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
         """Process a command of somebody else that may just have started the graph: an answer
@@ -163,9 +182,9 @@ class ForeignStopLoop:
                     told = await self._until_proven(it, engine)
                 except NotFound:
                     told = self._unproven(it, _REMOVED)
-                self._note(it.robot, told, "")
-                return
-            self._note(it.robot, self._unproven(it, it.why or "no proof has come"), "")
+            if it.patience.cancelled_caught:
+                told = self._unproven(it, it.why or "no proof has come")
+            self._robots.robot_log.note(it.robot, told, "")
         finally:
             self._going.pop((it.robot, it.graph), None)
             self._changed()
@@ -176,7 +195,7 @@ class ForeignStopLoop:
         the runner it has to show that first."""
         began, gap = anyio.current_time(), _GAP_S
         while True:
-            engine = self._present(it.robot)
+            engine = self._robots.present(it.robot)
             if engine is None:
                 told: RobotEvent | str = _NO_LINK
             elif engine is known:

@@ -5,23 +5,27 @@ that turns out to be wrong is taken back.
 """
 
 import logging
-from collections import OrderedDict, deque
-from collections.abc import Callable, Mapping
-from typing import Final, Protocol, TypeAlias, TypeVar
+from collections import deque
+from typing import Final
 
 import anyio
 import msgspec
 
 from action_assistant.errors import NotFound, Refused
 from action_assistant.kit.clock import ClockUs
+from action_assistant.kit.lru_cache import LruCache
+from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.engine_text import run_in
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.port import ForeignCommand, NoAnswer
 from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.robot_events import Commanded, RobotLog
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs.events import MovesAgain
 from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.start.preflight import Settled
 from action_assistant.web.auth.caller import BackgroundTasks
 
 log: Final = logging.getLogger(__name__)
@@ -32,73 +36,56 @@ _AGAIN_S: Final = 0.5
 _KEPT: Final = 200
 _TOLD: Final = 500  # newest entries of a robot's log
 
-K = TypeVar("K")
-T = TypeVar("T")
-Reopen: TypeAlias = Callable[[Run, int, MovesAgain], None]
-
-
-class Reopenable(Protocol):
-    """A run that is open, or is just being left."""
-
-    run: Run
-
-    def moves_again(self, event: MovesAgain) -> bool:
-        """Open the run again. Return False when its end is stored and nobody drives it any more."""
-        ...
-
-
-class RobotRecords(Protocol):
-    """Gives the records of the commands that others have sent to robots."""
-
-    @property
-    def robot_log(self) -> RobotLog:
-        """The log of what happened to robots."""
-        ...
-
 
 class LateActivity:
-    """Watches for runs that are over and that an engine shows moving. `open_`: the runs that are
-    not over; `reopen` is called with a stored run, the seq of its last event, and the event that
-    opens it again."""
+    """Watches for runs that are over and that an engine shows moving, and opens them again. It also
+    knows which runs ended without a proof of their engine."""
 
     def __init__(
         self,
-        open_: Mapping[str, Reopenable],
+        runs: OpenRuns,
         history: RunHistory,
-        robots: RobotRecords,
+        robots: Robots,
         tasks: BackgroundTasks,
-        *,
         clock_us: ClockUs,
-        reopen: Reopen,
     ) -> None:
-        self._open = open_
+        self._runs = runs
         self._history = history
         self._robots = robots
         self._tasks = tasks
         self._clock_us = clock_us
-        self._reopen = reopen
         self._looking: set[tuple[str, str]] = set()  # robots and runs
         self._waiting: deque[tuple[KnownEngine, Snapshot, str]] = deque()
         self._news = anyio.Event()
-        self._ended: OrderedDict[str, tuple[Run, int]] = OrderedDict()
-        self._others: OrderedDict[str, None] = OrderedDict()
+        self._settled: dict[str, Settled] = {}
+        self._others: LruCache[str, bool] = LruCache(_KEPT)
         #: Runs that a robot shows and that are not its own: one engine may be registered under two names.
-        self._elsewhere: OrderedDict[tuple[str, str], None] = OrderedDict()
+        self._elsewhere: LruCache[tuple[str, str], bool] = LruCache(_KEPT)
+        runs.watch(self._changed)
 
-    def ended(self, run: Run, seq: int) -> None:
-        """Remember a stored run that is over, so that its end is known without a query."""
-        _put(self._ended, run.id, (run, seq))
+    def _changed(self, opened: OpenRun) -> None:
+        run = opened.run
+        if run.end is not None and run.at_rest is not None and not run.simulated:
+            life = run.incarnation or ""
+            self._settled[run.id] = Settled(run.engine, run.id, life, opened.failed)
+
+    def settled_on(self, engine: str) -> tuple[Settled, ...]:
+        """Return the runs on an engine that ended since this process began because they were at
+        rest, by a person's word or the end of their code. Runs whose start message somebody else
+        has sent again are left out."""
+        found = (each for each in self._settled.values() if each.engine == engine)
+        return tuple(each for each in found if not self._is_of_others(engine, each.run))
 
     def sent_by_others(self, command: ForeignCommand) -> None:
         """Note that somebody else has published a start message of this runner again; its graph
         then belongs to them."""
         run = run_in(command.umrf) if command.umrf else None
         if run is not None:
-            _put(self._others, run, None)
+            self._others.put(run, True)
 
-    def is_of_others(self, robot: str, run: str) -> bool:
+    def _is_of_others(self, robot: str, run: str) -> bool:
         """Return whether somebody else has started the graph that a robot shows under this run's id."""
-        return run in self._others or (robot, run) in self._elsewhere
+        return bool(self._others.get(run) or self._elsewhere.get((robot, run)))
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
         """Process graphs that an engine shows, in an answer or by feedback. Return at once and
@@ -121,9 +108,9 @@ class LateActivity:
                 self._tasks.start_soon(self._look_into, *self._waiting.popleft())
 
     def _is_over(self, robot: str, run: str) -> bool:
-        if self.is_of_others(robot, run):
+        if self._is_of_others(robot, run):
             return False
-        opened = self._open.get(run)
+        opened = self._runs.by_id.get(run)
         return opened is None or opened.run.end is not None
 
     async def _look_into(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
@@ -140,28 +127,25 @@ class LateActivity:
             self._looking.discard((robot, run))
 
     async def _take_back(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
-        opened, robot = self._open.get(run), engine.registration.name
+        opened, robot = self._runs.by_id.get(run), engine.registration.name
         if opened is not None and opened.run.engine != robot:
-            _put(self._elsewhere, (robot, run), None)
+            self._elsewhere.put((robot, run), True)
             return
         if opened is not None and opened.moves_again(self._told(opened.run, shown)):
             return
-        while run in self._open:  # noqa: ASYNC110 - it is just being left
+        while run in self._runs.by_id:  # noqa: ASYNC110 - it is just being left
             await anyio.sleep(0.01)
         found = await self._known(run, robot)
         if found is None or not _is_of(found[0], engine):
-            _put(self._elsewhere, (robot, run), None)
+            self._elsewhere.put((robot, run), True)
         elif found[0].end is not None:  # else it is being adopted after a restart
-            self._reopen(*found, self._told(found[0], shown))
+            self._runs.reopen(*found, self._told(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
         """Return a run that is not open, and its last seq. Return None when there is no such run, or when an
         earlier process has recorded that somebody else published its start again."""
-        ended = self._ended.get(run)
-        if ended is not None:
-            if ended[0].engine == robot:
-                del self._ended[run]
-            return ended
+        if (closed := self._runs.closed.get(run)) is not None:
+            return closed
         while True:
             try:
                 told = await self._robots.robot_log.newest(robot, _TOLD)
@@ -208,9 +192,3 @@ def _is_of(run: Run, engine: KnownEngine) -> bool:
     """Return whether a run was sent to the present life of this engine."""
     lives = {run.incarnation, engine.standing.incarnation} - {None, ""}
     return run.engine == engine.registration.name and len(lives) <= 1
-
-
-def _put(kept: OrderedDict[K, T], key: K, value: T) -> None:
-    kept[key] = value
-    while len(kept) > _KEPT:
-        kept.popitem(last=False)
