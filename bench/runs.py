@@ -27,7 +27,7 @@ from action_assistant.runner.archives import archive_file
 from action_assistant.runner.links.observations import NodeResult, NodeState
 from action_assistant.runner.review.background_loops import due_after
 from action_assistant.runner.review.listing import numbers_with
-from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import queries, views
@@ -232,11 +232,11 @@ async def _after_a_death(journal: Journal, events: list[Any]) -> str:
     for i in range(0, upto, APART):
         await journal.append(stream, drafts[i : i + APART])
     if upto:
-        await KeyframeStore(journal, _ASIDE).keyframes(run)
+        await KeyframeStore(journal).keyframes(run)
     for i in range(upto, len(drafts), APART):
         await journal.append(stream, drafts[i : i + APART])
     started = time.perf_counter()
-    key = (await KeyframeStore(journal, _ASIDE).keyframes(run)).keys[-1]
+    key = (await KeyframeStore(journal).keyframes(run)).keys[-1]
     msgspec.json.encode(views.whole_view(key.run, Sent("{}", {})))
     return seconds(time.perf_counter() - started)
 
@@ -250,13 +250,13 @@ async def _opening(journal: Journal, asked: WorkerQueries, run: str, size: int) 
         msgspec.json.encode(views.whole_view(key.run, Sent("{}", {})))
 
     with contextlib.suppress(NotFound):
-        await asked.text(ReviewService.whole, "none")  # the worker is there
+        await asked.text(StoredRuns.whole, "none")  # the worker is there
     started = time.perf_counter()
-    await asked.text(ReviewService.whole, run)
+    await asked.text(StoredRuns.whole, run)
     first = seconds(time.perf_counter() - started)
     while await journal.snapshot(stream_of(run)) is None:  # noqa: ASYNC110 in another process
         await anyio.sleep(0.01)
-    known = KeyframeStore(journal, _ASIDE)
+    known = KeyframeStore(journal)
     middle = size // 2 - size // 2 % APART
 
     async def page(after: int) -> None:
@@ -264,7 +264,7 @@ async def _opening(journal: Journal, asked: WorkerQueries, run: str, size: int) 
 
     return [
         first,
-        await _took(lambda: opened(KeyframeStore(journal, _ASIDE))),  # as another process would
+        await _took(lambda: opened(KeyframeStore(journal))),  # as another process would
         await _took(lambda: page(0)),
         await _took(lambda: page(middle)),
         await _took(lambda: known.at(run, size // 3 + 1)),

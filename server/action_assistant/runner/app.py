@@ -35,6 +35,7 @@ from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.review.background_loops import index_words
 from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
@@ -79,7 +80,10 @@ async def open_services(
             services.connection_limits = ConnectionLimits(limits=settings.limits, keeps_one=True)
             services.journal = journal
             services.review_service = ReviewService(
-                control, archive_store, on_disk, utc_us, services.worker_queries
+                archive_store, utc_us, services.worker_queries, control.next_number
+            )
+            control.watch(
+                lambda opened: services.review_service.run_changed(opened.run, opened.recorder)
             )
             services.retention = Retention(
                 journal,
@@ -125,14 +129,14 @@ async def _executing(
                 simulator=Simulators(),
                 sources=StartSources(
                     services.behaviours,
-                    lambda *args: for_people.value(ReviewService.checked_courses, *args),
+                    lambda *args: for_people.value(StoredRuns.checked_courses, *args),
                     services.index_folders,
                 ),
                 # A run that moves again is read with all its visits, and waits behind no question.
                 past=lambda run, is_whole: (own if is_whole else for_people).past(run, is_whole),
             ) as control,
         ):
-            for_people.opened = own.opened = control.open
+            for_people.recorder_of = own.recorder_of = control.recorder_of
             services.worker_queries, services.control = for_people, control
             services.hub = Hub(control, utc_us)
             services.index_writer = IndexWriter(

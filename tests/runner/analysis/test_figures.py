@@ -22,7 +22,8 @@ from action_assistant.runner.analysis import (
     statistics,
 )
 from action_assistant.runner.archives.archive_store import ArchiveStore
-from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.background_loops import SumUpLoop
+from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.durations import DurationBounds, at_rank, duration_bounds
 from action_assistant.runner.runs.recorder import stream_of
@@ -233,10 +234,11 @@ def test_runs_that_an_older_version_has_summed_up_are_summed_up_again(tmp_path: 
         before = await journal.query(statistics.sums_of([told.run.id]))
         assert [row.took for row in before if row.took] == [[[0, None]]]  # at least: it is no value
         async with told.place.harness.runner() as control, anyio.create_task_group() as tasks:
-            review_service = ReviewService(
-                control, ArchiveStore(journal, tmp_path, at_once), at_once, clock_us
-            )
-            tasks.start_soon(review_service.run)
+            archive_store = ArchiveStore(journal, tmp_path, at_once)
+            summed = StoredRuns(archive_store).summed
+            sums = SumUpLoop(archive_store, clock_us, summed)
+            control.watch(lambda opened: sums.run_changed(opened.run, opened.recorder))
+            tasks.start_soon(sums.run)
             await anyio.sleep(5)
             tasks.cancel_scope.cancel()
         assert len(journal.streams[stream]) == 2  # once, and no more

@@ -22,7 +22,7 @@ from action_assistant.runner.runs.events import (
     encode,
 )
 from action_assistant.runner.runs.fold import replay
-from runner.harness import MemoryJournal, at_once, virtual
+from runner.harness import MemoryJournal, virtual
 from runner.runs.test_runs import STARTED
 from support.doses import examples
 
@@ -101,7 +101,7 @@ def test_replay_at_any_event_equals_the_fold_of_the_events_up_to_it(drawn: Any) 
     events = told(drawn)
 
     async def main() -> None:
-        keyframe_store = KeyframeStore(await stored(events), at_once)
+        keyframe_store = KeyframeStore(await stored(events))
         keyframes = await run_replay(keyframe_store, "r1", after=0)
         assert [frame.seq for frame in keyframes.frames] == list(range(1, len(events) + 1))
         for upto in range(1, len(events) + 1):
@@ -131,7 +131,7 @@ def long_run(events: int) -> list[RunEvent]:
 @virtual
 async def test_the_pages_of_a_long_film_join_without_a_gap() -> None:
     events = long_run(2 * APART + 10)
-    keyframe_store = KeyframeStore(await stored(events), at_once)
+    keyframe_store = KeyframeStore(await stored(events))
     first = await run_replay(keyframe_store, "r1", after=0)
     second = await run_replay(keyframe_store, "r1", after=APART + 5)
     third = await run_replay(keyframe_store, "r1", after=2 * APART)
@@ -148,23 +148,23 @@ async def test_the_pages_of_a_long_film_join_without_a_gap() -> None:
 async def test_keyframes_are_a_cache_that_may_vanish_or_be_of_another_fold() -> None:
     events = long_run(APART + 700)
     journal = await stored(events)
-    whole = await KeyframeStore(journal, at_once).keyframes("r1")
+    whole = await KeyframeStore(journal).keyframes("r1")
     assert whole.keys[-1].run == replay(events)
     assert journal.snapshots
-    again = await KeyframeStore(journal, at_once).keyframes("r1")  # from the cache
+    again = await KeyframeStore(journal).keyframes("r1")  # from the cache
     assert again == whole
     other = msgspec.structs.replace(whole, fold=-1)
     await journal.keep_snapshot("run/r1", whole.keys[-1].seq, msgspec.msgpack.encode(other))
-    assert await KeyframeStore(journal, at_once).keyframes("r1") == whole
+    assert await KeyframeStore(journal).keyframes("r1") == whole
     await journal.keep_snapshot("run/r1", whole.keys[-1].seq, b"nonsense")
-    assert await KeyframeStore(journal, at_once).keyframes("r1") == whole
+    assert await KeyframeStore(journal).keyframes("r1") == whole
 
 
 @virtual
 async def test_keyframes_of_an_open_run_are_stored_at_each_multiple_and_continued() -> None:
     events = long_run(3 * APART)
     journal = await stored(events[: APART - 1])
-    followed = KeyframeStore(journal, at_once)
+    followed = KeyframeStore(journal)
     await followed.keyframes("r1")
     assert not journal.snapshots  # nothing worth it yet
     for upto, kept in ((APART + 5, APART + 5), (2 * APART - 1, APART + 5), (2 * APART, 2 * APART)):
@@ -173,8 +173,8 @@ async def test_keyframes_of_an_open_run_are_stored_at_each_multiple_and_continue
         await journal.append("run/r1", rest)
         await followed.keyframes("r1")
         assert journal.snapshots["run/r1"].seq == kept
-        again = await KeyframeStore(journal, at_once).keyframes("r1")  # by who begins there
-        whole = KeyframeStore(await stored(events[:upto]), at_once)
+        again = await KeyframeStore(journal).keyframes("r1")  # by who begins there
+        whole = KeyframeStore(await stored(events[:upto]))
         assert again == await whole.keyframes("r1")
 
 
@@ -182,7 +182,7 @@ async def test_keyframes_of_an_open_run_are_stored_at_each_multiple_and_continue
 async def test_keyframes_stand_at_whole_multiples_however_many_events_are_read_at_once() -> None:
     events = long_run(6 * APART)
     journal = await stored(events[:700])
-    keyframe_store = KeyframeStore(journal, at_once)
+    keyframe_store = KeyframeStore(journal)
     await keyframe_store.keyframes("r1")
     rest = [Draft(each.kind, "x", encode(each)) for each in events[700:]]
     await journal.append("run/r1", rest)
@@ -196,7 +196,7 @@ async def test_keyframes_stand_at_whole_multiples_however_many_events_are_read_a
 async def test_keyframes_that_were_made_early_go_on_with_the_run() -> None:
     events = long_run(APART + 50)
     journal = await stored(events[: APART // 2])
-    keyframe_store = KeyframeStore(journal, at_once)
+    keyframe_store = KeyframeStore(journal)
     early = await keyframe_store.keyframes("r1")
     assert early.keys[-1].seq == APART // 2
     rest = [Draft(each.kind, "x", encode(each)) for each in events[APART // 2 :]]

@@ -55,7 +55,7 @@ async def test_an_archived_run_looks_as_it_did(data: Path) -> None:
     journal = await opened(data)
     before = await everything(journal, data)
     shelved = archive_store(journal, data)
-    film_before = await run_replay(KeyframeStore(shelved, asyncio.to_thread), "r2", after=2_000)
+    film_before = await run_replay(KeyframeStore(shelved), "r2", after=2_000)
     rows = await journal.query(select(run.c.id, run.c.summary, run.c.state, run.c.result))
     swept = await retention(journal, data).sweep(30, None)
     assert (swept.runs, swept.more, swept.problems) == (3, False, [])
@@ -63,10 +63,7 @@ async def test_an_archived_run_looks_as_it_did(data: Path) -> None:
     assert [await shelved.read(stream_of(each)) for each in LENGTHS] == list(before.values())
     assert await shelved.read("run/r2", after=10, limit=3) == before["r2"][10:13]
     assert await shelved.read("run/r2", after=10, upto=11) == before["r2"][10:11]
-    assert (
-        await run_replay(KeyframeStore(shelved, asyncio.to_thread), "r2", after=2_000)
-        == film_before
-    )
+    assert await run_replay(KeyframeStore(shelved), "r2", after=2_000) == film_before
     assert (await retention(journal, data).sweep(30, None)).runs == 0
     for _ in range(2):
         again = select(run.c.id, run.c.summary, run.c.state, run.c.result).order_by(run.c.number)

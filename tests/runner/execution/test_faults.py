@@ -12,7 +12,8 @@ from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.execution.monitor import Monitor
 from action_assistant.runner.links.port import Answer, NotSent, Order
-from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.background_loops import SumUpLoop
+from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.settings import Keep
 from runner.harness import (
@@ -215,8 +216,8 @@ async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_no
     harness = Harness()
     async with harness.runner() as control, anyio.create_task_group() as tasks:
         archive_store = ArchiveStore(harness.journal, Path("nowhere"), at_once)  # type: ignore[arg-type]
-        review_service = ReviewService(control, archive_store, at_once, clock_us)
-        keyframes, failed = review_service.keyframe_store.keyframes, []
+        stored_runs = StoredRuns(archive_store)
+        keyframes, failed = stored_runs.keyframe_store.keyframes, []
 
         async def fails_once(run: str) -> Any:
             if not failed:
@@ -224,8 +225,10 @@ async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_no
                 raise ZeroDivisionError
             return await keyframes(run)
 
-        review_service.keyframe_store.keyframes = fails_once  # type: ignore[method-assign]
-        tasks.start_soon(review_service.run)
+        stored_runs.keyframe_store.keyframes = fails_once  # type: ignore[method-assign]
+        sums = SumUpLoop(archive_store, clock_us, stored_runs.summed)
+        control.watch(lambda opened: sums.run_changed(opened.run, opened.recorder))
+        tasks.start_soon(sums.run)
         for _ in range(2):
             run = (await control.start(order(sequence(actions=1)), ANN)).run
             await until(lambda run=run: run.id not in control.open)

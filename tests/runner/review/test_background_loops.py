@@ -49,7 +49,9 @@ async def test_keyframes_are_made_at_multiples_and_not_after_the_end() -> None:
             raise Unavailable("the workers are busy")
 
     async with anyio.create_task_group() as tasks:
-        tasks.start_soon(KeyframeLoop(ongoing, make).run)
+        keyframes = KeyframeLoop(make)
+        ongoing.watch(lambda opened: keyframes.run_changed(opened.run, opened.recorder))
+        tasks.start_soon(keyframes.run)
         long, short = Going("long"), Going("short")
         for seq in (1, APART - 1, APART, APART + 1, 2 * APART - 1):
             ongoing.reached(long, seq)

@@ -6,7 +6,6 @@ event is kept. Keyframes are a cache in the journal: they may be missing at any 
 
 import asyncio
 import bisect
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from operator import attrgetter
 from typing import Final, NamedTuple, Protocol
@@ -15,6 +14,7 @@ import msgspec
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.journal.events import BareEvent, Event, StreamSnapshot
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Ended,
@@ -36,7 +36,6 @@ from action_assistant.runner.runs.fold import begin, follow, replay
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.web.workers.lanes import RunInWorker
 
 #: Raise it when `runs.fold` gives another run for the same events: older keyframes are not used then.
 FOLD: Final = 5
@@ -109,12 +108,11 @@ class SnapshotJournal(RunnerJournal, Protocol):
 
 
 class KeyframeStore:
-    """Makes, caches and stores the keyframes of runs."""
+    """Makes, caches and stores the keyframes of runs. For workers."""
 
-    def __init__(self, journal: SnapshotJournal, run_in_worker: RunInWorker) -> None:
-        self.run_in_worker = run_in_worker
+    def __init__(self, journal: SnapshotJournal) -> None:
         self._journal = journal
-        self._cache: OrderedDict[str, RunKeyframes] = OrderedDict()
+        self._cache: LruCache[str, RunKeyframes] = LruCache(_CACHED)
         self._locks: dict[str, asyncio.Lock] = {}
 
     async def keyframes(self, run: str) -> RunKeyframes:
@@ -135,7 +133,7 @@ class KeyframeStore:
         if key is not None and key.seq == seq:
             return key.run
         events = await self._journal.read(stream_of(run), after=key.seq if key else 0, upto=seq)
-        return (await self.run_in_worker(lambda: _next(key, _whole(events)))).run
+        return _next(key, _whole(events)).run
 
     async def seq_at(self, run: str, at: int) -> int:
         """Return the seq of the first event at or after the time `at` (microseconds UTC), else of
@@ -143,14 +141,10 @@ class KeyframeStore:
         be read."""
         key = (await self.keyframes(run)).until(at - 1)
         events = await self.page(run, key.seq if key else 0)
-
-        def found() -> int:
-            for event in events:
-                if getattr(decode(event.kind, event.body), "at", event.at) >= at:
-                    return event.seq
-            return events[-1].seq if events else key.seq if key else 1
-
-        return await self.run_in_worker(found)
+        for event in events:
+            if getattr(decode(event.kind, event.body), "at", event.at) >= at:
+                return event.seq
+        return events[-1].seq if events else key.seq if key else 1
 
     async def page(self, run: str, after: int) -> Sequence[Event]:
         """Return the first `APART` events with `seq > after`."""
@@ -174,14 +168,12 @@ class KeyframeStore:
                 break
             if last is not None and last.seq % APART:
                 keys.pop()  # an end that has gone on is no keyframe
-            keys += await self.run_in_worker(
-                lambda last=last, read=read, room=room: _following(last, read, room)
-            )
+            keys += _following(last, read, room)
             marks += _marks_of(read)
         if not keys:
             raise NotFound("There is no such run.")
         found = RunKeyframes(FOLD, tuple(keys), tuple(marks[:MARKS]))
-        self._put_into_cache(run, found)
+        self._cache.put(run, found)
         if _worth_keeping(keys[-1], had):
             await self._store(stream, found)
         return found
@@ -197,25 +189,17 @@ class KeyframeStore:
         if stored is None:
             return None
         try:
-            keyframes = await self.run_in_worker(
-                lambda: msgspec.msgpack.decode(stored.state, type=RunKeyframes)
-            )
+            keyframes = msgspec.msgpack.decode(stored.state, type=RunKeyframes)
         except msgspec.DecodeError:
             return None
         return keyframes if keyframes.fold == FOLD and keyframes.keys else None
 
     async def _store(self, stream: str, keyframes: RunKeyframes) -> None:
-        state = await self.run_in_worker(lambda: msgspec.msgpack.encode(keyframes))
+        state = msgspec.msgpack.encode(keyframes)
         try:
             await self._journal.keep_snapshot(stream, keyframes.keys[-1].seq, state)
         except Refused:
             return  # a cache: it is made again when the journal can be written
-
-    def _put_into_cache(self, run: str, keyframes: RunKeyframes) -> None:
-        self._cache[run] = keyframes
-        self._cache.move_to_end(run)
-        while len(self._cache) > _CACHED:
-            self._cache.popitem(last=False)
 
 
 def _worth_keeping(newest: Keyframe, had: int) -> bool:

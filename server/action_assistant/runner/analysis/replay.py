@@ -102,7 +102,7 @@ async def run_replay(keyframe_store: KeyframeStore, run: str, *, after: int) -> 
     start = after - after % APART
     base = keyframes.before(start) if start else None
     events = await keyframe_store.page(run, base.seq if base else 0)
-    frames = await keyframe_store.run_in_worker(lambda: _frames(base.run if base else None, events))
+    frames = _frames(base.run if base else None, events)
     chapters = [ReplayPageStart(0, views.time(keyframes.keys[0].run.requested_at))]
     chapters += [ReplayPageStart(key.seq, views.time(key.at)) for key in keyframes.keys[:-1]]
     return RunReplay(

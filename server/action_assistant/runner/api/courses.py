@@ -1,6 +1,6 @@
 """The routes of expected courses: saved, removed, checked against a graph, and proposed."""
 
-from typing import Any, Protocol
+from typing import Any
 
 from litestar import Request, Response, delete, get, post
 from litestar.types import ControllerRouterHandler
@@ -15,32 +15,21 @@ from action_assistant.runner.analysis.course_checks import (
 from action_assistant.runner.analysis.expected_runs import Expect, Expectation
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.api.review import json_of
-from action_assistant.runner.review.service import ReviewService
-from action_assistant.runner.review.worker_queries import WorkerQueries
+from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.start.admission import decoded
 from action_assistant.web.auth.access import Needs
-from action_assistant.web.network.connection_limits import ConcurrencyLimit
 from action_assistant.web.server.openapi import reads
-from action_assistant.web.workers.lanes import RunInWorker
 
 _Asking = Request[Any, Any, Any]
 
 
-class CourseServices(Protocol):
-    """The services of these routes."""
-
-    review_service: ReviewService
-    worker_queries: WorkerQueries
-    run_in_worker: RunInWorker
-    body_limit: ConcurrencyLimit
-
-
-def routes(services: CourseServices) -> list[ControllerRouterHandler]:
+def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     """Return the routes of expected courses."""
     return [*_saving(services), *_checking(services)]
 
 
-def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
+def _saving(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/expectations",
         summary="Courses that graphs are expected to take",
@@ -48,7 +37,7 @@ def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
     )
     async def listed() -> Response[list[Expectation]]:
         return json_of(
-            await services.worker_queries.text(ReviewService.expectations), list[Expectation]
+            await services.worker_queries.text(StoredRuns.expectations), list[Expectation]
         )
 
     @post(
@@ -76,7 +65,7 @@ def _saving(services: CourseServices) -> list[ControllerRouterHandler]:
     return [listed, expect, retire]
 
 
-def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
+def _checking(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/expectations/check",
         operation_id="checkExpectations",
@@ -90,7 +79,7 @@ def _checking(services: CourseServices) -> list[ControllerRouterHandler]:
         async with body_of(request, services.body_limit) as body:
             check_request = decoded(body, CheckRequest)
             text = await services.worker_queries.text(
-                ReviewService.checked_courses,
+                StoredRuns.checked_courses,
                 check_request.graph,
                 bytes(check_request.umrf),
                 check_request.subgraphs,

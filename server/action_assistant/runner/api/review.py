@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import AsyncIterator
-from typing import Annotated, Any, Final, Protocol, TypeVar, cast
+from typing import Annotated, Any, Final, TypeVar, cast
 
 import msgspec
 from anyio import to_thread
@@ -18,22 +18,17 @@ from action_assistant.runner.analysis.comparison import RunComparison
 from action_assistant.runner.analysis.replay import RunReplay
 from action_assistant.runner.analysis.statistics import Statistics
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
+from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import RawMessages
-from action_assistant.runner.archives.retention import Retention, SweepResult
-from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.review.service import (
-    CauseShown,
-    Format,
-    ReviewService,
-    RunMarks,
-)
+from action_assistant.runner.archives.retention import SweepResult
+from action_assistant.runner.review.service import RunMarks
+from action_assistant.runner.review.stored_runs import CauseShown, Format, StoredRuns
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.start.admission import decoded
 from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.web.auth.access import Needs
-from action_assistant.web.network.connection_limits import ConcurrencyLimit
 from action_assistant.web.server.openapi import FileBytes, answer, reads
 
 T = TypeVar("T")
@@ -67,22 +62,12 @@ class ArchiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     raw: Annotated[float, msgspec.Meta(ge=0)] | None = None
 
 
-class ReviewServices(Protocol):
-    """The services of these routes. `worker_queries` answers questions in a worker."""
-
-    control: ExecutionService
-    review_service: ReviewService
-    worker_queries: WorkerQueries
-    retention: Retention
-    body_limit: ConcurrencyLimit
-
-
-def routes(services: ReviewServices) -> list[ControllerRouterHandler]:
+def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     """Return the routes of review."""
     return [*_one_run(services), *_many_runs(services), _archiving(services)]
 
 
-def _archiving(services: ReviewServices) -> ControllerRouterHandler:
+def _archiving(services: RunnerServices) -> ControllerRouterHandler:
     @post(
         "/api/archive",
         operation_id="archiveRuns",
@@ -96,16 +81,14 @@ def _archiving(services: ReviewServices) -> ControllerRouterHandler:
     return archive
 
 
-def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
+def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/runs/{run:str}/film",
         summary="The changes of a run by each event, page by page",
         operation_id="getReplay",
     )
     async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[RunReplay]:
-        return json_of(
-            await services.worker_queries.text(ReviewService.replay, run, after), RunReplay
-        )
+        return json_of(await services.worker_queries.text(StoredRuns.replay, run, after), RunReplay)
 
     @get(
         "/api/runs/{run:str}/causes",
@@ -113,9 +96,7 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
         operation_id="listCauses",
     )
     async def found_causes(run: str) -> Response[list[CauseShown]]:
-        return json_of(
-            await services.worker_queries.text(ReviewService.causes, run), list[CauseShown]
-        )
+        return json_of(await services.worker_queries.text(StoredRuns.causes, run), list[CauseShown])
 
     @get(
         "/api/runs/{run:str}/umrf",
@@ -124,7 +105,7 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
         responses={200: answer(UmrfGraph)},
     )
     async def umrf(run: str) -> Response[bytes]:
-        return json_of(await services.worker_queries.value(ReviewService.umrf, run), bytes)
+        return json_of(await services.worker_queries.value(StoredRuns.umrf, run), bytes)
 
     @get(
         "/api/runs/{run:str}/marks",
@@ -151,7 +132,7 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
     async def script(
         run: str, action: str | None = None, fault: expected_runs.Fault | None = None
     ) -> Response[expected_runs.Recorded]:
-        text = await services.worker_queries.text(ReviewService.script, run, _fault(action, fault))
+        text = await services.worker_queries.text(StoredRuns.script, run, _fault(action, fault))
         return json_of(text, expected_runs.Recorded)
 
     @post(
@@ -168,7 +149,7 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
             wanted = decoded(body, ScriptRequest)
             fault = _fault(wanted.action, wanted.fault)
             text = await services.worker_queries.text(
-                ReviewService.script, run, fault, bytes(wanted.umrf)
+                StoredRuns.script, run, fault, bytes(wanted.umrf)
             )
         return json_of(text, expected_runs.Recorded)
 
@@ -183,10 +164,10 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
     ) -> Response[bytes] | Stream:
         head = {"content-disposition": f'attachment; filename="run.{form}"'}
         if form == "jsonl":
-            seq, first = await services.worker_queries.value(ReviewService.lines, run, 0)
+            seq, first = await services.worker_queries.value(StoredRuns.lines, run, 0)
             lines = _lines(services.worker_queries, run, seq, first)
             return Stream(lines, media_type=_TYPES[form], headers=head)
-        content = await services.worker_queries.value(ReviewService.export, run, form)
+        content = await services.worker_queries.value(StoredRuns.export, run, form)
         return Response(content, media_type=_TYPES[form], headers=head)
 
     @get(
@@ -200,9 +181,7 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
         here = (
             [] if found.simulated or recordings is None else await recordings.listed(found.engine)
         )
-        text = await services.worker_queries.text(
-            ReviewService.raw, run, here, time.time_ns() // 1000
-        )
+        text = await services.worker_queries.text(StoredRuns.raw, run, here, time.time_ns() // 1000)
         return json_of(text, RawMessages)
 
     return [film, found_causes, umrf, marks, mark, script, fit, export, raw]
@@ -211,19 +190,17 @@ def _one_run(services: ReviewServices) -> list[ControllerRouterHandler]:
 async def _lines(queries: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
     while page:
         yield page
-        seq, page = await queries.value(ReviewService.lines, run, seq)
+        seq, page = await queries.value(StoredRuns.lines, run, seq)
 
 
-def _many_runs(services: ReviewServices) -> list[ControllerRouterHandler]:
+def _many_runs(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/comparison",
         summary="Two runs side by side, and where they part",
         operation_id="compareRuns",
     )
     async def comparison(a: str, b: str) -> Response[RunComparison]:
-        return json_of(
-            await services.worker_queries.text(ReviewService.compare, a, b), RunComparison
-        )
+        return json_of(await services.worker_queries.text(StoredRuns.compare, a, b), RunComparison)
 
     @get(
         "/api/statistics",
@@ -236,7 +213,7 @@ def _many_runs(services: ReviewServices) -> list[ControllerRouterHandler]:
         last: Annotated[int, Parameter(ge=1, le=1000)] = 200,
     ) -> Response[Statistics]:
         return json_of(
-            await services.worker_queries.text(ReviewService.statistics, graph, robot, last),
+            await services.worker_queries.text(StoredRuns.statistics, graph, robot, last),
             Statistics,
         )
 

@@ -2,7 +2,7 @@
 several robots."""
 
 from datetime import datetime
-from typing import Any, Final, Literal, Protocol, assert_never
+from typing import Any, Final, Literal, assert_never
 
 import msgspec
 from litestar import Request, Response, delete, get, patch, post
@@ -10,8 +10,8 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
-from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.behaviours.folder import BehaviourFolder, BehaviourList
+from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.links.behaviours.folder import BehaviourList
 from action_assistant.runner.links.port import Candidate, Registration, Sighting
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot
@@ -30,7 +30,6 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.start.admission import GroupRequest, read_group
 from action_assistant.runner.start.index_writer import (
     IndexWriteAnswer,
-    IndexWriter,
     IndexWriteRequest,
     read_index_write,
 )
@@ -41,22 +40,10 @@ from action_assistant.umrf.files.action_files import write_action
 from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs, person_of
-from action_assistant.web.network.connection_limits import ConcurrencyLimit
 from action_assistant.web.server.openapi import FileBytes, answer, reads
-from action_assistant.web.workers.lanes import RunInWorker
 
 _EVENTS: Final = 200
 _Asking = Request[Any, Any, Any]
-
-
-class RobotServices(Protocol):
-    """The services of these routes."""
-
-    control: ExecutionService
-    body_limit: ConcurrencyLimit
-    run_in_worker: RunInWorker
-    behaviours: BehaviourFolder | None
-    index_writer: IndexWriter
 
 
 class ReachStatus(msgspec.Struct, frozen=True):
@@ -141,7 +128,7 @@ class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
     failed: dict[str, str]
 
 
-def routes(services: RobotServices) -> list[ControllerRouterHandler]:
+def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     """Return the routes of robots."""
     return [
         *_registry(services),
@@ -151,7 +138,7 @@ def routes(services: RobotServices) -> list[ControllerRouterHandler]:
     ]
 
 
-def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
+def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get("/api/robots", summary="Engines that runs can go to", operation_id="listRobots")
     async def robots() -> list[Robot]:
         return services.control.robot_views()
@@ -221,7 +208,7 @@ def _registry(services: RobotServices) -> list[ControllerRouterHandler]:
     return [robots, reach, candidates, sighting, register, change, remove]
 
 
-def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
+def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get("/api/robots/{name:str}", summary="One engine", operation_id="getRobot")
     async def robot(name: str) -> Robot:
         return services.control.robot_view(name)
@@ -317,7 +304,7 @@ def _one_robot(services: RobotServices) -> list[ControllerRouterHandler]:
     return [robot, known, known_action, events, commanded, held, recorded, recording, stop]
 
 
-def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
+def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     @post(
         "/api/preflight",
         operation_id="runPreflight",
@@ -350,7 +337,7 @@ def _starts(services: RobotServices) -> list[ControllerRouterHandler]:
     return [look, start]
 
 
-def _index(services: RobotServices) -> ControllerRouterHandler:
+def _index(services: RunnerServices) -> ControllerRouterHandler:
     @post(
         "/api/robots/{name:str}/index",
         operation_id="writeIntoIndex",
@@ -414,7 +401,7 @@ def _line(seq: int, event: RobotEvent) -> RobotLogLine:
             assert_never(event)
 
 
-async def _behaviours(services: RobotServices) -> BehaviourList | None:
+async def _behaviours(services: RunnerServices) -> BehaviourList | None:
     """Return the list of behaviours; a folder that cannot be read is a problem in it, since a
     refusal would look like a runner that cannot be reached."""
     if services.behaviours is None:
@@ -425,7 +412,7 @@ async def _behaviours(services: RobotServices) -> BehaviourList | None:
         return BehaviourList(problem=refused.detail)
 
 
-async def _umrf(services: RobotServices, text: str) -> Response[bytes]:
+async def _umrf(services: RunnerServices, text: str) -> Response[bytes]:
     return Response(await services.run_in_worker(canonical, text), media_type="application/json")
 
 

@@ -29,7 +29,7 @@ from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import ModifyRequest, RestRequest
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.review import listing
-from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.start.admission import StartRequest, decoded, read_request
@@ -231,10 +231,10 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         opened = services.control.open.get(run)
         if opened is None:
             return json_of(
-                await services.worker_queries.text(ReviewService.whole, run), views.RunWhole
+                await services.worker_queries.text(StoredRuns.whole, run), views.RunWhole
             )
         if opened not in services.sent:
-            services.sent[opened] = await services.worker_queries.value(ReviewService.sent, run)
+            services.sent[opened] = await services.worker_queries.value(StoredRuns.sent, run)
         opened = services.control.open.get(run, opened)
         await services.hub.prepare_view(opened)
         whole = views.whole_view(

@@ -34,6 +34,7 @@ from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended
 from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal
+from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import GroupRequest, StartRequest
 from action_assistant.runner.start.approvals import Approvals
@@ -258,6 +259,11 @@ class ExecutionService:
     async def find(self, run: str) -> Run:
         """Return a run, open or over. Raise NotFound if there is no such run."""
         return await self._runs.find(run)
+
+    def recorder_of(self, run: str) -> RunRecorder | None:
+        """Return the recorder of an open run; None for any other id."""
+        opened = self.open.get(run)
+        return None if opened is None else opened.recorder
 
     async def simulates(self, run: str) -> bool:
         """Return whether a run is simulated. Raise NotFound if there is no such run."""

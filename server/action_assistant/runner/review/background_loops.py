@@ -5,17 +5,19 @@ import logging
 from collections import Counter
 from collections.abc import Awaitable, Callable
 from functools import partial
-from typing import Any, Final, Protocol
+from typing import Final
 
 import anyio
-from sqlalchemy import Connection, func, select
+from sqlalchemy import func, select
 
 from action_assistant.errors import Refused, TooLarge
+from action_assistant.journal.journal import Journal
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.analysis.keyframes import APART
 from action_assistant.runner.archives.archive_store import ArchiveStore
-from action_assistant.runner.review.ongoing_runs import OngoingRun, OngoingRuns
+from action_assistant.runner.runs.recorder import RunRecorder
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.word_index import index_some
 from action_assistant.runner.workers import Crashed
 from action_assistant.schema.runner_tables import review, run
@@ -32,15 +34,14 @@ _PAUSE_S: Final = 0.05  # between two such transactions
 
 
 class SumUpLoop:
-    """Sums up ended runs until cancelled. `summed` computes the sum of a run, possibly in a
-    worker."""
+    """Sums up ended runs until cancelled. `summed` computes the sum of a run, given its id and the
+    present time in microseconds UTC."""
 
     def __init__(
         self,
         journal: ArchiveStore,
-        ongoing: OngoingRuns,
         clock_us: ClockUs,
-        summed: Callable[[str], Awaitable[annotations.SummedUp]],
+        summed: Callable[[str, int], Awaitable[annotations.SummedUp]],
     ) -> None:
         self._journal = journal
         self._clock_us = clock_us
@@ -48,16 +49,16 @@ class SumUpLoop:
         self._ended = anyio.Event()
         self._summed_up: int | None = None  # all runs that had ended by then have their sums
         self._tried: Counter[str] = Counter()  # how often the sum of a run ended its worker
-        ongoing.watch(self._saw)
 
     def begin_again(self) -> None:
         """Examine all runs again, at once."""
         self._summed_up = None
         self._ended.set()
 
-    def _saw(self, opened: OngoingRun) -> None:
-        if opened.run.end is not None:
-            if not opened.recorder.recorded:
+    def run_changed(self, run: Run, recorder: RunRecorder) -> None:
+        """Note that an open run has changed."""
+        if run.end is not None:
+            if not recorder.recorded:
                 self._summed_up = None  # its end may be stored much later
             self._ended.set()
 
@@ -100,7 +101,7 @@ class SumUpLoop:
 
     async def _one(self, run_id: str) -> None:
         try:
-            summed = await self._summed(run_id)
+            summed = await self._summed(run_id, self._clock_us())
         except Refused as refused:
             self._tried[run_id] += 1
             if self._tried[run_id] < _TRIES or not isinstance(refused, Crashed | TooLarge):
@@ -122,24 +123,23 @@ def due_after(stored: int) -> int:
 
 class KeyframeLoop:
     """Stores keyframes of long runs while they go on, until cancelled, so that they need not be
-    folded from the start after a crash. `make` makes and stores the keyframes of a run, possibly in
-    a worker."""
+    folded from the start after a crash. `make` makes and stores the keyframes of a run."""
 
-    def __init__(self, ongoing: OngoingRuns, make: Callable[[str], Awaitable[object]]) -> None:
+    def __init__(self, make: Callable[[str], Awaitable[object]]) -> None:
         self._make = make
         self._kept: dict[str, int] = {}  # by open run: how many of its keyframes are stored
         self._due: set[str] = set()
         self._wake = anyio.Event()
-        ongoing.watch(self._saw)
 
-    def _saw(self, opened: OngoingRun) -> None:
-        run, count = opened.run.id, opened.recorder.seq // APART
-        if opened.run.end is not None:  # its sum makes its keyframes
-            self._kept.pop(run, None)
-            self._due.discard(run)
-        elif count >= due_after(self._kept.get(run, 0)):
-            self._kept[run] = count
-            self._due.add(run)
+    def run_changed(self, run: Run, recorder: RunRecorder) -> None:
+        """Note that an open run has changed."""
+        count = recorder.seq // APART
+        if run.end is not None:  # its sum makes its keyframes
+            self._kept.pop(run.id, None)
+            self._due.discard(run.id)
+        elif count >= due_after(self._kept.get(run.id, 0)):
+            self._kept[run.id] = count
+            self._due.add(run.id)
             self._wake.set()
 
     async def run(self) -> None:
@@ -157,16 +157,7 @@ class KeyframeLoop:
                     log.exception("no keyframes of run %s were stored", run)
 
 
-class Deriving(Protocol):
-    """A journal whose tables may be added to."""
-
-    async def derive(self, work: Callable[[Connection], Any]) -> Any:
-        """Run `work` with a connection that may write tables which follow from events. Raise
-        Unavailable if the journal cannot be written."""
-        ...
-
-
-async def index_words(journal: Deriving) -> None:
+async def index_words(journal: Journal) -> None:
     """Index the words of old runs, in batches, until all are indexed. Raises nothing, since a
     search reads unindexed runs."""
     while True:

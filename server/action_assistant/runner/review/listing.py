@@ -8,7 +8,7 @@ import msgspec
 from sqlalchemy import Row, Select
 
 from action_assistant.journal.events import Event
-from action_assistant.runner.review.service import ReviewService
+from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.runs import queries, views, word_index
 
 _PAGE: Final = 500  # events read at once
@@ -25,16 +25,16 @@ class HistoryEvent(msgspec.Struct, frozen=True):
 
 
 async def listed(
-    review_service: ReviewService,
+    stored_runs: StoredRuns,
     wanted: queries.Filter,
     limit: int,
     open_runs: Mapping[str, views.RunSummary],
 ) -> list[views.Listed]:
     """Return runs, newest first. `open_runs`: summaries of open runs by id, which the tables do not
     have."""
-    among = None if wanted.text is None else await numbers_with(wanted.text, review_service.rows)
-    rows = await review_service.rows(queries.listed(wanted, limit, among))
-    labels = await _labels(review_service, rows)
+    among = None if wanted.text is None else await numbers_with(wanted.text, stored_runs.rows)
+    rows = await stored_runs.rows(queries.listed(wanted, limit, among))
+    labels = await _labels(stored_runs, rows)
     shown = (
         views.list_entry(
             open_runs.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, [])
@@ -59,18 +59,18 @@ async def numbers_with(
     return None
 
 
-async def _labels(review_service: ReviewService, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
+async def _labels(stored_runs: StoredRuns, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     if rows:
-        for row in await review_service.rows(queries.labels_of([row.id for row in rows])):
+        for row in await stored_runs.rows(queries.labels_of([row.id for row in rows])):
             found.setdefault(row.run, []).append(row.label)
     return found
 
 
-async def streamed(review_service: ReviewService, run: str, after: int) -> tuple[int, bytes]:
+async def streamed(stored_runs: StoredRuns, run: str, after: int) -> tuple[int, bytes]:
     """Return a page of stored events in the format of an event stream, and the seq of the last
     one."""
-    events = await review_service.events(run, after, _PAGE)
+    events = await stored_runs.events(run, after, _PAGE)
     lines = [
         b"id: %d\nevent: %b\ndata: %b\n\n" % (each.seq, each.kind.encode(), _event_json(each))
         for each in events

@@ -1,57 +1,24 @@
-"""The review of stored runs: sums, marks, comparisons, exports, expected courses."""
+"""The review of runs: marks of people, examples, expected courses, and the loops that sum runs up."""
 
-import logging
-from collections.abc import Awaitable, Callable, Sequence
-from datetime import datetime
-from typing import Any, Concatenate, Final, Literal, ParamSpec, Protocol, TypeAlias, TypeVar
+from collections.abc import Callable, Sequence
 
 import anyio
 import msgspec
-from sqlalchemy import ColumnElement, Row, Select, select
+from sqlalchemy import select
 
-from action_assistant.errors import BadInput, Conflict, NotFound
-from action_assistant.journal.events import Draft, Event
+from action_assistant.errors import NotFound
+from action_assistant.journal.events import Draft
 from action_assistant.kit.clock import ClockUs
-from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
-from action_assistant.runner.analysis.cause_texts import cause_sentence
-from action_assistant.runner.analysis.causes import OPERATOR, causes
-from action_assistant.runner.analysis.comparison import RunComparison, SentTree, compare
-from action_assistant.runner.analysis.course_checks import CheckedCourses, check_courses
-from action_assistant.runner.analysis.keyframes import KeyframeStore
-from action_assistant.runner.analysis.replay import RunReplay, run_replay
+from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.archives import examples
-from action_assistant.runner.archives.archive_store import Archived, ArchiveStore
-from action_assistant.runner.archives.raw_messages import (
-    RawArchived,
-    RawMessages,
-    raw_of,
-    stream_of_raw,
-)
+from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.background_loops import KeyframeLoop, SumUpLoop
-from action_assistant.runner.review.ongoing_runs import OngoingRuns, wait_until_stored
-from action_assistant.runner.robots.recordings import Recording, hours
-from action_assistant.runner.runs import views
-from action_assistant.runner.runs.events import Author, Observed, decode, said_in
-from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.review.stored_runs import StoredRuns
+from action_assistant.runner.review.worker_queries import WorkerQueries
+from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.recorder import RunRecorder, stream_of
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.runs.sent_graphs import Sent, SentSubgraph, read_sent, sent_of
-from action_assistant.schema.runner_tables import expectation, review, run_label, runner_event
-from action_assistant.umrf.files import codec
-from action_assistant.umrf.model import Graph
-from action_assistant.web.workers.lanes import RunInWorker
-
-log: Final = logging.getLogger(__name__)
-
-P = ParamSpec("P")
-T = TypeVar("T")
-
-_LAST: Final = 1_000  # runs in one statistics
-_CAUSES: Final = 10  # in one answer
-_ROWS: Final = 400  # parameters of one query
-_PAGE: Final = 500  # events exported at once
-_SAYING: Final = 2_000  # events of a run whose texts are searched
-
-Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
+from action_assistant.schema.runner_tables import expectation, review, run_label
 
 
 class RunMarks(msgspec.Struct, frozen=True):
@@ -62,55 +29,30 @@ class RunMarks(msgspec.Struct, frozen=True):
     labels: list[str]
 
 
-class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
-    """One cause in a sentence, with its evidence: the time, the event `seq` by which it was seen,
-    the action, a quoted text, and the person at this runner who caused it (`author`). The sentence
-    begins with the name that the person had then, or with *Somebody*."""
-
-    kind: str
-    text: str
-    at: datetime
-    seq: int
-    action: str | None
-    aid: str | None
-    quote: str
-    author: Author | None
-
-
-class ReviewQueries(Protocol):
-    """Answers methods of `ReviewService` elsewhere, as `WorkerQueries` does in a worker."""
-
-    async def value(
-        self,
-        question: Callable[Concatenate["ReviewService", P], Awaitable[T]],
-        *args: P.args,
-        **kw: P.kwargs,
-    ) -> T:
-        """Return the result of a method of ReviewService, called in a worker."""
-        ...
-
-
 class ReviewService:
-    """Answers questions about runs, and stores notes of people. It sends no commands. With `asked`,
-    expensive questions go to a worker, which has a service of its own over the same file,
-    without open runs."""
+    """Stores what people note about runs, and keeps the loops that work on stored runs. It sends no
+    commands. `queries` answers questions in workers; `next_number` gives the number for a new run."""
 
     def __init__(
         self,
-        control: OngoingRuns,
         journal: ArchiveStore,
-        run_in_worker: RunInWorker,
         clock_us: ClockUs,
-        asked: ReviewQueries | None = None,
+        queries: WorkerQueries,
+        next_number: Callable[[], int],
     ) -> None:
-        self.keyframe_store = KeyframeStore(journal, run_in_worker)
-        self._asked = asked
-        self._control = control
         self._journal = journal
-        self._run_in_worker = run_in_worker
         self._clock_us = clock_us
-        self._sums = SumUpLoop(journal, control, clock_us, self._summed)
-        self._keyframes = KeyframeLoop(control, self._make_keyframes)
+        self._queries = queries
+        self._next_number = next_number
+        self._sums = SumUpLoop(
+            journal, clock_us, lambda run, now: queries.value(StoredRuns.summed, run, now)
+        )
+        self._keyframes = KeyframeLoop(lambda run: queries.value(StoredRuns.made_keyframes, run))
+
+    def run_changed(self, run: Run, recorder: RunRecorder) -> None:
+        """Note that an open run has changed."""
+        self._sums.run_changed(run, recorder)
+        self._keyframes.run_changed(run, recorder)
 
     async def run(self) -> None:
         """Sum up ended runs and store keyframes of long ones, until cancelled."""
@@ -118,150 +60,10 @@ class ReviewService:
             tasks.start_soon(self._sums.run)
             tasks.start_soon(self._keyframes.run)
 
-    async def _answer(
-        self,
-        question: Callable[Concatenate["ReviewService", P], Awaitable[T]],
-        *args: P.args,
-        **kw: P.kwargs,
-    ) -> T:
-        """Return the result of a method, computed in a worker if there is one."""
-        if self._asked is None:
-            return await question(self, *args, **kw)
-        return await self._asked.value(question, *args, **kw)
-
-    async def _make_keyframes(self, run_id: str) -> int:
-        return await self._answer(ReviewService.made_keyframes, run_id)
-
-    async def made_keyframes(self, run_id: str) -> int:
-        """Make the keyframes of a run, and return the seq of its last keyframe. Raise NotFound if
-        there is no such run."""
-        return (await self.keyframe_store.keyframes(run_id)).keys[-1].seq
-
-    async def _summed(self, run_id: str) -> annotations.SummedUp:
-        return await self._answer(ReviewService.summed, run_id, self._clock_us())
-
-    async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
-        """Return the sum of a run that is over. `now` is the present time in microseconds UTC.
-        Raise NotFound if there is no such run."""
-        found = (await self.keyframe_store.keyframes(run_id)).keys[-1].run
-        good = found.end == "finished" and found.result == "on_true"
-        graph = None if good else await self._graph(run_id)  # only a run that went badly has causes
-        said = await self._said(run_id)
-        return await self._run_in_worker(lambda: annotations.sum_of(found, graph, now, said))
-
-    async def _said(self, run_id: str) -> list[str]:
-        """Return the texts in the first events of a run that people may search for, in the order of
-        the events. A text that occurs several times is returned once. Raise Unavailable if the
-        journal cannot be read."""
-        event = runner_event.c
-        chosen = select(event.kind, event.body).where(
-            event.stream == stream_of(run_id), event.kind != Observed.kind
-        )
-        texts: dict[str, None] = {}
-        for row in await self.rows(chosen.order_by(event.seq).limit(_SAYING)):
-            try:
-                texts.update(dict.fromkeys(said_in(decode(row.kind, row.body))))
-            except msgspec.DecodeError:  # a damaged event is reported where the run is read
-                continue
-        return list(texts)
-
-    async def whole(self, run_id: str) -> views.RunWhole:
-        """Return a run that is over, with the graph as it was sent. Raise NotFound if there is no
-        such run."""
-        sent = await self.sent(run_id)
-        found, place = await self.known(run_id), await self.place(run_id)
-        return views.whole_view(found, sent, place=place)
-
-    async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
-        """Return a run and the seq of its last event. `robots_too`: with all of its visits, so that
-        the fold can continue; else with the newest visits that people are shown. Raise NotFound
-        if there is no such run."""
-        key = (await self.keyframe_store.keyframes(run_id)).keys[-1]
-        return (key.run if robots_too else views.with_newest_visits(key.run)), key.seq
-
-    async def known(self, run_id: str) -> Run:
-        """Return a run, open or over. Raise NotFound if there is no such run."""
-        opened = self._control.open.get(run_id)
-        return (
-            opened.run
-            if opened is not None
-            else (await self.keyframe_store.keyframes(run_id)).keys[-1].run
-        )
-
-    # --- one run ------------------------------------------------------------------------------
-
-    async def causes(self, run_id: str) -> list[CauseShown]:
-        """Return the proven causes of a run's end, the weightiest first. Raise NotFound if there is
-        no such run."""
-        found, graph = await self.known(run_id), await self._graph(run_id)
-        named = await self._run_in_worker(
-            lambda: [(each, cause_sentence(each, found)) for each in causes(found, graph)[:_CAUSES]]
-        )
-        shown: list[CauseShown] = []
-        for each, text in named:
-            action = found.actions.get(each.action or "")
-            shown.append(
-                CauseShown(
-                    kind=str(each.__struct_config__.tag),
-                    text=text,
-                    at=views.time(each.at),
-                    seq=await self.keyframe_store.seq_at(run_id, each.at),
-                    action=each.action,
-                    aid=action.aid if action is not None else None,
-                    quote=each.quote,
-                    author=each.by if isinstance(each, OPERATOR) else None,
-                )
-            )
-        return shown
-
-    async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
-        cannot be read."""
-        return await self._journal.query(statement)
-
-    async def events(self, run_id: str, after: int, limit: int) -> Sequence[Event]:
-        """Return the stored events of a run with `seq > after`, at most `limit`. Raise Unavailable
-        if the journal cannot be read."""
-        return await self._control.history.events(run_id, after, limit)
-
-    async def sent(self, run_id: str) -> Sent:
-        """Return the graph as it was sent, and the values of its actions. Raise NotFound if there
-        is no such run."""
-        return sent_of(await self._control.history.requested(run_id))
-
-    async def place(self, run_id: str) -> Row[Any] | None:
-        """Return number, time and file of an archived run; None when its events are in the
-        journal."""
-        return await self._journal.place(stream_of(run_id))
-
-    async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> RawMessages:
-        """Return the raw messages of the run's robot from the time of the run. `recordings`: all
-        recordings of that robot on this computer; `now`: microseconds UTC. Raise NotFound if
-        there is no such run."""
-        run_ = await self.known(run_id)
-        until = run_.ended_at or now
-        first, last = hours(run_.started_at or run_.requested_at, until)
-        here = [
-            each
-            for each in recordings
-            if not run_.simulated and first <= each.name[: len(first)] <= last
-        ]
-        archived = await self._journal.read(stream_of_raw(run_.engine))
-        gone = (msgspec.json.decode(event.body, type=RawArchived) for event in archived)
-        return raw_of(run_, here, gone, until)
-
-    async def replay(self, run_id: str, after: int) -> RunReplay:
-        """Return one page of a run's replay: the events from the last keyframe at or before
-        `after`. Raise NotFound if there is no such run."""
-        return await run_replay(self.keyframe_store, run_id, after=after)
-
-    async def umrf(self, run_id: str) -> bytes:
-        """Return the text of the graph as it was sent. Raise NotFound if there is no such run."""
-        return (await self._control.history.umrf(run_id)).encode()
-
     async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> RunMarks:
         """Pin, note or label a run, and return its marks. Raise NotFound if there is no such run."""
-        await self.known(run_id)
+        if not await self._journal.newest(stream_of(run_id)):
+            raise NotFound("There is no such run.")
         marked = annotations.Marked(self._clock_us(), author, marks)
         await self._journal.append(annotations.stream_about(run_id), [annotations.draft(marked)])
         return await self.marks(run_id)
@@ -274,70 +76,6 @@ class ReviewService:
         )
         pinned, note = (rows[0].pinned, rows[0].note) if rows else (False, "")
         return RunMarks(bool(pinned), note, [row.label for row in labels])
-
-    async def compare(self, a: str, b: str) -> RunComparison:
-        """Compare two runs, given by their ids. Raise NotFound if one of them does not exist."""
-        one, other = await self.known(a), await self.known(b)
-        sent_a, sent_b = await self._sent_tree(a), await self._sent_tree(b)
-        return await self._run_in_worker(lambda: compare(one, other, sent_a, sent_b))
-
-    async def _sent_tree(self, run_id: str) -> SentTree:
-        sent = await self._control.history.requested(run_id)
-        inside = {each.name: each.digest for each in sent.subgraphs}
-        return SentTree(sent.umrf, inside, sent.script)
-
-    async def export(self, run_id: str, form: Format) -> bytes:
-        """Return the run as the contents of a file in this format. Raise NotFound if there is no
-        such run."""
-        found = await self.known(run_id)
-        if form == "csv":
-            return await self._run_in_worker(lambda: exports.intervals(found))
-        events = await self._journal.read(stream_of(run_id))
-        if form == "mcap":
-            return await self._run_in_worker(lambda: exports.mcap(events))
-        return await self._run_in_worker(lambda: b"".join(exports.lines(run_id, events)))
-
-    async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
-        """Return a page of JSON lines, and the seq of its last event: a long run need not be in
-        memory as a whole. Raises NotFound when the run has no events."""
-        events = await self._journal.read(stream_of(run_id), after=after, limit=_PAGE)
-        if not events and not after:
-            raise NotFound("There is no such run.")
-        return events[-1].seq if events else after, b"".join(exports.lines(run_id, events))
-
-    async def script(
-        self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None
-    ) -> expected_runs.Recorded:
-        """Return the run as a script, for its own graph or for another version of it. Raise
-        NotFound for an unknown run; BadInput, NotUmrf or TooLarge for a bad fault or graph."""
-        found = await self.known(run_id)
-        if fault is not None and fault[0] not in found.actions:
-            raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
-        script = expected_runs.recorded(found, fault)
-        if umrf is None:
-            return script
-        _, reading = await self._run_in_worker(lambda: read_sent(umrf))
-        return expected_runs.fitted(script, found, reading.graph)
-
-    # --- many runs ----------------------------------------------------------------------------
-
-    async def statistics(self, graph: str, engine: str | None, last: int) -> statistics.Statistics:
-        """Return statistics of the newest runs of a graph, at most `last` runs. With `engine`, only
-        runs on that engine count."""
-        rows = await self._journal.query(statistics.runs_of(graph, engine, min(last, _LAST)))
-        ids = [row.id for row in rows]
-        sums: list[Row[Any]] = []
-        for i in range(0, len(ids), _ROWS):
-            sums += await self._journal.query(statistics.sums_of(ids[i : i + _ROWS]))
-        newest = await self._graph(ids[0]) if ids else None
-        return await self._run_in_worker(lambda: statistics.statistics(rows, sums, newest))
-
-    async def _graph(self, run_id: str) -> Graph | None:
-        try:
-            text = await self._control.history.umrf(run_id)
-            return codec.read(text.encode()).graph
-        except (codec.Unreadable, Archived):
-            return None
 
     async def take_in(self, texts: Sequence[bytes], author: Author) -> list[str]:
         """Import recorded runs as examples, each once; return their ids. Raise BadInput if a text
@@ -352,7 +90,7 @@ class ReviewService:
                 await self._journal.append(
                     annotations.stream_about(first.run), [annotations.draft(marked)]
                 )
-                begin = examples.numbered(first, self._control.next_number())
+                begin = examples.numbered(first, self._next_number())
                 await self._journal.append(stream, [begin, *rest], expected=0)
             imported.append(first.run)
         self._sums.begin_again()  # the imported runs ended long ago
@@ -367,53 +105,11 @@ class ReviewService:
         for a bad request; Conflict if the simulator takes another course than the run."""
         name = expected_runs.name_of(wanted.name)
         now = self._clock_us()
-        opened = self._control.open.get(wanted.run)
-        if opened is not None:
-            if opened.run.end is None:
-                raise Conflict("The run is not over yet.")
-            await wait_until_stored(opened)
-        saved = await self._answer(ReviewService.expected, wanted, name, author, now)
+        await self._queries.wait_until_stored(wanted.run)
+        saved = await self._queries.value(StoredRuns.expected, wanted, name, author, now)
         draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
         await self._journal.append(expected_runs.STREAM, [draft])
         return expected_runs.expectation_view(saved)
-
-    async def expected(
-        self,
-        wanted: expected_runs.Expect,
-        name: str,
-        author: Author,
-        now: int,
-    ) -> expected_runs.Expected:
-        """Return the event that saves an expected course. Raise NotFound for an unknown run;
-        BadInput, NotUmrf or TooLarge for a bad request; Conflict if the simulator takes another
-        course than the run."""
-        if wanted.run == "":
-            return expected_runs.of_dry_run(wanted, name, author, now)
-        found = await self.known(wanted.run)
-        if found.end is None:
-            raise Conflict("The run is not over yet.")
-        sent = await self._control.history.requested(wanted.run)
-        return expected_runs.of_run(found, sent.umrf, name, author, now, sent.subgraphs)
-
-    async def expectations(self) -> list[expected_runs.Expectation]:
-        """Return all expected courses, by name."""
-        return [expected_runs.expectation_view(saved) for saved in await self._all_saved()]
-
-    async def checked_courses(
-        self, graph: str, umrf: bytes, subgraphs: Sequence[SentSubgraph] = ()
-    ) -> CheckedCourses:
-        """Check the expected courses of a graph against this text of it. Raise BadInput, NotUmrf or
-        TooLarge if the text cannot be read."""
-        saved = await self._all_saved(expectation.c.graph == graph)
-        return await self._run_in_worker(lambda: check_courses(saved, umrf, subgraphs=subgraphs))
-
-    async def _all_saved(self, *where: ColumnElement[bool]) -> list[expected_runs.Expected]:
-        asked = select(expectation).where(*where).order_by(expectation.c.name)
-        return [await self._saved(row.seq) for row in await self._journal.query(asked)]
-
-    async def _saved(self, seq: int) -> expected_runs.Expected:
-        (event,) = await self._journal.read(expected_runs.STREAM, after=seq - 1, upto=seq)
-        return msgspec.json.decode(event.body, type=expected_runs.Expected)
 
     async def retire(self, name: str, author: Author) -> None:
         """Remove the expected course of this name. Raise NotFound if there is none."""

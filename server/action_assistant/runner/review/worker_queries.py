@@ -1,16 +1,17 @@
 """Answers questions about stored runs in a worker that reads the database itself, read-only.
 
-A question is a method of `ReviewService`. `WorkerQueries` is the runner's side: it waits until what
+A question is a method of `StoredRuns`. `WorkerQueries` is the runner's side: it waits until what
 was just shown is stored before it asks, and stores keyframes that the worker made on the way.
 """
 
 import asyncio
 import logging
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import Any, Concatenate, Final, NoReturn, ParamSpec, TypeVar
+from typing import Any, Concatenate, Final, ParamSpec, TypeVar
 
+import anyio
 import msgspec
 
 from action_assistant.errors import Refused, Unavailable
@@ -18,10 +19,8 @@ from action_assistant.journal.events import Draft, StreamSnapshot
 from action_assistant.journal.reader import FileJournalReader
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives.archive_store import ArchiveStore
-from action_assistant.runner.review.ongoing_runs import OngoingRun, wait_until_stored
-from action_assistant.runner.review.service import ReviewService
-from action_assistant.runner.runs.history import RunHistory, RunnerJournal
-from action_assistant.runner.runs.recorder import stream_of
+from action_assistant.runner.review.stored_runs import StoredRuns
+from action_assistant.runner.runs.recorder import RunRecorder, stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
@@ -30,6 +29,8 @@ log: Final = logging.getLogger(__name__)
 
 P = ParamSpec("P")
 T = TypeVar("T")
+
+_SETTLED_S: Final = 2.0  # after which a question is answered from what is stored
 
 
 class StoragePaths(msgspec.Struct, frozen=True):
@@ -40,8 +41,8 @@ class StoragePaths(msgspec.Struct, frozen=True):
 
 
 class WorkerQueries:
-    """Answers questions in a worker. `opened`: the open runs, once known. Snapshots that the worker
-    made are stored by `tasks` afterwards."""
+    """Answers questions in a worker. `recorder_of` returns the recorder of an open run, None for any
+    other id. Snapshots that the worker made are stored by `tasks` afterwards."""
 
     def __init__(
         self,
@@ -50,7 +51,7 @@ class WorkerQueries:
         journal: SnapshotJournal,
         tasks: BackgroundTasks,
     ) -> None:
-        self.opened: Mapping[str, OngoingRun] = {}
+        self.recorder_of: Callable[[str], RunRecorder | None] = lambda _: None
         self._run_in_worker = run_in_worker
         self._paths = paths
         self._journal = journal
@@ -58,11 +59,11 @@ class WorkerQueries:
 
     async def value(
         self,
-        question: Callable[Concatenate[ReviewService, P], Awaitable[T]],
+        question: Callable[Concatenate[StoredRuns, P], Awaitable[T]],
         *args: P.args,
         **kw: P.kwargs,
     ) -> T:
-        """Return the result of a method of `ReviewService`, called in a worker. Raise its errors;
+        """Return the result of a method of `StoredRuns`, called in a worker. Raise its errors;
         Unavailable or TooMany if no worker can answer."""
         await self._settled(args)
         found, snapshots = await self._run_in_worker(
@@ -74,11 +75,11 @@ class WorkerQueries:
 
     async def text(
         self,
-        question: Callable[Concatenate[ReviewService, P], Awaitable[T]],
+        question: Callable[Concatenate[StoredRuns, P], Awaitable[T]],
         *args: P.args,
         **kw: P.kwargs,
     ) -> bytes:
-        """Return what a method of `ReviewService` returns, as JSON that the worker encoded."""
+        """Return what a method of `StoredRuns` returns, as JSON that the worker encoded."""
         await self._settled(args)
         found, snapshots = await self._run_in_worker(
             encoded, self._paths, partial(question, **kw) if kw else question, args
@@ -90,18 +91,24 @@ class WorkerQueries:
     async def newest(self, run: str) -> int:
         """Return the seq of the last stored event of a run; 0 when there is none. Raise Unavailable
         if the journal cannot be read."""
-        await self._settled([run])
+        await self.wait_until_stored(run)
         return await self._journal.newest(stream_of(run))
 
     async def past(self, run: str, robots_too: bool) -> tuple[Run, int]:
         """Return a run that is over, and the seq of its last event, as `history.Past`."""
-        return await self.value(ReviewService.followed, run, robots_too)
+        return await self.value(StoredRuns.followed, run, robots_too)
 
     async def _settled(self, args: Sequence[object]) -> None:
         for each in args:
-            opened = self.opened.get(each) if isinstance(each, str) else None
-            if opened is not None:
-                await wait_until_stored(opened)
+            if isinstance(each, str):
+                await self.wait_until_stored(each)
+
+    async def wait_until_stored(self, run: str) -> None:
+        """Wait until the events of an open run that were shown are stored, for two seconds at most."""
+        recorder = self.recorder_of(run)
+        if recorder is not None:
+            with anyio.move_on_after(_SETTLED_S):
+                await recorder.flushed()
 
     def _keep(self, snapshots: Sequence[StreamSnapshot]) -> None:
         if snapshots:
@@ -123,8 +130,8 @@ def answered(
     paths: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[Any, list[StreamSnapshot]]:
     """Answer a question in the worker; return the answer and the snapshots to store."""
-    review_service, file = _reading(paths)
-    found = asyncio.run(_asked(question, review_service, args))
+    stored_runs, file = _reading(paths)
+    found = asyncio.run(_asked(question, stored_runs, args))
     return found, file.given()
 
 
@@ -137,26 +144,19 @@ def encoded(
 
 
 async def _asked(
-    question: Callable[..., Awaitable[Any]], review_service: ReviewService, args: Sequence[Any]
+    question: Callable[..., Awaitable[Any]], stored_runs: StoredRuns, args: Sequence[Any]
 ) -> object:
-    return await question(review_service, *args)
+    return await question(stored_runs, *args)
 
 
 @lru_cache(maxsize=1)
-def _reading(paths: StoragePaths) -> "tuple[ReviewService, _ReadOnlyJournal]":
+def _reading(paths: StoragePaths) -> "tuple[StoredRuns, _ReadOnlyJournal]":
     file = _ReadOnlyJournal(paths.database)
-    archive_store = ArchiveStore(file, paths.archive, _in_this_thread)
-    return ReviewService(
-        _NoOngoingRuns(archive_store), archive_store, _in_this_thread, _no_clock
-    ), file
+    return StoredRuns(ArchiveStore(file, paths.archive, _in_this_thread)), file
 
 
 async def _in_this_thread(work: Callable[..., T], *args: Any) -> T:
     return work(*args)
-
-
-def _no_clock() -> NoReturn:
-    raise AssertionError("reading stored runs needs no clock")
 
 
 class _ReadOnlyJournal(FileJournalReader):
@@ -180,18 +180,3 @@ class _ReadOnlyJournal(FileJournalReader):
         """Return the snapshots to store, each once."""
         given, self._kept = self._kept, []
         return given
-
-
-class _NoOngoingRuns:
-    """The open runs in a worker: none, since everything is stored."""
-
-    def __init__(self, journal: RunnerJournal) -> None:
-        self.open: Mapping[str, OngoingRun] = {}
-        self.history = RunHistory(journal)
-
-    def next_number(self) -> int:
-        """Raise NotImplementedError always: a worker numbers no runs."""
-        raise NotImplementedError
-
-    def watch(self, watcher: Callable[[OngoingRun], None]) -> None:
-        """Do nothing, since no run changes in a worker."""
