@@ -2,7 +2,7 @@
 
 import asyncio
 import logging
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Final
@@ -17,7 +17,6 @@ from action_assistant.editor.api import (
     drafts,
     drawing,
     editor,
-    flat,
     graphs,
     history,
     invitations,
@@ -31,7 +30,6 @@ from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people.people import People
 from action_assistant.editor.services import EditorServices, EditorState
-from action_assistant.editor.watched import WatchedEditor
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.errors import BadInput
 from action_assistant.journal.copies import before_upgrade
@@ -42,7 +40,10 @@ from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.scrape_token import ScrapeToken
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import session_routes
+from action_assistant.web.monitoring.gauges import Family
 from action_assistant.web.monitoring.monitoring import Monitoring
+from action_assistant.web.monitoring.status import Activity
+from action_assistant.web.monitoring.watched import Watched
 from action_assistant.web.network.addresses import Addresses, addresses_of
 from action_assistant.web.server.application import application
 from action_assistant.web.workers.lanes import run_here
@@ -160,7 +161,6 @@ def _routes(
         *graphs.routes(app_state),
         *history.routes(app_state),
         *versions.routes(app_state),
-        *flat.routes(app_state),
         *subgraphs.routes(app_state),
         *drafts.routes(app_state),
         *drawing.routes(app_state),
@@ -182,3 +182,43 @@ async def _greet(services: EditorServices, folder: Path) -> None:
             )
         except BadInput as error:
             log.error("the example %s cannot be read: %s", path.name, error.detail)
+
+
+class WatchedEditor(Watched):
+    """Gives the metrics and the status of an open editor."""
+
+    def __init__(self, services: EditorServices) -> None:
+        workers, self._rooms = services.workers, services.rooms
+        lanes = (workers.files, workers.edits, workers.graphs)
+        super().__init__(services.journal, lanes, (services.rooms.metrics,), {})
+
+    def activity(self) -> Activity:
+        """Return how many sockets and rooms are open."""
+        rooms = self._rooms.open_rooms()
+        return Activity(sockets=sum(len(room.members) for room in rooms), rooms=len(rooms))
+
+    def families(self) -> Iterator[Family]:
+        """Yield the metrics of rooms and their sockets."""
+        now, metrics = self.activity(), self._rooms.metrics
+        yield Family("rooms", "Graphs that somebody has open.", now.rooms or 0)
+        yield Family("sockets", "Sockets in rooms.", now.sockets)
+        yield Family("rooms_opened", "Rooms that were opened.", metrics.opened, (), "counter")
+        yield Family("rooms_unloaded", "Rooms that were let go.", metrics.unloaded, (), "counter")
+        yield Family(
+            "updates_refused",
+            "Edits that a room refused, by why.",
+            {(why,): count for why, count in metrics.refused.items()},
+            ("reason",),
+            "counter",
+        )
+        yield Family(
+            "sockets_closed",
+            "Sockets in rooms that have ended, by close code.",
+            {(str(code),): count for code, count in metrics.closed.items()},
+            ("code",),
+            "counter",
+        )
+        divergences = self._rooms.divergences
+        told = "How often a page showed something else than its room."
+        yield Family("divergences", f"{told} The former name of divergences_total.", divergences)
+        yield Family("divergences", told, divergences, (), "counter")

@@ -11,8 +11,7 @@ from action_assistant.editor.history.drafts.draft_merges import DraftMerges
 from action_assistant.editor.history.drafts.drafts import Drafts
 from action_assistant.editor.history.graph_history import GraphHistory
 from action_assistant.editor.history.restoring import Restoring
-from action_assistant.editor.library.library import Library
-from action_assistant.editor.library.library_edits import LibraryEdits
+from action_assistant.editor.library.library import Library, LibraryEdits
 from action_assistant.editor.people.invitations import Invitations
 from action_assistant.editor.people.people import People
 from action_assistant.editor.rooms.colours import PersonColours

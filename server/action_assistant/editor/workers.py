@@ -23,7 +23,7 @@ _PRELOADED: Final = (
     "action_assistant.editor.crdt.trial",
     "action_assistant.editor.library.action_uses",
     "action_assistant.editor.interchange.action_packages",
-    "action_assistant.editor.subgraphs.subgraph_edits",
+    "action_assistant.editor.interchange.subgraphs",
     "action_assistant.journal.sqlite",
     "action_assistant.editor.history.graph_history",
     "action_assistant.editor.history.blame",

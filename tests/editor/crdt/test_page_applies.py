@@ -12,10 +12,9 @@ from typing import Any, Final, TypeAlias
 import pytest
 from pycrdt import Doc
 
-from action_assistant.editor.crdt.applying import Panicked
+from action_assistant.editor.crdt.applying import Panicked, clocks
 from action_assistant.editor.crdt.messages import Malformed, text
 from action_assistant.editor.crdt.replica import Replica, UpdateEffect
-from action_assistant.editor.crdt.updates.applied_updates import clocks
 from action_assistant.editor.crdt.updates.small_update import small_outline
 from action_assistant.editor.crdt.updates.update_scan import outline, stored_outline
 from action_assistant.editor.rooms.batch import merged

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, get_update, merge_updates
 
 from action_assistant.editor.crdt.messages import ByteReader, Malformed, number
-from action_assistant.editor.crdt.updates.update_content import DEEPEST
-from action_assistant.editor.crdt.updates.update_scan import outline
+from action_assistant.editor.crdt.updates.update_scan import DEEPEST, outline
 from action_assistant.editor.documents import document
 from action_assistant.editor.interchange import document_edits
 from action_assistant.umrf.model import Action, Graph

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text
 
 from action_assistant.editor.crdt import loading
+from action_assistant.editor.crdt.applying import clocks
 from action_assistant.editor.crdt.replica import Replica
-from action_assistant.editor.crdt.updates.applied_updates import clocks
 from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES, pieces_of
 from action_assistant.editor.crdt.updates.update_scan import stored_outline
 from action_assistant.editor.rooms.open_rooms import Rooms

@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from action_assistant.editor.history.edit_sessions import EditSession, Step, edit_sessions
+from action_assistant.editor.history.graph_history import EditSession, Step, edit_sessions
 from support.doses import examples
 
 _MORNING = datetime(2026, 11, 23, 8, tzinfo=UTC)

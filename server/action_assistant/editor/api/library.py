@@ -14,7 +14,7 @@ from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.interchange.importing import ImportReport, Preview
 from action_assistant.editor.library import library_updates
 from action_assistant.editor.library.action_uses import GraphAsAction, LibraryAction
-from action_assistant.editor.library.library_edits import GraphMoment, UpdatedGraph
+from action_assistant.editor.library.library import GraphMoment, UpdatedGraph
 from action_assistant.editor.library.library_updates import ActionUse
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorState

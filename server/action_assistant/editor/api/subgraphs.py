@@ -1,27 +1,31 @@
-"""Routes that make a sub-graph of chosen actions, and unpack one again."""
+"""Routes of sub-graphs: make one of chosen actions, unpack one, and flatten a graph with all of its own."""
 
 import asyncio
 from typing import Annotated, Any
 
 import msgspec
-from litestar import Request, Response, post
+from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
+from action_assistant.editor.api.graphs import Seq
 from action_assistant.editor.catalogue.catalogue import GraphView, fit
-from action_assistant.editor.documents.contents import GraphAtSeq
+from action_assistant.editor.documents.contents import GraphAtSeq, Inside
 from action_assistant.editor.interchange.edited_text import KeyChange
-from action_assistant.editor.services import EditorServices, EditorState
-from action_assistant.editor.subgraphs.subgraph_edits import (
+from action_assistant.editor.interchange.subgraphs import (
     ChosenActions,
     ExtractionLook,
+    FlatGraph,
     UnpackingLook,
     extraction_look,
+    flat_graph,
+    flat_text,
     name_of_action,
     subgraph_file,
     unpacking_look,
 )
+from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
-from action_assistant.errors import NotFound
+from action_assistant.errors import Conflict, NotFound
 from action_assistant.umrf.model import Key, Position
 from action_assistant.web.auth.access import Needs, person_of
 
@@ -69,6 +73,13 @@ class CalledUses(msgspec.Struct, frozen=True):
     changed: tuple[str, ...]
 
 
+class FlatCopy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A request to flatten a graph after its change `seq` into a new graph called `name`."""
+
+    seq: int
+    name: str
+
+
 async def _chosen(
     services: EditorServices, graph: str, data: Extracting
 ) -> tuple[GraphAtSeq, ChosenActions]:
@@ -82,7 +93,7 @@ async def _chosen(
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes that make sub-graphs of actions, and that unpack them."""
+    """Return the routes that make sub-graphs of actions, unpack them, and flatten graphs."""
     # If two people make a sub-graph of the same name at once, the second is refused.
     making = asyncio.Lock()
 
@@ -156,4 +167,51 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
             await services.catalogue.call_uses(data.graphs, data.before, data.name, person.id)
         )
 
-    return [look_at_extraction, make_subgraph, look_at_unpacking, call_uses]
+    return [*_flat(app_state), look_at_extraction, make_subgraph, look_at_unpacking, call_uses]
+
+
+async def _whole(
+    services: EditorServices, graph: str, seq: int | None
+) -> tuple[GraphAtSeq, Inside]:
+    """Return a graph after its change `seq` (None: the newest), with the present state of all
+    graphs inside. `graph`: its id.
+
+    Raise NotFound if there is no such graph; Conflict if it has no such change, or if more graphs
+    are inside of it than are looked at; Unavailable if the log cannot be read.
+    """
+    await services.catalogue.require(graph, "graph")
+    sight = await services.graph_reader.moment(graph, seq)
+    inside = await services.graph_checks.inside(sight)
+    if inside.cut:
+        raise Conflict("More graphs are inside of it than are looked at.")
+    return sight, inside
+
+
+def _flat(app_state: EditorState) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/graphs/{graph_id:str}/flat",
+        summary="A graph and those inside of it as one graph that does the same, or why there is none",
+        operation_id="getFlatGraph",
+    )
+    async def get_flat(graph_id: str, at: Seq | None = None) -> FlatGraph:
+        services = app_state.services
+        whole = await _whole(services, graph_id, at)
+        return encoded(FlatGraph, await services.graph_reader.ask(flat_graph, *whole))
+
+    @post(
+        "/api/graphs/{graph_id:str}/flat",
+        summary="Make a new graph of a graph and those inside of it",
+        operation_id="makeFlatGraph",
+        guards=[Needs("edit")],
+    )
+    async def make_flat(
+        graph_id: str, request: Request[Any, Any, Any], data: FlatCopy
+    ) -> Response[GraphView]:
+        services, person = app_state.services, person_of(request)
+        whole = await _whole(services, graph_id, data.seq)
+        await services.people.seen(person)
+        text = await services.graph_reader.ask(flat_text, *whole, data.name)
+        made, _ = await services.catalogue.create(text, person.id)
+        return Response(made, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
+
+    return [get_flat, make_flat]

@@ -8,8 +8,8 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.graphs import Seq
 from action_assistant.editor.catalogue.versions import InsideView, VersionView
+from action_assistant.editor.interchange.subgraphs import zipped
 from action_assistant.editor.services import EditorState
-from action_assistant.editor.subgraphs.subgraph_files import packed
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.openapi import FileBytes, answer
 
@@ -79,7 +79,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id)
         inside = await services.versions.inside(graph_id, at)
         graphs = [(each.name, bytes(each.umrf)) for each in inside.subgraphs]
-        made = await services.workers.files(packed, graphs)
+        made = await services.workers.files(zipped, graphs)
         return Response(
             made,
             media_type="application/zip",

@@ -1,11 +1,19 @@
-"""Calls of the CRDT library with foreign bytes: translates its errors, and applies updates with less overhead."""
+"""Calls of the CRDT library with foreign bytes: applies updates, translates errors, and checks afterwards.
 
+The checks find what the library takes otherwise than Yjs in a page does.
+"""
+
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from typing import Any, Final
 
 from pycrdt import Doc
 
-from action_assistant.editor.crdt.messages import Malformed
+from action_assistant.editor.crdt.messages import ByteReader, Malformed, number
+from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
+from action_assistant.editor.crdt.updates.update_scan import cut_items
+
+_KIND: Final = 31  # the bits of a struct that say what it is; none of them: it was collected
 
 
 class Panicked(Exception):
@@ -54,3 +62,45 @@ def apply_updates(doc: "Doc[Any]", *updates: bytes) -> None:
     finally:
         transaction.commit()
         transaction.drop()
+
+
+def check_cut_items(
+    doc: "Doc[Any]", update: bytes, read: UpdateOutline, known: Mapping[int, int]
+) -> None:
+    """Raise Malformed if an item continues a struct of which only the length is left, since Yjs
+    fails at that."""
+    if not any(start < known.get(client, 0) < end for client, start, end in read.brings):
+        return
+    for client in cut_items(update, known):
+        clock = known[client] - 1
+        reader = ByteReader(doc.get_update(_state({**known, client: clock})))
+        found = [reader.number() for _ in range(4)]  # clients, structs, client, clock
+        if found == [1, 1, client, clock] and not reader.byte() & _KIND:
+            raise Malformed("an item that goes on from what was collected")
+
+
+def check_whole(doc: "Doc[Any]", read: UpdateOutline) -> None:
+    """Raise Panicked if the library has not applied all of an update, since structs of several
+    clients wait for each other."""
+    if len(read.brings) > 1:
+        reached = clocks(doc.get_state())
+        if any(reached.get(client, 0) < end for client, _, end in read.brings):
+            raise Panicked("structs that wait for each other")
+
+
+def check_unchanged(doc: "Doc[Any]", known: Mapping[int, int], error: Malformed) -> None:
+    """Raise Panicked if the library has refused an update after applying a part."""
+    if clocks(doc.get_state()) != {client: clock for client, clock in known.items() if clock}:
+        raise Panicked(f"partly applied: {error}") from error
+
+
+def clocks(state: bytes) -> dict[int, int]:
+    """Decode a state vector: the next clock of each client."""
+    reader = ByteReader(state)
+    return {reader.number(): reader.number() for _ in range(reader.number())}
+
+
+def _state(known: Mapping[int, int]) -> bytes:
+    """Encode a state vector in the format of Yjs."""
+    pairs = [number(client) + number(clock) for client, clock in known.items()]
+    return number(len(pairs)) + b"".join(pairs)

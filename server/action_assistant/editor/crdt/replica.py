@@ -11,19 +11,21 @@ from typing import Any, Final, Literal
 import msgspec
 from pycrdt import Doc
 
-from action_assistant.editor.crdt.applying import Panicked, apply_updates, applying
+from action_assistant.editor.crdt.applying import (
+    Panicked,
+    apply_updates,
+    applying,
+    check_cut_items,
+    check_unchanged,
+    check_whole,
+    clocks,
+)
 from action_assistant.editor.crdt.document_quota import DocumentQuota
 from action_assistant.editor.crdt.event_columns import EventColumns, EventRow
 from action_assistant.editor.crdt.messages import NO_CLOCKS, NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
 from action_assistant.editor.crdt.sound_updates import Clients, check_nothing_is_missing, lies_deep
-from action_assistant.editor.crdt.updates.applied_updates import (
-    check_cut_items,
-    check_unchanged,
-    check_whole,
-    clocks,
-)
 from action_assistant.editor.crdt.updates.paired_texts import (
     PairedTexts,
     has_paired_texts,

@@ -2,7 +2,9 @@
 
 A room reads every update as a whole before it is stored, and the chain proves that it is still the same.
 Opening a graph need not do that again: it asks whose the clients are, whether anything may lie deeper
-than in a root, and afterwards whether anything is missing. For workers: what a room never took may end them.
+than in a root, and afterwards whether anything is missing. The target for opening 100,000 changes, 0.5 s, needs
+that: a worker folds them in 0.27 s, and in 1.01 s where it reads each. For workers: what a room never took may
+end them.
 
 Rooms tell what waits, deletions too, as such, and did so before there was any data to keep. So the others
 build on what came before them, and those of one client come in their order: where one were missing, so would

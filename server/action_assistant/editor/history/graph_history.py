@@ -1,10 +1,14 @@
-"""The history of a graph: events of its two streams by session, with what each session changed."""
+"""The history of a graph: events of its two streams by session, with what each session changed.
 
-from collections.abc import Callable, Mapping, Sequence
+A session holds the edits of one person with short pauses.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime
-from typing import Any, Final, TypeAlias
+from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
 import msgspec
+from msgspec.structs import replace
 from sqlalchemy import Connection, Row, select
 
 from action_assistant.editor.catalogue.versions import VersionView, versions_by_event
@@ -12,12 +16,84 @@ from action_assistant.editor.documents.values import ends_of
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.change_summaries import Changes, Stretch, told
-from action_assistant.editor.history.edit_sessions import EditSession, Kind, Step, edit_sessions
 from action_assistant.editor.history.key_changes import LoggedChange, OverwrittenValue, owner_of
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people.people import stored_people
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.keys import PersonRef
+
+_ONE_GO: Final = 5 * 60  # seconds between two edits of one session
+
+Kind: TypeAlias = Literal[
+    "created",
+    "imported",
+    "edited",
+    "published",
+    "restored",
+    "reverted",
+    "adapted",
+    "merged",
+    "deleted",
+    "recovered",
+]
+
+
+class Step(NamedTuple):
+    """An event to be grouped. `seq`: the change of the document; None if it is none. `told`: for an
+    event about the graph, its seq in that other stream; 0 for a change."""
+
+    kind: Kind
+    author: str
+    at: datetime
+    seq: int | None
+    told: int = 0
+
+
+class EditSession(msgspec.Struct, frozen=True):
+    """The edits of one person between `at` and `until`, from the change `from_seq` to `seq`; others
+    may have edited in between. For an entry that is no edit, `from_seq` is None and `seq` is the
+    change before it."""
+
+    kind: Kind
+    author: str
+    at: datetime
+    until: datetime
+    seq: int
+    from_seq: int | None = None
+    told: int = 0
+
+
+def edit_sessions(steps: Iterable[Step]) -> list[EditSession]:
+    """Group steps, given in order of time, into sessions, sorted by their ends. A step that is no
+    edit ends all open sessions, since it may refer to the document at that time."""
+    done: dict[int, EditSession] = {}
+    open_of: dict[str, int] = {}
+    seq = 1
+    for number, step in enumerate(steps):
+        seq = step.seq or seq
+        if step.kind == "imported" and done:
+            before = done.popitem()[1]
+            done[number] = replace(before, kind="imported")
+        elif (
+            step.kind == "created" and done
+        ):  # a large file is stored before the graph that was made of it
+            continue
+        elif step.kind == "edited":
+            mine = done.pop(open_of.get(step.author, -1), None)
+            if mine is not None and (step.at - mine.until).total_seconds() >= _ONE_GO:
+                done[open_of[step.author]] = mine
+                mine = None
+            begun = EditSession("edited", step.author, step.at, step.at, seq, seq)
+            done[number] = begun if mine is None else replace(mine, until=step.at, seq=seq)
+            open_of[step.author] = number
+        else:
+            open_of.clear()
+            changed = seq if step.seq is not None and step.kind != "created" else None
+            done[number] = EditSession(
+                step.kind, step.author, step.at, step.at, seq, changed, step.told
+            )
+    return [done[number] for number in sorted(done)]
+
 
 _EVENTS: Final = (2_000, 10_000)  # that one answer looks at, if the fewer are not enough
 _CHANGES: Final = 20_000  # of keys that one answer tells of

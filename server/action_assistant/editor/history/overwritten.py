@@ -11,9 +11,8 @@ from typing import Any, Final, NamedTuple, cast
 
 from pycrdt import Doc, Map
 
-from action_assistant.editor.crdt.applying import applying
+from action_assistant.editor.crdt.applying import applying, clocks
 from action_assistant.editor.crdt.replica import Replica
-from action_assistant.editor.crdt.updates.applied_updates import clocks
 from action_assistant.editor.crdt.updates.update_scan import WrittenItem, WrittenUpdate, written
 from action_assistant.editor.documents.document import PLAIN, is_same
 from action_assistant.editor.documents.values import ROOTS, Root

@@ -1,23 +1,40 @@
-"""The action library: the actions that have a document, and those that graphs use, each name once."""
+"""The action library: the actions that have a document, and those that graphs use, each name once.
 
-from collections.abc import Callable
-from typing import Final
+Actions are made, imported, updated from graphs, and graphs updated from them.
+"""
 
+from collections.abc import Callable, Sequence
+from contextlib import AsyncExitStack
+from typing import Any, Final
+
+import anyio
+import msgspec
 from anyio import CapacityLimiter, Lock, create_task_group
 from sqlalchemy import select
 
+from action_assistant.editor.catalogue.catalogue import Catalogue, GraphView, fit
 from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.documents.contents import GraphAtSeq
+from action_assistant.editor.documents.document import new_aid
+from action_assistant.editor.library import library_updates
 from action_assistant.editor.library.action_uses import (
     NOTHING,
     ActionSource,
+    LibraryAction,
     as_actions,
     found,
     merged,
 )
+from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.log.graph_events import DocumentKind
+from action_assistant.editor.rooms.open_rooms import Rooms
+from action_assistant.editor.rooms.room import Room
+from action_assistant.errors import BadInput, Conflict
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
-from action_assistant.web.workers.lanes import HOPELESS
+from action_assistant.umrf.action_updates import Renames
+from action_assistant.umrf.model import Action
+from action_assistant.web.workers.lanes import HOPELESS, RunInWorker
 
 _AT_ONCE: Final = 4  # documents that are read
 
@@ -101,3 +118,231 @@ class Library:
             except HOPELESS:
                 actions = NOTHING
         self._read[graph] = seq, actions
+
+
+class NewAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A new action without parameters, or, with `from_graphs`, with the parameters that graphs use."""
+
+    name: str
+    description: str = ""
+    from_graphs: bool = False
+
+
+class GraphMoment(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A graph, and its change that a person has seen."""
+
+    graph: str
+    seq: int
+
+
+class UpdatedGraph(msgspec.Struct, frozen=True):
+    """A graph after an update of its uses. `seq`: its newest change; `changed`: whether that is new."""
+
+    graph: str
+    seq: int
+    changed: bool
+
+
+class LibraryEdits:
+    """Commands of people; each has been permitted already."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        rooms: Rooms,
+        graph_reader: GraphReader,
+        catalogue: Catalogue,
+        library: Library,
+        files: RunInWorker,
+    ) -> None:
+        self._journal = journal
+        self._rooms = rooms
+        self._graph_reader = graph_reader
+        self._catalogue = catalogue
+        self._library = library
+        self._files = files
+        self._making = anyio.Lock()
+
+    async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
+        """Create the document of an action from a `NewAction` or from a file; for a file also
+        return the JSON of an `ImportReport`. Raise BadInput, NotUmrf or TooLarge, with the
+        place, for a bad file; Conflict for a taken name; NotFound if no graph uses the action."""
+        try:
+            wanted = msgspec.json.decode(body, type=NewAction)
+        except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
+            return await self._bring(body, author)
+        name, description = fit(wanted.name, wanted.description)
+        action = Action(key=new_aid(), name=name, description=description)
+        if wanted.from_graphs:
+            known = await self._of_graphs(name)
+            action = msgspec.structs.replace(
+                known, key=action.key, description=description or known.description
+            )
+        about = h.GraphCreated(action.name, action.description, kind="action")
+        return await self._add(action, author, about), None
+
+    async def _bring(self, body: bytes, author: str) -> tuple[GraphView, bytes]:
+        found = await self._files(library_updates.brought, body)
+        name, description = fit(found.action.name, found.action.description)
+        about = h.GraphCreated(name, description, found.dialect, found.notes, "action")
+        action = msgspec.structs.replace(found.action, key=new_aid())
+        return await self._add(action, author, about, body), found.reading
+
+    async def _add(
+        self, action: Action, author: str, about: h.GraphCreated, file: bytes | None = None
+    ) -> GraphView:
+        async with self._making:  # of two of one name at a time, one is refused
+            for view in await self._catalogue.all(kind="action"):
+                if view.name == action.name:
+                    raise Conflict(
+                        f"The library has an action {action.name!r} already.",
+                        where={"graph": view.id},
+                    )
+            return await self._catalogue.add_action(action, author, about, file)
+
+    async def _of_graphs(self, name: str) -> Action:
+        sights = await self._using(name)
+        action: Action = await self._graph_reader.ask(library_updates.of_graphs, name, sights)
+        return action
+
+    async def uses(self, action: str, renames: Renames) -> tuple[int, bytes]:
+        """Return the action's last change, and the JSON of a list of `ActionUse` for it."""
+        sight = await self._graph_reader.now(action)
+        name = (await self._catalogue.get(action)).name
+        graphs = await self._using(name)
+        found: bytes = await self._graph_reader.ask(library_updates.uses, sight, graphs, renames)
+        return sight.seq, found
+
+    async def update_uses(
+        self, action: str, seq: int, graphs: Sequence[GraphMoment], renames: Renames, author: str
+    ) -> list[UpdatedGraph]:
+        """Update the uses in graphs to the action after its change `seq`, one edit for each graph.
+        Raise Conflict, before anything is written, if a graph has changed meanwhile."""
+        sight = await self._graph_reader.at(action, seq)
+        name = (await self._catalogue.get(action)).name
+        if len({each.graph for each in graphs}) < len(graphs):
+            raise BadInput("A graph is named twice.", where={"path": "/graphs"})
+        async with AsyncExitStack() as open_rooms:
+            updates: list[tuple[GraphMoment, Room, bytes]] = []
+            for each in graphs:
+                await self._catalogue.require(each.graph, "graph")
+                room = await open_rooms.enter_async_context(
+                    self._rooms.enter(h.graph_stream(each.graph))
+                )
+                then = await _seen(room, each)
+                update = await self._graph_reader.ask(
+                    library_updates.updating, sight, then, renames
+                )
+                updates.append((each, room, update))
+            for each, room, _ in updates:
+                if room.seq != each.seq:
+                    raise _changed(each, room.seq)
+            return [
+                await self._adapt(room, each.graph, update, author, sight, name)
+                for each, room, update in updates
+            ]
+
+    async def take(self, action: str, graph: str, aid: str | None, author: str) -> GraphView:
+        """Give an action of the library the parameters that its use in a graph has. Raise NotFound
+        if the action, the graph or the use does not exist."""
+        await self._catalogue.require(action, "action")
+        await self._catalogue.require(graph, "graph")
+        source = await self._graph_reader.now(graph)
+        name = (await self._catalogue.get(action)).name
+        async with self._rooms.enter(h.graph_stream(action)) as room:
+            sight = await _now(room, action)
+            update = await self._graph_reader.ask(library_updates.taking, sight, source, aid)
+            await self._adapt(room, action, update, author, source, name)
+        return await self._catalogue.get(action)
+
+    async def replacing_would(self, action: str, body: bytes) -> bytes:
+        """Return the JSON of the `Difference` that `replace` would make. Raises as `replace` does."""
+        await self._catalogue.require(action, "action")
+        sight = await self._graph_reader.now(action)
+        found: bytes = await self._files(library_updates.replacing_would, sight, body)
+        return found
+
+    async def replace(
+        self, action: str, body: bytes, author: str, seq: int | None = None
+    ) -> GraphView:
+        """Replace an action by the content of its file. Raise BadInput, NotUmrf or TooLarge, with
+        the place, for a bad file; Conflict for the file of another action, or if `seq` is not
+        the last change."""
+        await self._catalogue.require(action, "action")
+        name = (await self._catalogue.get(action)).name
+        async with self._rooms.enter(h.graph_stream(action)) as room:
+            sight = await _now(room, action)
+            if seq is not None and sight.seq != seq:
+                raise _changed(GraphMoment(action, seq), sight.seq, "action")
+            update = await self._files(library_updates.replacing, sight, body)
+            if seq is not None and room.seq != seq:
+                raise _changed(GraphMoment(action, seq), room.seq, "action")
+            await self._adapt(room, action, update, author, GraphAtSeq("", 0, b""), name)
+        return await self._catalogue.get(action)
+
+    async def built(self, action: str, build: h.ActionBuilt, author: str) -> None:
+        """Store the report of a build of an action's package. Raise NotFound if the action does not
+        exist."""
+        await self._catalogue.require(action, "action")
+        await self._journal.append(h.about_stream(action), [h.draft(h.BUILT, author, build)])
+
+    async def last_build(self, action: str) -> h.ActionBuilt | None:
+        """Return the last report of a build of an action's package; None if it was never built.
+        Raise NotFound if the action does not exist."""
+        await self._catalogue.require(action, "action")
+        event = editor_tables.editor_event.c
+        chosen = (
+            select(event.body)
+            .where(event.stream == h.about_stream(action), event.kind == h.BUILT)
+            .order_by(event.seq.desc())
+            .limit(1)
+        )
+        for row in await self._journal.query(chosen):
+            return msgspec.json.decode(row.body, type=h.ActionBuilt)
+        return None
+
+    async def _adapt(
+        self,
+        room: Room,
+        document: str,
+        update: bytes,
+        author: str,
+        source: GraphAtSeq,
+        name: str,
+    ) -> UpdatedGraph:
+        before = room.seq
+        seq = await room.submit(update, author)
+        if seq > before:
+            adapted = h.GraphAdapted(seq, source.graph, source.seq, name)
+            await self._journal.append(
+                h.about_stream(document), [h.draft(h.ADAPTED, author, adapted)]
+            )
+        return UpdatedGraph(document, seq, seq > before)
+
+    async def _using(self, name: str) -> list[GraphAtSeq]:
+        """Return the graphs that use an action, the last changed first."""
+        known = msgspec.json.decode(await self._library.all(), type=list[LibraryAction])
+        used_in = {graph for each in known if each.name == name for graph in each.used_in}
+        views = [view for view in await self._catalogue.all() if view.id in used_in]
+        return [await self._graph_reader.now(view.id) for view in views]
+
+
+async def _now(room: Room, document: str) -> GraphAtSeq:
+    return await room.read(lambda replica, seq: GraphAtSeq(document, seq, replica.state()))
+
+
+async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
+    """Return the graph that a person has seen. Raise Conflict if it has changed since."""
+    found = await _now(room, moment.graph)
+    if found.seq != moment.seq:
+        raise _changed(moment, found.seq)
+    return found
+
+
+def _changed(moment: GraphMoment, seq: int, what: DocumentKind = "graph") -> Conflict:
+    where: dict[str, Any] = {"graph": moment.graph}
+    return Conflict(
+        f"Somebody has changed this {what}: it was seen after its change {moment.seq}, and now has "
+        f"{seq}. Nothing was written.",
+        where=where,
+    )

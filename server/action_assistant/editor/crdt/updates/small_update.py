@@ -1,7 +1,9 @@
 """Reads small ordinary updates quickly: a few keys of one client, typed text, deletions.
 
-Several times quicker than the scanner, with which it always agrees (a property of the tests): it says
+Takes half the time of the scanner, with which it always agrees (a property of the tests): it says
 the same, or None where the scanner has to read. So it never says why something cannot be read.
+The target for dragging needs it: 50 people of whom 15 drag cost the server 3.2 µs for each delivered update,
+and 3.6 µs without it (`make performance ARGS=rooms`, medians of six runs of each in turn).
 Yjs update format, version 1. Every function takes the place where it reads from and returns the one
 after it; whoever skips beyond the end does not end at the end, which is looked at last.
 """

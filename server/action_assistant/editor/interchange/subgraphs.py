@@ -1,23 +1,34 @@
-"""Sub-graphs made of chosen actions, and unpacked again, as changes of a document key by key. For workers.
+"""Sub-graphs: made of chosen actions, unpacked, flattened and packed as files. For workers.
 
-The page makes the changes, so that they are an edit of the person's own; `before` lets it see what others
-changed meanwhile (docs/decisions/072-make-and-unpack-a-sub-graph.md).
+Actions are moved by changes of a document key by key. The page makes these changes, so that they are an edit of
+the person's own; `before` lets it see what others changed meanwhile
+(docs/decisions/072-make-and-unpack-a-sub-graph.md).
 """
+
+import io
+import zipfile
+from collections.abc import Iterable
+from typing import Final
 
 import msgspec
 from msgspec.structs import replace
 
 from action_assistant.editor.documents import document
-from action_assistant.editor.documents.contents import GraphAtSeq, read
+from action_assistant.editor.documents.contents import GraphAtSeq, Inside, graphs_of, read
 from action_assistant.editor.interchange.edited_text import KeyChange, key_changes
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.files.file_names import graph_file_name
 from action_assistant.umrf.hierarchy.extraction import Extracted, Extraction, extracted
+from action_assistant.umrf.hierarchy.flattening import FlatOrigin, LeftOut, Unflattenable, flattened
 from action_assistant.umrf.hierarchy.reasons import FlatteningReason
 from action_assistant.umrf.hierarchy.unpacking import Unpackable, unpacked
 from action_assistant.umrf.json.embedded import UmrfGraph
 from action_assistant.umrf.model import Key, Position
 from action_assistant.umrf.signatures import signature_of
+
+_LONG_AGO: Final = (1980, 1, 1, 0, 0, 0)  # the same files are the same bytes
+_MODE: Final = 0o644 << 16
 
 
 class ChosenActions(msgspec.Struct, frozen=True):
@@ -143,3 +154,62 @@ def name_of_action(sight: GraphAtSeq, action: Key) -> str:
         if each.key == action and not each.missing:
             return each.name
     raise NotFound("That action is not there any more.")
+
+
+class FlatGraph(msgspec.Struct, frozen=True):
+    """A graph with its sub-graphs, flattened into one graph (docs/decisions/069-flatten.md).
+
+    `umrf`: the flat graph, under the same name; null if none is known to do the same, for the
+    `reasons`. `origins`: the graph and action from which each action comes. `left_out`: fields that
+    are lost.
+    """
+
+    seq: int
+    umrf: UmrfGraph | None
+    origins: tuple[FlatOrigin, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+    reasons: tuple[FlatteningReason, ...] = ()
+
+
+def flat_graph(sight: GraphAtSeq, inside: Inside) -> bytes:
+    """Flatten a graph; return JSON of a `FlatGraph`."""
+    found = flattened(read(sight).moment.graph, graphs_of(inside))
+    if isinstance(found, Unflattenable):
+        return msgspec.json.encode(FlatGraph(sight.seq, None, reasons=found.reasons))
+    umrf = msgspec.Raw(codec.write(found.graph).encode())
+    return msgspec.json.encode(FlatGraph(sight.seq, umrf, found.origins, found.left_out))
+
+
+def flat_text(sight: GraphAtSeq, inside: Inside, name: str) -> bytes:
+    """Return the UMRF of the flat graph under another name; its description names its source. Raise
+    Conflict if no flat graph does the same."""
+    graph = read(sight).moment.graph
+    found = flattened(graph, graphs_of(inside))
+    if isinstance(found, Unflattenable):
+        raise Conflict(f"One graph would not do the same: {found.reasons[0].message}")
+    made_of = f"Made of {graph.name} (change {sight.seq}) and the graphs inside of it."
+    described = "\n".join(filter(None, (found.graph.description, made_of)))
+    return codec.write(replace(found.graph, name=name, description=described)).encode()
+
+
+def zipped(graphs: Iterable[tuple[str, bytes]]) -> bytes:
+    """Return a ZIP file with one file for each of these graphs, given by name and text. The files are named so
+    that an engine indexes them: `*graph.json`."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as file:
+        taken: set[str] = set()
+        for name, text in graphs:
+            entry = zipfile.ZipInfo(_free_name(name, taken), _LONG_AGO)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = _MODE
+            file.writestr(entry, text)
+    return made.getvalue()
+
+
+def _free_name(graph: str, taken: set[str]) -> str:
+    """Return a file name that is not taken, also where a file system ignores case."""
+    number = 1
+    while (name := graph_file_name(graph, number)).lower() in taken:
+        number += 1
+    taken.add(name.lower())
+    return name

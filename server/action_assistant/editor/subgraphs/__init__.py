@@ -1,1 +1,0 @@
-"""Sub-graphs: made of actions, unpacked, downloaded and flattened."""
