@@ -18,7 +18,7 @@ from action_assistant.paths import examples
 from action_assistant.runner.archives import examples as recorded_runs
 from action_assistant.runner.emulator.engine import EmulatedEngine
 from action_assistant.runner.emulator.messages import EngineTraits, Start, index_of
-from action_assistant.runner.execution import start_pipeline
+from action_assistant.runner.execution import start_checks
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.recorder import stream_of
@@ -212,11 +212,11 @@ async def played(story: Story, begins: int) -> bytes:
 @contextmanager
 def _named(name: str) -> Iterator[None]:
     """Ids are drawn by chance; those of examples are always the same."""
-    drawn, start_pipeline.random_id = start_pipeline.random_id, lambda: f"example-{name}"
+    drawn, start_checks.random_id = start_checks.random_id, lambda: f"example-{name}"
     try:
         yield
     finally:
-        start_pipeline.random_id = drawn
+        start_checks.random_id = drawn
 
 
 def recorded() -> dict[str, bytes]:

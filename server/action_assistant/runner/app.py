@@ -28,7 +28,7 @@ from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.execution.start_pipeline import StartSources
+from action_assistant.runner.execution.start_checks import StartSources
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach

@@ -7,7 +7,7 @@ from pathlib import Path
 import anyio
 
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.execution.start_pipeline import StartSources
+from action_assistant.runner.execution.start_checks import StartSources
 from action_assistant.runner.links.port import Answer, Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.start.index_writer import IndexWriter

@@ -10,7 +10,7 @@ import pytest
 
 from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.execution.start_pipeline import StartSources
+from action_assistant.runner.execution.start_checks import StartSources
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import IndexWriteAsked, IndexWritten

@@ -12,7 +12,6 @@ import anyio
 import msgspec
 
 from action_assistant.errors import NotFound, Refused
-from action_assistant.kit.clock import ClockUs
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -25,8 +24,8 @@ from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs.events import MovesAgain
 from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.preflight import Settled
-from action_assistant.web.auth.caller import BackgroundTasks
 
 log: Final = logging.getLogger(__name__)
 
@@ -46,14 +45,13 @@ class LateActivity:
         runs: OpenRuns,
         history: RunHistory,
         robots: Robots,
-        tasks: BackgroundTasks,
-        clock_us: ClockUs,
+        runtime: Runtime,
     ) -> None:
         self._runs = runs
         self._history = history
         self._robots = robots
-        self._tasks = tasks
-        self._clock_us = clock_us
+        self._tasks = runtime.tasks
+        self._clock_us = runtime.clock_us
         self._looking: set[tuple[str, str]] = set()  # robots and runs
         self._waiting: deque[tuple[KnownEngine, Snapshot, str]] = deque()
         self._news = anyio.Event()

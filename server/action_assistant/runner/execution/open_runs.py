@@ -5,7 +5,6 @@ from typing import Final
 
 import anyio
 
-from action_assistant.kit.clock import ClockUs
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.logs.context import begin
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -13,11 +12,10 @@ from action_assistant.runner.links.port import ForeignCommand, Link, Order
 from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import MovesAgain
-from action_assistant.runner.runs.history import RunHistory, RunnerJournal
+from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.stop.loading import LoadingTimes
-from action_assistant.web.auth.caller import BackgroundTasks
-from action_assistant.web.workers.lanes import RunInWorker
 
 _CLOSED: Final = 200  # newest runs that are over and kept in memory
 
@@ -27,25 +25,13 @@ class OpenRuns:
     still driven; `closed`: the newest ones that were driven to their end, each with the seq of its
     last event."""
 
-    def __init__(
-        self,
-        journal: RunnerJournal,
-        robots: Robots,
-        history: RunHistory,
-        *,
-        clock_us: ClockUs,
-        tasks: BackgroundTasks,
-        run_in_worker: RunInWorker,
-    ) -> None:
+    def __init__(self, robots: Robots, history: RunHistory, runtime: Runtime) -> None:
         self.by_id: Final[dict[str, OpenRun]] = {}
         self.last_number = 0
         self.closed: Final[LruCache[str, tuple[Run, int]]] = LruCache(_CLOSED)
-        self._journal = journal
         self._robots = robots
         self._history = history
-        self._clock_us = clock_us
-        self._tasks = tasks
-        self._run_in_worker = run_in_worker
+        self._runtime = runtime
         self._loading_times = LoadingTimes()
         self._watchers: list[Callable[[OpenRun], None]] = []
         self._news = anyio.Event()
@@ -67,10 +53,10 @@ class OpenRuns:
             if link is not None
             else UnreachableLink("there is no link to this robot any more"),
             owns_link=owns_link,
-            store=self._journal,
+            store=self._runtime.journal,
             seq=seq,
-            clock_us=self._clock_us,
-            run_in_worker=self._run_in_worker,
+            clock_us=self._runtime.clock_us,
+            run_in_worker=self._runtime.run_in_worker,
             changed=self._changed,
             loading_times=self._loading_times,
         )
@@ -81,7 +67,7 @@ class OpenRuns:
     def drive(self, opened: OpenRun, order: Order | None = None, incarnation: str = "") -> None:
         """Drive an open run in a task of its own. With an order, first start it, exactly once, in
         the life `incarnation` of the engine; without one, continue from its present state."""
-        self._tasks.start_soon(self._drive, opened, order, incarnation)
+        self._runtime.tasks.start_soon(self._drive, opened, order, incarnation)
 
     async def _drive(self, opened: OpenRun, order: Order | None, incarnation: str) -> None:
         begin({"run": opened.run.id})
@@ -138,7 +124,7 @@ class OpenRuns:
         was sent by somebody else."""
         found = self.by_id.items()
         return {
-            run: each for run, each in found if each.run.engine == engine and each.run.end is None
+            run: each for run, each in found if engine in each.run.robots and each.run.end is None
         }
 
     def occupying(self, engine: str, graph_name: str = "") -> Run | None:

@@ -17,25 +17,21 @@ from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.execution.start_pipeline import (
-    NO_SOURCES,
-    Grouped,
-    Started,
-    StartPipeline,
-    StartSources,
-)
+from action_assistant.runner.execution.start_checks import NO_SOURCES, StartChecks, StartSources
+from action_assistant.runner.execution.start_pipeline import Grouped, Started, StartPipeline
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registration import Robot, registration_of
-from action_assistant.runner.robots.registry import RegistryContext, Robots
+from action_assistant.runner.robots.registry import RobotListeners, Robots
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended
 from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import GroupRequest, StartRequest
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import StopOrder
@@ -58,50 +54,34 @@ class ExecutionService:
 
     def __init__(
         self,
-        journal: RunnerJournal,
         robots: Robots,
+        runtime: Runtime,
         *,
-        clock_us: ClockUs,
-        tasks: BackgroundTasks,
-        run_in_worker: RunInWorker,
         simulator: Simulator,
-        past: Past | None = None,
-        sources: StartSources = NO_SOURCES,
+        past: Past | None,
+        sources: StartSources,
     ) -> None:
         self.robots = robots
-        self.history = RunHistory(journal, past)
-        self.approvals: Final = Approvals(journal, clock_us)
-        self._journal, self._clock_us = journal, clock_us
-        self._tasks, self._run_in_worker = tasks, run_in_worker
+        self.history = RunHistory(runtime.journal, past)
+        self.approvals: Final = Approvals(runtime.journal, runtime.clock_us)
+        self._runtime = runtime
         self._robot_watchers: list[Callable[[], None]] = []
         self._stops = StopOrder()
-        self.foreign_stops: Final = ForeignStopLoop(
-            robots, tasks, clock_us, run_in_worker, self._robots_changed
-        )
-        self._runs = OpenRuns(
-            journal,
-            robots,
-            self.history,
-            clock_us=clock_us,
-            tasks=tasks,
-            run_in_worker=run_in_worker,
-        )
+        self.foreign_stops: Final = ForeignStopLoop(robots, runtime, self._robots_changed)
+        self._runs = OpenRuns(robots, self.history, runtime)
         self.open: Final = self._runs.by_id
-        self._late_activity = LateActivity(self._runs, self.history, robots, tasks, clock_us)
-        self._starts = StartPipeline(
+        self._late_activity = LateActivity(self._runs, self.history, robots, runtime)
+        self._checks = StartChecks(
             self._runs,
             self._late_activity,
             robots,
             self.foreign_stops,
-            journal,
+            runtime,
             approvals=self.approvals,
-            stops=self._stops,
-            clock_us=clock_us,
-            tasks=tasks,
-            run_in_worker=run_in_worker,
             simulator=simulator,
             sources=sources,
         )
+        self._starts = StartPipeline(self._runs, self._checks, self._stops, runtime)
 
     @classmethod
     @asynccontextmanager
@@ -120,16 +100,8 @@ class ExecutionService:
         `past` reads runs that are over; `simulator` makes links to simulated engines; `sources`
         are the behaviours, expected courses and index folders that starts need."""
         async with anyio.create_task_group() as tasks:
-            control = cls(
-                journal,
-                robots,
-                clock_us=clock_us,
-                tasks=BackgroundTasks(tasks),
-                run_in_worker=run_in_worker,
-                simulator=simulator,
-                past=past,
-                sources=sources,
-            )
+            runtime = Runtime(journal, clock_us, BackgroundTasks(tasks), run_in_worker)
+            control = cls(robots, runtime, simulator=simulator, past=past, sources=sources)
             await control._take_up()
             try:
                 yield control
@@ -164,7 +136,7 @@ class ExecutionService:
     async def look(self, group: GroupRequest, starter: str = "") -> list[Preflight]:
         """Return the pre-flight of a start on each engine; `starter` is the id of the person who
         would start. Only a get is sent."""
-        return await self._starts.look(group, starter)
+        return await self._checks.look(group, starter)
 
     def under_way(self, request_id: str) -> bool:
         """Return whether the start, or the start of a group, with this request id is being carried
@@ -238,7 +210,7 @@ class ExecutionService:
             author,
             engine=engine,
             approvals=self.approvals,
-            run_in_worker=self._run_in_worker,
+            run_in_worker=self._runtime.run_in_worker,
         )
 
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
@@ -275,7 +247,7 @@ class ExecutionService:
     async def _over(self, run: str) -> Row[Any]:
         """Return `state` and `simulated` of a run from the table. Raise NotFound if there is no
         such run, Unavailable if the journal cannot be read."""
-        rows = await self._journal.query(queries.of_run(run))
+        rows = await self._runtime.journal.query(queries.of_run(run))
         if not rows:
             raise NotFound("There is no such run.")
         return rows[0]
@@ -294,14 +266,14 @@ class ExecutionService:
         """Register a robot, or change its registration. Raise BadInput if the registration is not
         valid, Conflict if the robot is in use or has the simulator's name, Unavailable if the
         journal cannot store it."""
-        async with self._starts.turn(asked.name):
+        async with self._starts.turns([asked.name]):
             self._check_unused(asked.name)
             return await self.robots.register(asked, author)
 
     async def remove(self, robot: str, author: Author) -> None:
         """Remove a robot from the registry. Raise NotFound if the robot is not registered, Conflict
         if it is in use, Unavailable if the journal cannot store that."""
-        async with self._starts.turn(robot):
+        async with self._starts.turns([robot]):
             self._check_unused(robot)
             await self.robots.remove(robot, author)
 
@@ -348,21 +320,14 @@ class ExecutionService:
     async def _take_up(self) -> None:
         """Take over the robots, the open runs and the Stops of foreign graphs that an earlier
         process left. Stops that were wanted go on; no run is started."""
-        self._runs.last_number = (await self._journal.query(queries.last_number()))[0][0]
-        context = RegistryContext(
-            self._journal,
-            self._tasks,
-            self._clock_us,
-            self._run_in_worker,
-            self._robots_changed,
-            self._hear_of,
-            self._show,
+        self._runs.last_number = (await self._runtime.journal.query(queries.last_number()))[0][0]
+        self._runtime.tasks.start_soon(self._late_activity.run)
+        self.robots.open(
+            self._runtime, RobotListeners(self._robots_changed, self._hear_of, self._show)
         )
-        self._tasks.start_soon(self._late_activity.run)
-        self.robots.open(context)
-        for row in await self._journal.query(queries.all_robots()):
+        for row in await self._runtime.journal.query(queries.all_robots()):
             self.robots.add(registration_of(row))
-        for row in await self._journal.query(queries.open_runs()):
+        for row in await self._runtime.journal.query(queries.open_runs()):
             run, seq, is_whole = await self.history.left(row.id)
             if run is None or run.end is not None:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)
@@ -377,7 +342,7 @@ class ExecutionService:
         link = self.robots.link(run.engine)
         opened = self._runs.open(run, link, owns_link=False, seq=seq)
         if run.simulated:
-            opened.tell(Ended(self._clock_us(), "lost", None, _LOST))
+            opened.tell(Ended(self._runtime.clock_us(), "lost", None, _LOST))
         elif not is_whole:
             log.error("run %s: some of its events cannot be read", run.id)
             opened.lose("Some of what was recorded of this run cannot be read.")

@@ -14,91 +14,22 @@ A start happens at most once: it is never retried and never queued. A refusal be
 nothing behind, and a start that cannot be stored is not sent.
 """
 
-import os
-from collections.abc import Awaitable, Callable, Mapping, Sequence
-from contextlib import AsyncExitStack
-from functools import partial
-from pathlib import Path
-from typing import Final, TypeAlias
+from collections.abc import AsyncIterator, Iterable, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
 
 import anyio
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
-from action_assistant.kit.clock import ClockUs
+from action_assistant.errors import BadInput, Refused
 from action_assistant.random_ids import random_id
-from action_assistant.ros_workspace import Workspace
-from action_assistant.runner.analysis.course_checks import CheckedCourses
-from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.open_runs import OpenRuns
-from action_assistant.runner.links.behaviours.folder import BehaviourFolder
-from action_assistant.runner.links.port import (
-    SIMULATOR,
-    Answer,
-    GraphOutline,
-    Link,
-    NoAnswer,
-    Order,
-)
-from action_assistant.runner.links.simulator import Simulator
-from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs.events import Author, Overridden, Requested
-from action_assistant.runner.runs.history import RunnerJournal
+from action_assistant.runner.execution.start_checks import AcceptedStart, StartChecks
+from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Order
+from action_assistant.runner.runs.events import Author, Requested
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.runs.sent_graphs import SentSubgraph
-from action_assistant.runner.start import preflight
-from action_assistant.runner.start.admission import (
-    GroupRequest,
-    Prepared,
-    StartRequest,
-    prepared,
-)
-from action_assistant.runner.start.approvals import Approvals
+from action_assistant.runner.runtime import Runtime
+from action_assistant.runner.start.admission import GroupRequest, StartRequest
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder
-from action_assistant.runner.start.preflight import EngineView, Item, Preflight
-from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
-from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
-from action_assistant.web.auth.caller import BackgroundTasks
-from action_assistant.web.workers.lanes import RunInWorker
-
-#: Facts of the simulator when it plays no robot: there a paused run can be stopped.
-_SIMULATOR_FACTS: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
-_GET_S: Final = 2.0
-_COURSES_S: Final = 5.0  # a pre-flight waits at most so long for expected courses
-_MOST_OVERRIDDEN: Final = 40  # overridden problems that are stored with a run
-
-#: Checks the expected courses of a graph, by its id, against a text of it and the graphs inside.
-CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[CheckedCourses]]
-
-
-class StartSources(msgspec.Struct, frozen=True):
-    """Further sources that a start needs: the folder of Python `behaviours`, the check of expected
-    `courses`, and the index folders by robot."""
-
-    behaviours: BehaviourFolder | None = None
-    courses: CoursesOf | None = None
-    index_folders: Mapping[str, Path] = {}
-
-
-NO_SOURCES: Final = StartSources()
-
-
-class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
-    """A start that nothing prevents. It goes over `link`, which the run owns if simulated, to the
-    life `incarnation` of the engine. `despite`: problems that a person overrides."""
-
-    request: StartRequest
-    prepared: Prepared
-    link: Link
-    is_simulated: bool
-    incarnation: str
-    despite: tuple[Overridden, ...] = ()
-
-    @property
-    def overridden(self) -> tuple[str, ...]:
-        """The codes of problems that the starter overrides."""
-        return self.request.override.codes if self.request.override else ()
 
 
 class Started(msgspec.Struct, frozen=True):
@@ -118,38 +49,17 @@ class Grouped(msgspec.Struct, frozen=True):
 
 
 class StartPipeline:
-    """Carries out starts and pre-flights. `stops`: knows the Stops pressed since a start was
-    requested; `turns`: the lock of each robot, also held by work that must not overlap a start."""
+    """Carries out starts. `stops`: knows the Stops pressed since a start was requested."""
 
     def __init__(
-        self,
-        runs: OpenRuns,
-        late_activity: LateActivity,
-        robots: Robots,
-        foreign_stops: ForeignStopLoop,
-        journal: RunnerJournal,
-        *,
-        approvals: Approvals,
-        stops: StopOrder,
-        clock_us: ClockUs,
-        tasks: BackgroundTasks,
-        run_in_worker: RunInWorker,
-        simulator: Simulator,
-        sources: StartSources,
+        self, runs: OpenRuns, checks: StartChecks, stops: StopOrder, runtime: Runtime
     ) -> None:
         self._runs = runs
-        self._late_activity = late_activity
-        self._robots = robots
-        self._foreign_stops = foreign_stops
-        self._approvals = approvals
+        self._checks = checks
         self._stops = stops
-        self._clock_us = clock_us
-        self._run_in_worker = run_in_worker
-        self._simulator = simulator
-        self._sources = sources
-        self._claims = IdempotentStarts(journal, tasks, clock_us)
+        self._clock_us = runtime.clock_us
+        self._claims = IdempotentStarts(runtime.journal, runtime.tasks, runtime.clock_us)
         self._turns: dict[str, anyio.Lock] = {}
-        self._prefixes = Workspace.of(os.environ).prefixes
 
     async def start(self, request: StartRequest, author: Author) -> Started:
         """Carry out a start, at most once per request id. Return after the one start message has
@@ -159,10 +69,8 @@ class StartPipeline:
             known = await self._known(request)
             if known is not None:
                 return Started(known, fresh=False)
-            async with AsyncExitStack() as turns:
-                if request.engine != SIMULATOR:
-                    await turns.enter_async_context(self.turn(request.engine))
-                accepted = await self._accept(request, author.id)
+            async with self.turns(() if request.engine == SIMULATOR else (request.engine,)):
+                accepted = await self._checks.accept(request, author.id)
                 run = await self._store_and_hand_over(accepted, author, stops)
             return Started(run, fresh=True)
 
@@ -183,37 +91,21 @@ class StartPipeline:
                 ]
                 failed = dict.fromkeys(missing, "It was not started with the others.")
                 return Grouped(known[0].group or "", known, failed, fresh=False)
-            async with AsyncExitStack() as turns:
-                for each in requests:  # in the order of their names, so that no two groups wait
-                    await turns.enter_async_context(self.turn(each.engine))
-                accepted = await self._accept_all(requests, author.id)
+            async with self.turns(group.engines):
+                accepted = await self._checks.accept_all(requests, author.id)
                 return await self._hand_over_group(accepted, author, stops)
-
-    async def look(self, group: GroupRequest, starter: str) -> list[Preflight]:
-        """Return the pre-flight of a start on each engine; `starter` is the id of the person who
-        would start. A refusal becomes an item of the pre-flight. Nothing is stored, and only a
-        get is sent."""
-        found: dict[str, Preflight] = {}
-        courses: list[Item] = []
-
-        async def look(engine: str) -> None:
-            found[engine] = await self._look(group.for_engine(engine), starter)
-
-        async def check_courses() -> None:
-            courses.extend(await self._course_items(group))
-
-        async with anyio.create_task_group() as tasks:
-            tasks.start_soon(check_courses)
-            for engine in group.engines:
-                tasks.start_soon(look, engine)
-        return [preflight.with_items(found[engine], courses) for engine in group.engines]
 
     # --- claim --------------------------------------------------------------------------------
 
-    def turn(self, engine: str) -> anyio.Lock:
-        """Return the lock of a robot, which allows one start at a time, and none during a new
-        registration."""
-        return self._turns.setdefault(engine, anyio.Lock())
+    @asynccontextmanager
+    async def turns(self, robots: Iterable[str]) -> AsyncIterator[None]:
+        """Keep these robots for one start, or for a change of their registration, until the end of
+        the block. They are locked in the order of their names, so that no two callers wait for each
+        other."""
+        async with AsyncExitStack() as held:
+            for robot in sorted(robots):
+                await held.enter_async_context(self._turns.setdefault(robot, anyio.Lock()))
+            yield
 
     def is_under_way(self, request_id: str) -> bool:
         """Return whether the start, or the start of a group, with this request id is being carried
@@ -226,157 +118,6 @@ class StartPipeline:
         run = await self._claims.run_of(request)
         return None if run is None else await self._runs.find(run)
 
-    # --- read, check, ask the engine, decide ----------------------------------------------------
-
-    async def _accept(self, request: StartRequest, starter: str) -> AcceptedStart:
-        """Take a request through all stages that may refuse it. Raise a subclass of Refused if one
-        stage does."""
-        if request.engine == SIMULATOR:
-            return await self._accept_simulation(request)
-        robot = self._robots.reachable(request.engine)
-        if request.like is not None:
-            raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
-        if request.behaviours:
-            raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
-        ready = await self._run_in_worker(prepared, request, robot.facts, random_id())
-        await self._check(request, ready, robot, starter)
-        try:
-            view = await self._ask(robot)
-        except NoAnswer as nothing:
-            silence = preflight.silence_item(request.engine, str(nothing))
-            raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
-                nothing
-            )
-        return await self._decide(request, ready, robot, view)
-
-    async def _accept_all(
-        self, requests: Sequence[StartRequest], starter: str
-    ) -> list[AcceptedStart]:
-        """Accept the starts on several engines side by side. Raise Conflict, with the reasons of
-        all engines, if at least one start is refused."""
-        accepted: dict[str, AcceptedStart] = {}
-        refused: dict[str, Refused] = {}
-
-        async def accept(each: StartRequest) -> None:
-            try:
-                accepted[each.engine] = await self._accept(each, starter)
-            except Refused as why:
-                refused[each.engine] = why
-
-        async with anyio.create_task_group() as tasks:
-            for each in requests:
-                tasks.start_soon(accept, each)
-        if refused:
-            reasons = " ".join(f"{name}: {why.detail}" for name, why in sorted(refused.items()))
-            engines = {name: why.where or {} for name, why in refused.items()}
-            raise Conflict(
-                f"Nothing was started. {reasons}", where={"path": "/engines", "engines": engines}
-            )
-        return [accepted[each.engine] for each in requests]
-
-    async def _accept_simulation(self, request: StartRequest) -> AcceptedStart:
-        facts = self._simulated_facts(request)
-        ready = await self._run_in_worker(prepared, request, facts, random_id())
-        behaviours = await self._behaviours_for(ready) if request.behaviours else None
-        link = self._simulator(facts, ready.script, self._clock_us, behaviours)
-        return AcceptedStart(
-            request=request,
-            prepared=ready,
-            link=link,
-            is_simulated=True,
-            incarnation=link.standing.incarnation,
-            despite=_overridden(ready, ()),
-        )
-
-    async def _check(
-        self, request: StartRequest, ready: Prepared, robot: KnownEngine, starter: str
-    ) -> None:
-        """Make all checks that need no answer of the engine. Raise Conflict if one of them fails."""
-        await self._approvals.require(robot.registration, ready.tree_digest, starter)
-        overridden = request.override.codes if request.override else ()
-        preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
-        if self._foreign_stops.is_stopping(request.engine):
-            raise Conflict(
-                f"Something is being stopped on {request.engine}; a start would be stopped with it.",
-                where={"path": "/engine", "item": "quiet"},
-            )
-
-    async def _ask(self, robot: KnownEngine) -> EngineView:
-        """Send a get to the engine, on the path that would confirm a Stop, after it has read its
-        new index files; return its answer with what is known of it. Raise NoAnswer if none comes
-        in time."""
-        await robot.indexed()
-        name, began = robot.registration.name, anyio.current_time()
-        open_runs = frozenset(self._runs.on(name))  # before the get: a run may move again meanwhile
-        answer: Answer
-        try:
-            with anyio.fail_after(_GET_S):
-                answer = await robot.get()
-        except TimeoutError as late:
-            raise NoAnswer(f"Asked for {_GET_S:.0f} s. {robot.standing.why}") from late
-        took_ms = 1000 * (anyio.current_time() - began)
-        return EngineView(
-            name=name,
-            facts=robot.facts,
-            standing=robot.standing,
-            answer=answer,
-            index=await robot.index(self._run_in_worker),
-            took_ms=took_ms,
-            open_runs=open_runs,
-            settled=self._late_activity.settled_on(name),
-            index_folder=self._sources.index_folders.get(name),
-        )
-
-    async def _decide(
-        self, request: StartRequest, ready: Prepared, robot: KnownEngine, view: EngineView
-    ) -> AcceptedStart:
-        """Accept a start if no item of its pre-flight blocks it. Raise Conflict if one does."""
-        items = await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes)
-        free = self._free_item(request.engine, ready.name)  # again: time has passed
-        accepted = AcceptedStart(
-            request=request,
-            prepared=ready,
-            link=robot,
-            is_simulated=False,
-            incarnation=view.answer.incarnation,
-            despite=_overridden(ready, (free, *items)),
-        )
-        preflight.require_clear([free], accepted.overridden)
-        preflight.require_clear(items, accepted.overridden)
-        return accepted
-
-    def _free_item(self, engine: str, graph_name: str) -> Item:
-        """Return the item that says whether another run keeps a robot from starting a graph of this
-        name."""
-        longest_ms = self._robots.reachable(engine).facts.longest_loading_ms
-        other = self._runs.occupying(engine, graph_name)
-        return preflight.free_item(engine, other, graph_name, longest_ms, self._clock_us())
-
-    async def _behaviours_for(self, ready: Prepared) -> BehaviourFolder:
-        """Return the folder of behaviours, after a check that the behaviours of all actions of a
-        graph can be used. Raise Conflict if there is no folder or a behaviour cannot be used."""
-        where: dict[str, object] = {"path": "/behaviours"}
-        folder = self._sources.behaviours
-        if folder is None:
-            raise Conflict(
-                "This runner has no behaviours: whoever starts it names their folder.", where=where
-            )
-        own = {each.rpartition("_")[0] for each in ready.actions}
-        names = sorted(own | set(ready.inner))
-        found = await self._run_in_worker(folder.listed, names)
-        if found.problem or found.refused:
-            reasons = " ".join([found.problem, *found.refused.values()]).strip()
-            raise Conflict(f"{reasons} Nothing was started.", where=where)
-        return folder
-
-    def _simulated_facts(self, request: StartRequest) -> EngineFacts:
-        """Return the facts of the simulator, or of the robot that the simulator plays. Raise
-        NotFound if that robot is not registered."""
-        if request.like is None:
-            return _SIMULATOR_FACTS
-        facts = facts_of(self._robots.registration(request.like).profile)
-        return msgspec.structs.replace(facts, simulated=True)
-
     # --- store, hand over -----------------------------------------------------------------------
 
     async def _store_and_hand_over(
@@ -388,16 +129,14 @@ class StartPipeline:
         stored."""
         number, at = self._runs.next_number(), self._clock_us()
         requested, order = _to_store(accepted, author, at=at, number=number, group=group)
-        engine, name = accepted.request.engine, accepted.prepared.name
-        if not accepted.is_simulated:  # a run that was over may have moved again since the check
-            preflight.require_clear([self._free_item(engine, name)], accepted.overridden)
+        self._checks.require_free(accepted)
         with anyio.CancelScope(shield=True):
             run = await self._claims.store(requested)
-            free = None if accepted.is_simulated else self._free_item(engine, name)
+            occupied = self._checks.why_occupied(accepted)
             opened = self._runs.open(run, accepted.link, owns_link=accepted.is_simulated, seq=1)
-            if free is not None and preflight.is_blocking(free, accepted.overridden):
-                opened.end("refused", free.text)
-            if pressed := self._stops.since(stops, engine, group or ""):
+            if occupied:
+                opened.end("refused", occupied)
+            if pressed := self._stops.since(stops, accepted.request.engine, group or ""):
                 opened.stop(*pressed)
             self._runs.drive(opened, order, accepted.incarnation)
         await opened.published.wait()
@@ -417,68 +156,6 @@ class StartPipeline:
             except Refused as why:
                 failed[each.request.engine] = why.detail
         return Grouped(group, runs, failed, fresh=True)
-
-    # --- pre-flight -----------------------------------------------------------------------------
-
-    async def _look(self, request: StartRequest, starter: str) -> Preflight:
-        """Return the pre-flight items of one engine. A refusal of one stage becomes an item, and
-        the next stage runs all the same."""
-        items: list[Item] = []
-        robot: KnownEngine | None = None
-        ready: Prepared | None = None
-        try:
-            if request.engine == SIMULATOR:
-                facts = self._simulated_facts(request)
-            else:
-                robot = self._robots.reachable(request.engine)
-                facts = robot.facts
-        except Refused as refused:
-            return preflight.with_verdict(request.engine, [preflight.refusal_item("link", refused)])
-        try:
-            ready = await self._run_in_worker(partial(prepared, approved=False), request, facts, "")
-            items.append(preflight.graph_item(ready))
-            if request.behaviours:
-                await self._behaviours_for(ready)
-        except Refused as refused:
-            items.append(preflight.refusal_item("graph", refused))
-        if robot is not None:
-            items.append(self._free_item(request.engine, ready.name if ready is not None else ""))
-            items += await self._engine_items(robot, ready)
-            items += await self._approval_items(robot, ready, starter)
-        digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
-        return preflight.with_verdict(request.engine, items, *digests)
-
-    async def _engine_items(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
-        try:
-            view = await self._ask(robot)
-        except NoAnswer as nothing:
-            return [preflight.silence_item(robot.registration.name, str(nothing))]
-        if ready is None:
-            return [preflight.answer_item(view)]
-        return list(await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes))
-
-    async def _approval_items(
-        self, robot: KnownEngine, ready: Prepared | None, starter: str
-    ) -> list[Item]:
-        if ready is None:
-            return []
-        item = await self._approvals.item(robot.registration, ready.tree_digest, starter)
-        return [] if item is None else [item]
-
-    async def _course_items(self, group: GroupRequest) -> Sequence[Item]:
-        """Return the item that says whether the graph takes its expected courses. The item only
-        warns and never blocks a start, even if the courses could not be checked."""
-        if self._sources.courses is None or group.graph is None:
-            return ()
-        try:
-            with anyio.fail_after(_COURSES_S):
-                found = await self._sources.courses(group.graph, bytes(group.umrf), group.subgraphs)
-                return preflight.course_items(found)
-        except TimeoutError:
-            why = f"That takes longer than {_COURSES_S:.0f} s."
-            return (preflight.unknown_courses_item(why),)
-        except Refused as refused:
-            return (preflight.unknown_courses_item(refused.detail),)
 
 
 def _to_store(
@@ -516,21 +193,3 @@ def _to_store(
     inside = tuple(each.umrf for each in ready.subgraphs)
     order = Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets, inside=inside)
     return requested, order
-
-
-def _overridden(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:
-    """Return the problems that a person overrides: errors of the graph, and those that block it on
-    the robot."""
-    problems = [each for each in ready.problems if each.severity == "error"]
-    found: list[Overridden] = []
-    for item in items:
-        if item.verdict != "blocked":
-            continue
-        problems += item.problems
-        if not item.problems:
-            found.append(Overridden(code=item.code, text=item.text))
-    found += [
-        Overridden(code=each.code, text=each.message, aid=each.where.aid, path=each.where.path)
-        for each in problems
-    ]
-    return tuple(found[:_MOST_OVERRIDDEN])

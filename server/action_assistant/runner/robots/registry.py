@@ -9,7 +9,6 @@ import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.events import Draft
-from action_assistant.kit.clock import ClockUs
 from action_assistant.logs.context import begin
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
@@ -38,10 +37,8 @@ from action_assistant.runner.robots.robot_events import (
     RobotLog,
 )
 from action_assistant.runner.runs.events import Author
-from action_assistant.runner.runs.history import RunnerJournal
+from action_assistant.runner.runtime import Runtime
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
-from action_assistant.web.auth.caller import BackgroundTasks
-from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -50,15 +47,11 @@ _NOT_YET: Final = "It has not answered yet."
 _ANSWERS: Final = frozenset({"answering", "restarted"})
 
 
-class RegistryContext(msgspec.Struct, frozen=True):
-    """The services that the registry uses, and the subscribers of what robots report. `changed` is
-    called when the page has to show something else; `commanded` with each command that somebody
-    else has sent to a robot; `shows` with all graphs that an engine shows."""
+class RobotListeners(msgspec.Struct, frozen=True):
+    """The functions that are called with what robots report. `changed`: the page has to show
+    something else; `commanded`: somebody else has sent a command to a robot; `shows`: an engine
+    shows these graphs."""
 
-    journal: RunnerJournal
-    tasks: BackgroundTasks
-    clock_us: ClockUs
-    run_in_worker: RunInWorker
     changed: Callable[[], None]
     commanded: Callable[[KnownEngine, ForeignCommand], None]
     shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
@@ -83,15 +76,15 @@ class Robots:
         self._registered: dict[str, Registration] = {}
         self._engines: dict[str, KnownEngine] = {}
         self._scopes: dict[str, anyio.CancelScope] = {}
-        self._context: RegistryContext | None = None
+        self._opened: tuple[Runtime, RobotListeners] | None = None
         self._robot_log: RobotLog | None = None
 
-    def open(self, context: RegistryContext) -> None:
+    def open(self, runtime: Runtime, listeners: RobotListeners) -> None:
         """Start to watch the robots of `links`, and from now on every robot that is added."""
-        self._context = context
-        self._robot_log = RobotLog(context.journal, context.tasks)
+        self._opened = runtime, listeners
+        self._robot_log = RobotLog(runtime.journal, runtime.tasks)
         if self.recordings is not None:
-            context.tasks.start_soon(self.recordings.run)
+            runtime.tasks.start_soon(self.recordings.run)
         for name in self._given:
             self.add(Registration(name=name))
 
@@ -102,25 +95,25 @@ class Robots:
         valid, Conflict if it has the name of the simulator, Unavailable if the journal cannot
         store it."""
         check_registration(registration)
-        context = self._open_context()
-        body = RobotRegistered(at=context.clock_us(), **msgspec.structs.asdict(registration))
+        runtime, listeners = self._while_open()
+        body = RobotRegistered(at=runtime.clock_us(), **msgspec.structs.asdict(registration))
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
-        await context.journal.append(STREAM, [draft])
+        await runtime.journal.append(STREAM, [draft])
         self.add(registration)
-        context.changed()
+        listeners.changed()
         return self.robot(registration.name)
 
     async def remove(self, name: str, author: Author) -> None:
         """Store that a robot is removed, and close its link. Raise NotFound if the robot is not
         registered, Unavailable if the journal cannot store that."""
         self.registration(name)
-        context = self._open_context()
-        body = RobotRemoved(at=context.clock_us(), name=name)
+        runtime, listeners = self._while_open()
+        body = RobotRemoved(at=runtime.clock_us(), name=name)
         draft = Draft(body.kind, author.id, msgspec.json.encode(body))
-        await context.journal.append(STREAM, [draft])
+        await runtime.journal.append(STREAM, [draft])
         self._close(name)
         del self._registered[name]
-        context.changed()
+        listeners.changed()
 
     def add(self, registration: Registration) -> None:
         """Link to a robot whose registration is stored already. An older link to the robot is
@@ -133,22 +126,22 @@ class Robots:
         link, facts = self._link(registration)
         if link is None:
             return
-        context = self._open_context()
+        runtime, listeners = self._while_open()
         engine = KnownEngine(
             registration,
             facts,
             link,
-            clock_us=context.clock_us,
-            changed=context.changed,
+            clock_us=runtime.clock_us,
+            changed=listeners.changed,
             became=self._note_state,
             foreign=self._pass_on,
-            shows=context.shows,
+            shows=listeners.shows,
             recordings=self.recordings,
             indexes=name in self._indexing,
         )
         self._engines[name] = engine
         scope = self._scopes[name] = anyio.CancelScope()
-        context.tasks.start_soon(self._watch, engine, scope)
+        runtime.tasks.start_soon(self._watch, engine, scope)
 
     def _link(self, registration: Registration) -> tuple[Link | None, EngineFacts]:
         try:
@@ -174,10 +167,10 @@ class Robots:
         with scope:
             await engine.watch()
 
-    def _open_context(self) -> RegistryContext:
-        if self._context is None:
+    def _while_open(self) -> tuple[Runtime, RobotListeners]:
+        if self._opened is None:
             raise RuntimeError("the registry is not open")
-        return self._context
+        return self._opened
 
     # --- what there is ------------------------------------------------------------------------
 
@@ -282,7 +275,7 @@ class Robots:
         return (
             EngineIndex()
             if engine is None
-            else await engine.index(self._open_context().run_in_worker)
+            else await engine.index(self._while_open()[0].run_in_worker)
         )
 
     def held_graph(self, name: str, graph: str) -> str:
@@ -330,14 +323,14 @@ class Robots:
     def _note_state(self, engine: KnownEngine) -> None:
         name = engine.registration.name
         incarnation = engine.standing.incarnation
-        at = self._open_context().clock_us()
+        at = self._while_open()[0].clock_us()
         became = EngineBecame(at=at, state=engine.state, why=engine.why, incarnation=incarnation)
         self.robot_log.note(name, became, name)
 
     def _pass_on(self, engine: KnownEngine, command: ForeignCommand) -> None:
         """Pass a command of somebody else on, if it is for this robot."""
         if not command.targets or engine.registration.name in command.targets:
-            self._open_context().commanded(engine, command)
+            self._while_open()[1].commanded(engine, command)
 
     @property
     def robot_log(self) -> RobotLog:

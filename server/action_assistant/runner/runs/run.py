@@ -137,6 +137,11 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
                 return "running"
 
     @property
+    def robots(self) -> tuple[str, ...]:
+        """The robots that the run keeps for itself from its request until it is proven over."""
+        return () if self.simulated else (self.engine,)
+
+    @property
     def doubt(self) -> str:
         """The reason why no answer of the engine can prove rest now; "" if one can."""
         return self.unconfirmed or self.loading

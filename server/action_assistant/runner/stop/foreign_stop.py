@@ -13,7 +13,6 @@ import anyio
 import msgspec
 
 from action_assistant.errors import NotFound, Refused
-from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import Answer, ForeignCommand, NoAnswer
 from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
@@ -26,11 +25,10 @@ from action_assistant.runner.robots.robot_events import (
     left_unproven,
 )
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
 from action_assistant.runner.stop.loading import LoadingWatch, in_words
 from action_assistant.runner.stop.proof import SET_GOING, RestProof, send_stop
-from action_assistant.web.auth.caller import BackgroundTasks
-from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
@@ -78,18 +76,11 @@ class ForeignStopLoop:
     """Carries out all Stops of graphs that others have started on `robots`. `changed` is called when
     the page has to show something else."""
 
-    def __init__(
-        self,
-        robots: Robots,
-        tasks: BackgroundTasks,
-        clock_us: ClockUs,
-        run_in_worker: RunInWorker,
-        changed: Callable[[], None],
-    ) -> None:
+    def __init__(self, robots: Robots, runtime: Runtime, changed: Callable[[], None]) -> None:
         self._robots = robots
-        self._tasks = tasks
-        self._clock_us = clock_us
-        self._run_in_worker = run_in_worker
+        self._tasks = runtime.tasks
+        self._clock_us = runtime.clock_us
+        self._run_in_worker = runtime.run_in_worker
         self._changed = changed
         self._going: dict[tuple[str, str], _ForeignStop] = {}
 

@@ -1,0 +1,359 @@
+"""The checks of a start: read, check, ask the engine, decide. A pre-flight makes the same checks and lists
+all that they find, instead of ending at the first refusal."""
+
+import os
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Final, TypeAlias
+
+import anyio
+import msgspec
+
+from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
+from action_assistant.random_ids import random_id
+from action_assistant.ros_workspace import Workspace
+from action_assistant.runner.analysis.course_checks import CheckedCourses
+from action_assistant.runner.execution.late_activity import LateActivity
+from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
+from action_assistant.runner.links.simulator import Simulator
+from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Overridden
+from action_assistant.runner.runs.sent_graphs import SentSubgraph
+from action_assistant.runner.runtime import Runtime
+from action_assistant.runner.start import preflight
+from action_assistant.runner.start.admission import GroupRequest, Prepared, StartRequest, prepared
+from action_assistant.runner.start.approvals import Approvals
+from action_assistant.runner.start.preflight import EngineView, Item, Preflight
+from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
+
+#: Facts of the simulator when it plays no robot: there a paused run can be stopped.
+_SIMULATOR_FACTS: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
+_GET_S: Final = 2.0
+_COURSES_S: Final = 5.0  # a pre-flight waits at most so long for expected courses
+_MOST_OVERRIDDEN: Final = 40  # overridden problems that are stored with a run
+
+#: Checks the expected courses of a graph, by its id, against a text of it and the graphs inside.
+CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[CheckedCourses]]
+
+
+class StartSources(msgspec.Struct, frozen=True):
+    """Further sources that a start needs: the folder of Python `behaviours`, the check of expected
+    `courses`, and the index folders by robot."""
+
+    behaviours: BehaviourFolder | None = None
+    courses: CoursesOf | None = None
+    index_folders: Mapping[str, Path] = {}
+
+
+NO_SOURCES: Final = StartSources()
+
+
+class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
+    """A start that nothing prevents. It goes over `link`, which the run owns if simulated, to the
+    life `incarnation` of the engine. `despite`: problems that a person overrides."""
+
+    request: StartRequest
+    prepared: Prepared
+    link: Link
+    is_simulated: bool
+    incarnation: str
+    despite: tuple[Overridden, ...] = ()
+
+    @property
+    def overridden(self) -> tuple[str, ...]:
+        """The codes of problems that the starter overrides."""
+        return self.request.override.codes if self.request.override else ()
+
+
+class StartChecks:
+    """Decides whether a graph may be started on one engine. Nothing is stored or sent but a get."""
+
+    def __init__(
+        self,
+        runs: OpenRuns,
+        late_activity: LateActivity,
+        robots: Robots,
+        foreign_stops: ForeignStopLoop,
+        runtime: Runtime,
+        *,
+        approvals: Approvals,
+        simulator: Simulator,
+        sources: StartSources,
+    ) -> None:
+        self._runs = runs
+        self._late_activity = late_activity
+        self._robots = robots
+        self._foreign_stops = foreign_stops
+        self._approvals = approvals
+        self._clock_us = runtime.clock_us
+        self._run_in_worker = runtime.run_in_worker
+        self._simulator = simulator
+        self._sources = sources
+        self._prefixes = Workspace.of(os.environ).prefixes
+
+    async def accept(self, request: StartRequest, starter: str) -> AcceptedStart:
+        """Take a request through all stages that may refuse it. Raise a subclass of Refused if one
+        stage does."""
+        if request.engine == SIMULATOR:
+            return await self._accept_simulation(request)
+        robot = self._robots.reachable(request.engine)
+        if request.like is not None:
+            raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
+        if request.behaviours:
+            raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
+        ready = await self._run_in_worker(prepared, request, robot.facts, random_id())
+        await self._check(request, ready, robot, starter)
+        try:
+            view = await self._ask(robot)
+        except NoAnswer as nothing:
+            silence = preflight.silence_item(request.engine, str(nothing))
+            raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
+                nothing
+            )
+        return await self._decide(request, ready, robot, view)
+
+    async def accept_all(
+        self, requests: Sequence[StartRequest], starter: str
+    ) -> list[AcceptedStart]:
+        """Accept the starts on several engines side by side. Raise Conflict, with the reasons of
+        all engines, if at least one start is refused."""
+        accepted: dict[str, AcceptedStart] = {}
+        refused: dict[str, Refused] = {}
+
+        async def accept(each: StartRequest) -> None:
+            try:
+                accepted[each.engine] = await self.accept(each, starter)
+            except Refused as why:
+                refused[each.engine] = why
+
+        async with anyio.create_task_group() as tasks:
+            for each in requests:
+                tasks.start_soon(accept, each)
+        if refused:
+            reasons = " ".join(f"{name}: {why.detail}" for name, why in sorted(refused.items()))
+            engines = {name: why.where or {} for name, why in refused.items()}
+            raise Conflict(
+                f"Nothing was started. {reasons}", where={"path": "/engines", "engines": engines}
+            )
+        return [accepted[each.engine] for each in requests]
+
+    async def _accept_simulation(self, request: StartRequest) -> AcceptedStart:
+        facts = self._simulated_facts(request)
+        ready = await self._run_in_worker(prepared, request, facts, random_id())
+        behaviours = await self._behaviours_for(ready) if request.behaviours else None
+        link = self._simulator(facts, ready.script, self._clock_us, behaviours)
+        return AcceptedStart(
+            request=request,
+            prepared=ready,
+            link=link,
+            is_simulated=True,
+            incarnation=link.standing.incarnation,
+            despite=_overridden(ready, ()),
+        )
+
+    async def _check(
+        self, request: StartRequest, ready: Prepared, robot: KnownEngine, starter: str
+    ) -> None:
+        """Make all checks that need no answer of the engine. Raise Conflict if one of them fails."""
+        await self._approvals.require(robot.registration, ready.tree_digest, starter)
+        overridden = request.override.codes if request.override else ()
+        preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
+        if self._foreign_stops.is_stopping(request.engine):
+            raise Conflict(
+                f"Something is being stopped on {request.engine}; a start would be stopped with it.",
+                where={"path": "/engine", "item": "quiet"},
+            )
+
+    async def _ask(self, robot: KnownEngine) -> EngineView:
+        """Send a get to the engine, on the path that would confirm a Stop, after it has read its
+        new index files; return its answer with what is known of it. Raise NoAnswer if none comes
+        in time."""
+        await robot.indexed()
+        name, began = robot.registration.name, anyio.current_time()
+        open_runs = frozenset(self._runs.on(name))  # before the get: a run may move again meanwhile
+        answer: Answer
+        try:
+            with anyio.fail_after(_GET_S):
+                answer = await robot.get()
+        except TimeoutError as late:
+            raise NoAnswer(f"Asked for {_GET_S:.0f} s. {robot.standing.why}") from late
+        took_ms = 1000 * (anyio.current_time() - began)
+        return EngineView(
+            name=name,
+            facts=robot.facts,
+            standing=robot.standing,
+            answer=answer,
+            index=await robot.index(self._run_in_worker),
+            took_ms=took_ms,
+            open_runs=open_runs,
+            settled=self._late_activity.settled_on(name),
+            index_folder=self._sources.index_folders.get(name),
+        )
+
+    async def _decide(
+        self, request: StartRequest, ready: Prepared, robot: KnownEngine, view: EngineView
+    ) -> AcceptedStart:
+        """Accept a start if no item of its pre-flight blocks it. Raise Conflict if one does."""
+        items = await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes)
+        free = self._free_item(request.engine, ready.name)  # again: time has passed
+        accepted = AcceptedStart(
+            request=request,
+            prepared=ready,
+            link=robot,
+            is_simulated=False,
+            incarnation=view.answer.incarnation,
+            despite=_overridden(ready, (free, *items)),
+        )
+        preflight.require_clear([free], accepted.overridden)
+        preflight.require_clear(items, accepted.overridden)
+        return accepted
+
+    def require_free(self, accepted: AcceptedStart) -> None:
+        """Raise Conflict if a run keeps the robot from an accepted start by now: one that was over
+        may have moved again meanwhile."""
+        if not accepted.is_simulated:
+            item = self._free_item(accepted.request.engine, accepted.prepared.name)
+            preflight.require_clear([item], accepted.overridden)
+
+    def why_occupied(self, accepted: AcceptedStart) -> str:
+        """Return why a run keeps the robot from an accepted start by now; "" if none does."""
+        if accepted.is_simulated:
+            return ""
+        item = self._free_item(accepted.request.engine, accepted.prepared.name)
+        return item.text if preflight.is_blocking(item, accepted.overridden) else ""
+
+    def _free_item(self, engine: str, graph_name: str) -> Item:
+        """Return the item that says whether another run keeps a robot from starting a graph of this
+        name."""
+        longest_ms = self._robots.reachable(engine).facts.longest_loading_ms
+        other = self._runs.occupying(engine, graph_name)
+        return preflight.free_item(engine, other, graph_name, longest_ms, self._clock_us())
+
+    async def _behaviours_for(self, ready: Prepared) -> BehaviourFolder:
+        """Return the folder of behaviours, after a check that the behaviours of all actions of a
+        graph can be used. Raise Conflict if there is no folder or a behaviour cannot be used."""
+        where: dict[str, object] = {"path": "/behaviours"}
+        folder = self._sources.behaviours
+        if folder is None:
+            raise Conflict(
+                "This runner has no behaviours: whoever starts it names their folder.", where=where
+            )
+        own = {each.rpartition("_")[0] for each in ready.actions}
+        names = sorted(own | set(ready.inner))
+        found = await self._run_in_worker(folder.listed, names)
+        if found.problem or found.refused:
+            reasons = " ".join([found.problem, *found.refused.values()]).strip()
+            raise Conflict(f"{reasons} Nothing was started.", where=where)
+        return folder
+
+    def _simulated_facts(self, request: StartRequest) -> EngineFacts:
+        """Return the facts of the simulator, or of the robot that the simulator plays. Raise
+        NotFound if that robot is not registered."""
+        if request.like is None:
+            return _SIMULATOR_FACTS
+        facts = facts_of(self._robots.registration(request.like).profile)
+        return msgspec.structs.replace(facts, simulated=True)
+
+    # --- pre-flight ---------------------------------------------------------------------------
+
+    async def look(self, group: GroupRequest, starter: str) -> list[Preflight]:
+        """Return the pre-flight of a start on each engine; `starter` is the id of the person who
+        would start. A refusal becomes an item of the pre-flight. Nothing is stored, and only a
+        get is sent."""
+        found: dict[str, Preflight] = {}
+        courses: list[Item] = []
+
+        async def look(engine: str) -> None:
+            found[engine] = await self._look(group.for_engine(engine), starter)
+
+        async def check_courses() -> None:
+            courses.extend(await self._course_items(group))
+
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(check_courses)
+            for engine in group.engines:
+                tasks.start_soon(look, engine)
+        return [preflight.with_items(found[engine], courses) for engine in group.engines]
+
+    async def _look(self, request: StartRequest, starter: str) -> Preflight:
+        """Return the pre-flight items of one engine. A refusal of one stage becomes an item, and
+        the next stage runs all the same."""
+        items: list[Item] = []
+        robot: KnownEngine | None = None
+        ready: Prepared | None = None
+        try:
+            if request.engine == SIMULATOR:
+                facts = self._simulated_facts(request)
+            else:
+                robot = self._robots.reachable(request.engine)
+                facts = robot.facts
+        except Refused as refused:
+            return preflight.with_verdict(request.engine, [preflight.refusal_item("link", refused)])
+        try:
+            ready = await self._run_in_worker(partial(prepared, approved=False), request, facts, "")
+            items.append(preflight.graph_item(ready))
+            if request.behaviours:
+                await self._behaviours_for(ready)
+        except Refused as refused:
+            items.append(preflight.refusal_item("graph", refused))
+        if robot is not None:
+            items.append(self._free_item(request.engine, ready.name if ready is not None else ""))
+            items += await self._engine_items(robot, ready)
+            items += await self._approval_items(robot, ready, starter)
+        digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
+        return preflight.with_verdict(request.engine, items, *digests)
+
+    async def _engine_items(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
+        try:
+            view = await self._ask(robot)
+        except NoAnswer as nothing:
+            return [preflight.silence_item(robot.registration.name, str(nothing))]
+        if ready is None:
+            return [preflight.answer_item(view)]
+        return list(await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes))
+
+    async def _approval_items(
+        self, robot: KnownEngine, ready: Prepared | None, starter: str
+    ) -> list[Item]:
+        if ready is None:
+            return []
+        item = await self._approvals.item(robot.registration, ready.tree_digest, starter)
+        return [] if item is None else [item]
+
+    async def _course_items(self, group: GroupRequest) -> Sequence[Item]:
+        """Return the item that says whether the graph takes its expected courses. The item only
+        warns and never blocks a start, even if the courses could not be checked."""
+        if self._sources.courses is None or group.graph is None:
+            return ()
+        try:
+            with anyio.fail_after(_COURSES_S):
+                found = await self._sources.courses(group.graph, bytes(group.umrf), group.subgraphs)
+                return preflight.course_items(found)
+        except TimeoutError:
+            why = f"That takes longer than {_COURSES_S:.0f} s."
+            return (preflight.unknown_courses_item(why),)
+        except Refused as refused:
+            return (preflight.unknown_courses_item(refused.detail),)
+
+
+def _overridden(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:
+    """Return the problems that a person overrides: errors of the graph, and those that block it on
+    the robot."""
+    problems = [each for each in ready.problems if each.severity == "error"]
+    found: list[Overridden] = []
+    for item in items:
+        if item.verdict != "blocked":
+            continue
+        problems += item.problems
+        if not item.problems:
+            found.append(Overridden(code=item.code, text=item.text))
+    found += [
+        Overridden(code=each.code, text=each.message, aid=each.where.aid, path=each.where.path)
+        for each in problems
+    ]
+    return tuple(found[:_MOST_OVERRIDDEN])
