@@ -1,5 +1,9 @@
 """The services of the editor process, and the state that its routes are given."""
 
+from typing import Any
+
+from litestar import Request
+
 from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
@@ -20,7 +24,8 @@ from action_assistant.editor.rooms.rate_limits import ByteRateLimits
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
-from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.access import person_of
+from action_assistant.web.auth.keys import Keys, Person
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.network.connection_limits import ConnectionLimits
 
@@ -87,3 +92,10 @@ class EditorState:
         if self._services is None:
             raise RuntimeError("the editor is not open yet")
         return self._services
+
+    async def acting(self, request: Request[Any, Any, Any]) -> tuple[EditorServices, Person]:
+        """Return the services, and the person who sent a request, whose name is stored from now on. Raise
+        Unavailable if it cannot be stored."""
+        person = person_of(request)
+        await self.services.people.seen(person)
+        return self.services, person

@@ -15,7 +15,7 @@ from action_assistant.editor.history.drafts.draft_merges import (
 from action_assistant.editor.history.drafts.drafts import DraftView, NewDraft, Remark
 from action_assistant.editor.log.graph_events import DraftAnswered
 from action_assistant.editor.services import EditorState
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs
 
 Asking = Request[Any, Any, Any]
 
@@ -58,8 +58,7 @@ def _drafts(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def make_draft(
         graph_id: str, request: Asking, data: NewDraft | None = None
     ) -> Response[DraftView]:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         made = await services.drafts.make(graph_id, person.id, data or NewDraft())
         headers = {"location": f"/api/drafts/{made.id}"}
         return Response(made, status_code=201, headers=headers)
@@ -80,8 +79,7 @@ def _proposals(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def propose_draft(draft_id: str, data: Proposing, request: Asking) -> DraftView:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         return await services.drafts.propose(draft_id, person.id, data.note)
 
     @delete(
@@ -92,8 +90,7 @@ def _proposals(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def withdraw_proposal(draft_id: str, request: Asking) -> DraftView:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         return await services.drafts.withdraw(draft_id, person.id)
 
     @post(
@@ -104,8 +101,7 @@ def _proposals(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def answer_proposal(draft_id: str, data: Answering, request: Asking) -> DraftView:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         said = DraftAnswered(data.yes, data.note.strip(), data.seq)
         return await services.drafts.answer(draft_id, person.id, said)
 
@@ -133,8 +129,7 @@ def _merges(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def merge_draft(draft_id: str, data: WantedMerge, request: Asking) -> MergedDraft:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         return await services.draft_merges.merge(draft_id, person.id, data)
 
     return [preview_merge, merge_draft]

@@ -64,6 +64,13 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     return [*_catalogue(app_state), *_contents(app_state)]
 
 
+def made_graph(made: GraphView, told: bytes | None) -> Response[MadeGraph]:
+    """Return the answer for a new document. `told`: the JSON of the `ImportReport` of its file."""
+    reading = None if told is None else encoded(ImportReport, told)
+    body = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
+    return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
+
+
 async def _previewed(services: EditorServices, body: bytes) -> bytes:
     """Return the JSON of a `Preview` of a file, checked with the stored graphs that would be
     inside."""
@@ -106,12 +113,9 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         if preview:
             found = await _previewed(app_state.services, await request.body())
             return Response(encoded(Preview, found), status_code=200)
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         made, told = await services.catalogue.create(await request.body(), person.id)
-        reading = None if told is None else encoded(ImportReport, told)
-        body = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
-        return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
+        return made_graph(made, told)
 
     @get("/api/graphs/{graph_id:str}", summary="One graph", operation_id="getGraph")
     async def get_graph(graph_id: str) -> GraphView:
@@ -124,8 +128,7 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def describe_graph(graph_id: str, data: Describing, request: Asking) -> GraphView:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         return await services.catalogue.describe(
             graph_id, person.id, name=data.name, description=data.description
         )
@@ -137,8 +140,7 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def delete_graph(graph_id: str, request: Asking) -> None:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         await services.catalogue.delete(graph_id, person.id)
 
     @post(
@@ -149,8 +151,7 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def recover_graph(graph_id: str, request: Asking) -> GraphView:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         return await services.catalogue.recover(graph_id, person.id)
 
     return [list_graphs, create_graph, get_graph, describe_graph, delete_graph, recover_graph]

@@ -90,8 +90,7 @@ def _links(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         guards=[Needs("share")],
     )
     async def invite(data: Inviting, request: Request[Any, Any, Any]) -> Response[Invitation]:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         made = await services.invitations.make(data.role, data.label, person.id)
         location = f"/api/invitations/{made.id}"
         return Response(made, status_code=201, headers={"location": location})

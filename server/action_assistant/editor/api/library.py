@@ -9,9 +9,9 @@ from litestar import Request, Response, get, post, put
 from litestar.params import QueryParameter
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.api.graphs import MadeGraph, Seq
+from action_assistant.editor.api.graphs import MadeGraph, Seq, made_graph
 from action_assistant.editor.catalogue.catalogue import GraphView
-from action_assistant.editor.interchange.importing import ImportReport, Preview
+from action_assistant.editor.interchange.importing import Preview
 from action_assistant.editor.library import library_updates
 from action_assistant.editor.library.action_uses import GraphAsAction, LibraryAction
 from action_assistant.editor.library.library import GraphMoment, UpdatedGraph
@@ -123,9 +123,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
             return Response(encoded(Preview, found), status_code=200)
         await services.people.seen(person)
         made, told = await services.library_edits.create(body, person.id)
-        reading = None if told is None else encoded(ImportReport, told)
-        whole = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
-        return Response(whole, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
+        return made_graph(made, told)
 
     @get(
         "/api/actions/{action_id:str}/umrf",
@@ -216,8 +214,7 @@ def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def take_over(action_id: str, data: TakingOver, request: Asking) -> GraphView:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         return await services.library_edits.take(action_id, data.graph, data.aid, person.id)
 
     return [list_uses, update_uses, take_over]
@@ -239,8 +236,7 @@ def _builds(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("edit")],
     )
     async def put_build(action_id: str, data: BuildReport, request: Asking) -> LastBuild:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         build = h.ActionBuilt(data.package, data.ended_well, data.at, data.errors)
         await services.library_edits.built(action_id, build, person.id)
         return LastBuild(build)

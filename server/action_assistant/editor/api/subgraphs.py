@@ -118,8 +118,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def make_subgraph(
         graph_id: str, request: Request[Any, Any, Any], data: Extracting
     ) -> Response[MadeSubGraph]:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         async with making:
             chosen = await _chosen(services, graph_id, data)
             found = await services.workers.files(subgraph_file, *chosen)
@@ -160,8 +159,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def call_uses(
         graph_id: str, request: Request[Any, Any, Any], data: CallingUses
     ) -> CalledUses:
-        services, person = app_state.services, person_of(request)
-        await services.people.seen(person)
+        services, person = await app_state.acting(request)
         await services.catalogue.require(graph_id, "graph")
         return CalledUses(
             await services.catalogue.call_uses(data.graphs, data.before, data.name, person.id)

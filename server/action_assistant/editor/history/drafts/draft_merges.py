@@ -3,15 +3,17 @@
 import msgspec
 
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
-from action_assistant.editor.documents.contents import Inside
 from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.change_summaries import Changes
 from action_assistant.editor.history.drafts.drafts import DraftPair, Drafts
 from action_assistant.editor.history.drafts.merge_previews import (
     DraftConflict,
+    DraftMerge,
     DraftSide,
+    DraftSides,
     UnmadeChoices,
     made_merge,
+    other_side,
     previewed,
 )
 from action_assistant.editor.history.merge_origins import bring_up, grafts_of
@@ -92,15 +94,12 @@ class DraftMerges:
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
         """Compute a merge without storing anything. Raise NotFound for an unknown draft,
         Unavailable if the journal cannot be read."""
-        pair = await self._drafts.pair(draft)
-        inside = await self._brought_up(pair, asked.into)
-        found = await self._index.value(
-            previewed, pair.base, pair.origin, pair.draft, asked.into, asked.choices, inside
-        )
+        sides = (await self._drafts.pair(draft)).sides
+        found = await self._index.value(previewed, await self._merge(sides, asked))
         return MergePreview(
             into=asked.into,
-            seq=pair.origin.seq,
-            draft_seq=pair.draft.seq,
+            seq=sides.origin.seq,
+            draft_seq=sides.draft.seq,
             changes=encoded(Changes, found.changes),
             conflicts=encoded(tuple[DraftConflict, ...], found.conflicts),
             problems=encoded(tuple[Problem, ...], found.problems),
@@ -118,19 +117,17 @@ class DraftMerges:
         target: str = row.draft_of if wanted.into == "origin" else draft
         async with self._rooms.enter(h.graph_stream(target)) as room:
             pair = await self._drafts.pair(draft)
-            _require_moments(pair, wanted)
-            inside = await self._brought_up(pair, wanted.into)
-            found = await self._index.value(
-                made_merge, pair.base, pair.origin, pair.draft, wanted.into, wanted.choices, inside
-            )
+            _require_moments(pair.sides, wanted)
+            merge = await self._merge(pair.sides, wanted)
+            found = await self._index.value(made_merge, merge)
             _require_choices(found.left)
             seen = wanted.seq if wanted.into == "origin" else wanted.draft_seq
             if room.seq != seen:
                 raise _moved_on(wanted.into)
             now = await room.submit(found.update, author)
         seq = await self._entered(target, seen, now, found.update)
-        source = pair.draft if wanted.into == "origin" else pair.origin
         if seq or found.any_conflicts:
+            source = merge.source
             since = await self._since(pair, source.graph, target)
             body = h.GraphMerged(
                 draft, pair.row.draft_name, source.graph, since, source.seq, seq, found.authors
@@ -144,12 +141,13 @@ class DraftMerges:
         events = await self._journal.read(h.graph_stream(graph), after=before, upto=now)
         return next((event.seq for event in events if event.body == update), 0)
 
-    async def _brought_up(self, pair: DraftPair, into: DraftSide) -> Inside:
-        """Bring the index up to the side that is brought in, for its authors; return the graphs inside of
-        either side."""
-        sides = (pair.origin, pair.draft) if into == "origin" else (pair.draft, pair.origin)
-        await bring_up(self._index, sides[1].graph, sides[1].seq)
-        return await self._checks.inside(*sides)
+    async def _merge(self, sides: DraftSides, asked: AskedMerge | WantedMerge) -> DraftMerge:
+        """Return the merge that is asked for, once the index knows the side that is brought in, for its
+        authors."""
+        source, target = sides.of(other_side(asked.into)), sides.of(asked.into)
+        await bring_up(self._index, source.graph, source.seq)
+        inside = await self._checks.inside(target, source)
+        return DraftMerge(sides, asked.into, asked.choices, inside)
 
     async def _since(self, pair: DraftPair, source: str, target: str) -> int:
         """Return the first change of one side that was not merged into the other."""
@@ -160,10 +158,10 @@ class DraftMerges:
         return max(merged, default=int(pair.row.drafted_seq)) + 1
 
 
-def _require_moments(pair: DraftPair, wanted: WantedMerge) -> None:
-    if pair.origin.seq != wanted.seq:
+def _require_moments(sides: DraftSides, wanted: WantedMerge) -> None:
+    if sides.origin.seq != wanted.seq:
         raise _moved_on("origin")
-    if pair.draft.seq != wanted.draft_seq:
+    if sides.draft.seq != wanted.draft_seq:
         raise _moved_on("draft")
 
 

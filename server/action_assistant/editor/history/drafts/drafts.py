@@ -9,9 +9,12 @@ from sqlalchemy import Row, select
 
 from action_assistant.editor.catalogue.catalogue import NAME_LIMIT, Catalogue, GraphView
 from action_assistant.editor.catalogue.graph_reader import GraphReader
-from action_assistant.editor.documents.contents import GraphAtSeq
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.drafts.merge_previews import DraftBase, apart_since
+from action_assistant.editor.history.drafts.merge_previews import (
+    DraftMoment,
+    DraftSides,
+    apart_since,
+)
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people.people import People
 from action_assistant.errors import BadInput, Conflict, NotFound
@@ -53,13 +56,6 @@ class DraftProposal(msgspec.Struct, frozen=True, omit_defaults=True):
     answers: tuple[DraftAnswer, ...] = ()
 
 
-class DraftMoment(msgspec.Struct, frozen=True):
-    """The state with which both sides are compared: the graph `graph` after its change `seq`."""
-
-    graph: str
-    seq: int
-
-
 class DraftView(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """A draft. `seq`, `origin_seq`: the last changes of draft and origin. `ahead`, `behind`: how
     many things the draft and the origin changed since they were equal; None if that is unknown."""
@@ -90,12 +86,10 @@ class NewDraft(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class DraftPair(msgspec.Struct, frozen=True):
-    """A draft and its origin in their present states, and the last state in which they were equal."""
+    """The row of a draft in the catalogue, and its two sides."""
 
     row: Any
-    base: DraftBase
-    origin: GraphAtSeq
-    draft: GraphAtSeq
+    sides: DraftSides
 
 
 class Drafts:
@@ -149,12 +143,9 @@ class Drafts:
         row = await self._row(draft)
         await self._catalogue.require(row.draft_of, "graph")
         await self._index.upto(row.base_graph, row.base_seq)
-        return DraftPair(
-            row,
-            DraftBase(row.base_graph, row.base_seq),
-            await self._graph_reader.now(row.draft_of),
-            await self._graph_reader.now(draft),
-        )
+        base = DraftMoment(row.base_graph, row.base_seq)
+        origin = await self._graph_reader.now(row.draft_of)
+        return DraftPair(row, DraftSides(base, origin, await self._graph_reader.now(draft)))
 
     # --- proposals --------------------------------------------------------------------------------
 
@@ -284,7 +275,7 @@ class Drafts:
         known = self._distances.get(moments)
         if known is None:
             pair = await self.pair(row.id)
-            behind, ahead = await self._index.value(apart_since, pair.base, pair.origin, pair.draft)
+            behind, ahead = await self._index.value(apart_since, pair.sides)
             known = self._distances.put(moments, (ahead, behind))
         return *known, newest[0]
 

@@ -1,13 +1,12 @@
 """Previews a merge as differences of actions, arrows and notes, and makes its update. For workers."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 from sqlalchemy import Connection
 
 from action_assistant.editor.documents.contents import (
-    NOTHING_INSIDE,
     GraphAtSeq,
     Inside,
     graphs_of,
@@ -19,7 +18,7 @@ from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_summaries import Changes, maps_of, shortened, state_of
 from action_assistant.editor.history.document_places import by_owner, field_of
 from action_assistant.editor.history.drafts.merging import Choices, FoundConflict, merged
-from action_assistant.editor.history.key_changes import LoggedChange, Place, owner_of
+from action_assistant.editor.history.key_changes import Place, owner_of
 from action_assistant.editor.history.merge_origins import originals
 from action_assistant.editor.interchange.document_edits import Side, setting
 from action_assistant.umrf.check import check_written
@@ -37,6 +36,7 @@ from action_assistant.umrf.model import ENTRY, EXIT, Graph, Problem
 #: The two graphs of a merge. What is brought in comes from the one, into the other.
 DraftSide: TypeAlias = Literal["origin", "draft"]
 
+DRAFT_SIDES: Final[tuple[DraftSide, ...]] = ("origin", "draft")
 _WORSE: Final = 50  # problems that are told
 _NAMED: Final = 3  # conflicts without a choice that a refusal names
 _TOLD: Final = 50  # of which it says the places
@@ -54,11 +54,43 @@ class DraftConflict(msgspec.Struct, frozen=True, kw_only=True):
     draft: Changes
 
 
-class DraftBase(msgspec.Struct, frozen=True):
-    """The state with which both sides of a draft are compared: the graph `graph` after its change `seq`."""
+class DraftMoment(msgspec.Struct, frozen=True):
+    """The state with which both sides are compared: the graph `graph` after its change `seq`."""
 
     graph: str
     seq: int
+
+
+class DraftSides(msgspec.Struct, frozen=True):
+    """A draft and its origin in their present states, and the last state in which they were equal."""
+
+    base: DraftMoment
+    origin: GraphAtSeq
+    draft: GraphAtSeq
+
+    def of(self, side: DraftSide) -> GraphAtSeq:
+        """Return the present state of one side."""
+        return self.origin if side == "origin" else self.draft
+
+
+class DraftMerge(msgspec.Struct, frozen=True):
+    """A merge to compute: of the other side into the side `into`. `choices`: the chosen side of each
+    conflict, by its place. `inside`: the graphs inside of either side."""
+
+    sides: DraftSides
+    into: DraftSide
+    choices: Mapping[str, DraftSide]
+    inside: Inside
+
+    @property
+    def target(self) -> GraphAtSeq:
+        """Return the side that is merged into."""
+        return self.sides.of(self.into)
+
+    @property
+    def source(self) -> GraphAtSeq:
+        """Return the side that is brought in."""
+        return self.sides.of(other_side(self.into))
 
 
 class UnmadeChoices(msgspec.Struct, frozen=True):
@@ -93,20 +125,6 @@ class FoundMerge(msgspec.Struct, frozen=True):
     umrf: str
 
 
-def merging_since(
-    connection: Connection,
-    base: DraftBase,
-    origin: GraphAtSeq,
-    draft: GraphAtSeq,
-    into: DraftSide,
-    choices: Mapping[str, DraftSide],
-    inside: Inside,
-) -> FoundMerge:
-    """Merge both sides of a draft, with the base read from the index. See `merging`."""
-    was = index_queries.at(connection, base.graph, base.seq)
-    return merging(was, origin, draft, into, choices, inside)
-
-
 class WrittenPreview(msgspec.Struct, frozen=True):
     """The parts of a merge preview, each as JSON, and the authors of the merged changes, the last
     one first."""
@@ -120,18 +138,9 @@ class WrittenPreview(msgspec.Struct, frozen=True):
     authors: tuple[str, ...]
 
 
-def previewed(
-    connection: Connection,
-    base: DraftBase,
-    origin: GraphAtSeq,
-    draft: GraphAtSeq,
-    into: DraftSide,
-    choices: Mapping[str, DraftSide],
-    inside: Inside,
-) -> WrittenPreview:
-    """Preview a merge for the page, as JSON. See `merging_since`."""
-    found = merging_since(connection, base, origin, draft, into, choices, inside)
-    source = draft if into == "origin" else origin
+def previewed(connection: Connection, merge: DraftMerge) -> WrittenPreview:
+    """Preview a merge for the page, as JSON."""
+    found = merging(connection, merge)
     write_json = msgspec.json.encode
     return WrittenPreview(
         changes=write_json(found.changes),
@@ -140,29 +149,20 @@ def previewed(
         umrf=write_json(found.umrf),
         origin_did=write_json(found.did["origin"]),
         draft_did=write_json(found.did["draft"]),
-        authors=authors_of(connection, source, found.places),
+        authors=authors_of(connection, merge.source, found.places),
     )
 
 
-def made_merge(
-    connection: Connection,
-    base: DraftBase,
-    origin: GraphAtSeq,
-    draft: GraphAtSeq,
-    into: DraftSide,
-    choices: Mapping[str, DraftSide],
-    inside: Inside,
-) -> MadeMerge:
-    """Compute a merge with all that is needed to store it. See `merging_since`."""
-    found = merging_since(connection, base, origin, draft, into, choices, inside)
-    left = [conflict for conflict in found.conflicts if conflict.place not in choices]
+def made_merge(connection: Connection, merge: DraftMerge) -> MadeMerge:
+    """Compute a merge with all that is needed to store it."""
+    found = merging(connection, merge)
+    left = [conflict for conflict in found.conflicts if conflict.place not in merge.choices]
     unmade = UnmadeChoices(
         len(left),
         tuple(conflict.what for conflict in left[:_NAMED]),
         tuple(conflict.place for conflict in left[:_TOLD]),
     )
-    source = draft if into == "origin" else origin
-    authors = authors_of(connection, source, found.places)
+    authors = authors_of(connection, merge.source, found.places)
     return MadeMerge(found.update, authors, bool(found.conflicts), unmade if left else None)
 
 
@@ -179,38 +179,33 @@ def authors_of(
     return tuple(dict.fromkeys(each.change.author for each in newest))
 
 
-def apart_since(
-    connection: Connection, base: DraftBase, origin: GraphAtSeq, draft: GraphAtSeq
-) -> tuple[int, int]:
+def apart_since(connection: Connection, sides: DraftSides) -> tuple[int, int]:
     """Return how many things the origin and the draft each changed since they were equal."""
-    did = apart(index_queries.at(connection, base.graph, base.seq), origin, draft)
+    maps: dict[DraftSide, Maps] = {side: read(sides.of(side)).moment.maps for side in DRAFT_SIDES}
+    did = _did(_base_of(connection, sides), maps)
     return count(did["origin"]), count(did["draft"])
 
 
-def merging(
-    base: Sequence[LoggedChange],
-    origin: GraphAtSeq,
-    draft: GraphAtSeq,
-    into: DraftSide,
-    choices: Mapping[str, DraftSide],
-    inside: Inside = NOTHING_INSIDE,
-) -> FoundMerge:
-    """Merge the other side of a draft into the side `into`. `base`: the changes that made up the
-    state in which both sides were last equal. `inside`: the graphs inside of either side."""
-    was = maps_of(state_of(base))
-    sides: dict[DraftSide, GraphAtSeq] = {"origin": origin, "draft": draft}
-    ours, theirs = sides[into], sides[_other(into)]
-    mine = read(ours)
-    chosen: Choices = {place: _side(side, into) for place, side in choices.items()}
+def _base_of(connection: Connection, sides: DraftSides) -> Maps:
+    """Return the state in which both sides were last equal, as the index knows it."""
+    return maps_of(state_of(index_queries.at(connection, sides.base.graph, sides.base.seq)))
+
+
+def merging(connection: Connection, merge: DraftMerge) -> FoundMerge:
+    """Merge the source of a merge into its target. Nothing is stored."""
+    was, into = _base_of(connection, merge.sides), merge.into
+    maps_by_side = {side: read(merge.sides.of(side)).moment.maps for side in DRAFT_SIDES}
+    ours, mine = merge.target, read(merge.target)
+    chosen: Choices = {place: _side(side, into) for place, side in merge.choices.items()}
     found = merged(
-        _places(was), _places(mine.moment.maps), _places(read(theirs).moment.maps), chosen
+        _places(was), _places(mine.moment.maps), _places(maps_by_side[other_side(into)]), chosen
     )
     result = _places(mine.moment.maps) | found.targets
     maps = _maps({place: v for place, v in result.items() if v is not msgspec.UNSET})
     graph = read_maps(maps)
-    teller = _Teller(was, {side: read(each).moment.maps for side, each in sides.items()}, into)
-    known = {(problem.code, problem.message) for problem in mine.problems(inside)}
-    problems = check_written(graph, graphs_of(inside), inside.resolution)
+    teller = _Teller(was, maps_by_side, into)
+    known = {(problem.code, problem.message) for problem in mine.problems(merge.inside)}
+    problems = check_written(graph, graphs_of(merge.inside), merge.inside.resolution)
     worse = [each for each in problems if (each.code, each.message) not in known]
     return FoundMerge(
         setting(ours.state, {(root, key): v for (root, key), v in found.targets.items()}),
@@ -221,15 +216,6 @@ def merging(
         teller.did,
         write(graph, Stamp(ours.graph)),
     )
-
-
-def apart(
-    base: Sequence[LoggedChange], origin: GraphAtSeq, draft: GraphAtSeq
-) -> dict[DraftSide, Changes]:
-    """Return the changes of each side since both were equal."""
-    was = maps_of(state_of(base))
-    maps = {"origin": read(origin).moment.maps, "draft": read(draft).moment.maps}
-    return _did(was, {"origin": maps["origin"], "draft": maps["draft"]})
 
 
 def count(changes: Changes) -> int:
@@ -250,7 +236,7 @@ class _Teller:
             side: difference((0, self._graph), (0, graph)) for side, graph in self._graphs.items()
         }
         self._into: Final = into
-        shown = [self._graph, self._graphs[_other(into)], self._graphs[into]]
+        shown = [self._graph, self._graphs[other_side(into)], self._graphs[into]]
         self._names = {a.key: a.full_name for graph in shown for a in graph.actions}
         self.did: Final = _did(base, sides)
 
@@ -337,7 +323,8 @@ def _changes(before: Graph, after: Graph, owners: Iterable[str]) -> Changes:
     return shortened(difference((0, before), (0, after)), set(owners))
 
 
-def _other(side: DraftSide) -> DraftSide:
+def other_side(side: DraftSide) -> DraftSide:
+    """Return the other one of origin and draft."""
     return "draft" if side == "origin" else "origin"
 
 
@@ -346,7 +333,7 @@ def _side(side: DraftSide, into: DraftSide) -> Side:
 
 
 def _named(side: Side, into: DraftSide) -> DraftSide:
-    return into if side == "ours" else _other(into)
+    return into if side == "ours" else other_side(into)
 
 
 def _places(maps: Maps) -> dict[Place, Any]:
