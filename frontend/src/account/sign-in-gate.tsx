@@ -2,15 +2,7 @@
 
 import { IconPlugConnectedX } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
-import {
-  type ReactNode,
-  useCallback,
-  useEffect,
-  useLayoutEffect,
-  useMemo,
-  useState,
-  useSyncExternalStore,
-} from "react";
+import { type ReactNode, useCallback, useEffect, useLayoutEffect, useMemo, useState } from "react";
 import { errorText, isOutcomeUnknown, Refusal, sessionEnd } from "../api/http";
 import { pageLink } from "../api/page-link";
 import { PersonContext } from "../api/people";
@@ -32,6 +24,7 @@ import {
 } from "../api/session";
 import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import { useRootMark } from "../ui/use-root-mark";
+import { useWatched } from "../ui/watched";
 import style from "./sign-in-gate.module.css";
 
 const SignIn = lazyPart(() => import("./sign-in").then((part) => part.SignIn));
@@ -177,7 +170,7 @@ export function SignInGate({ children }: { children: ReactNode }) {
     },
     [client],
   );
-  const ended = useSyncExternalStore(sessionEnd.subscribe, sessionEnd.now);
+  const ended = useWatched(sessionEnd);
   const offline = gate.at === "inside" && gate.offline === true;
   const putOut = useCallback(() => {
     rememberPerson(null);

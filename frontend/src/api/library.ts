@@ -34,6 +34,18 @@ export function useLibrary() {
   });
 }
 
+/**
+ * Return the ids of the other graphs with an action that stands for a graph. If the library has an
+ * action of that name, it is meant instead of the graph.
+ */
+export function usedIn(
+  actions: readonly LibraryAction[],
+  graph: { readonly id: string; readonly name: string },
+): readonly string[] {
+  const found = actions.find(({ name, document }) => document === null && name === graph.name);
+  return (found?.used_in ?? []).filter((each) => each !== graph.id);
+}
+
 /** A graph as the action that stands for it in another: what its first actions lack, what its last one gives. */
 export type GraphAsAction = EditorApi["GraphAsAction"];
 

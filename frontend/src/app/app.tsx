@@ -1,7 +1,7 @@
 /** The page: theme, data, session, routes. */
 import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
-import { useEffect, useState, useSyncExternalStore } from "react";
+import { useEffect, useState } from "react";
 import { Route, Router, Switch } from "wouter";
 import { SignInGate } from "../account/sign-in-gate";
 import { Refusal } from "../api/http";
@@ -15,6 +15,7 @@ import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { DragPreview } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
 import type { Crumb } from "../ui/top-bar";
+import { useWatched } from "../ui/watched";
 import { DropFiles } from "./imports/drop-files";
 import { importReviews } from "./imports/import-review";
 import { NotFound } from "./page-frame";
@@ -57,7 +58,7 @@ const ImportReviewDialog = lazyPart(() =>
 /** Once something had to be looked at, the dialog stays: it goes out of sight by itself. */
 function ImportReview() {
   const [asked, setAsked] = useState(false);
-  const waits = useSyncExternalStore(importReviews.subscribe, importReviews.now) !== null;
+  const waits = useWatched(importReviews) !== null;
   useEffect(() => setAsked((was) => was || waits), [waits]);
   return <OverlayBoundary>{asked && <ImportReviewDialog />}</OverlayBoundary>;
 }

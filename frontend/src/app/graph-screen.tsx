@@ -1,6 +1,14 @@
 /** The editor of a graph with the list on its left and its runs below. */
 
-import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
+import {
+  type ComponentProps,
+  memo,
+  type ReactNode,
+  useEffect,
+  useMemo,
+  useRef,
+  useState,
+} from "react";
 import { Redirect, useSearch } from "wouter";
 import { useVersions, versionName } from "../api/graphs";
 import { type GraphAsAction, useGraphsAsActions } from "../api/library";
@@ -8,10 +16,12 @@ import { newestRun, openRuns } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useMay, usePerson } from "../api/people";
 import { type Run, useLastRun } from "../api/runs";
+import { EditorStoreProvider, useEditorStore } from "../canvas/editor-store";
 import { levelsOf } from "../canvas/level-path";
 import { serverNow } from "../clock/server-clock";
+import { scriptOf } from "../dry-run/script";
 import { useSeed } from "../editor/dry-run/use-seed";
-import { Editor, type EditorSummary } from "../editor/editor";
+import { Editor, useEditorSummary } from "../editor/editor";
 import { templatesOf, useKnownActions, usePlaceable } from "../home/known-actions";
 import { Sidebar } from "../home/sidebar";
 import { askedDryRun } from "../review/dry-run-link";
@@ -19,7 +29,7 @@ import { useReplay } from "../review/replay";
 import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import { StartControl } from "../runs/start/start-control";
-import { type GraphInRun, isInRun, runOnCanvas, useProgress } from "../status/progress-inside";
+import { type GraphInRun, isInRun, useProgress } from "../status/progress-inside";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
 import { lazyPart, PartBoundary } from "../ui/lazy-part";
@@ -116,10 +126,11 @@ function useRunOnCanvas(
   inside: GraphInRun | null,
 ): void {
   const names = inside !== null && "names" in inside ? inside.names : undefined;
-  useEffect(() => {
-    runOnCanvas.set(run && { run, unsure, at, names: names ?? [] });
-  }, [run, unsure, at, names]);
-  useEffect(() => () => runOnCanvas.set(null), []);
+  const store = useEditorStore();
+  useEffect(
+    () => store.run.set(run && { run, unsure, at, names: names ?? [] }),
+    [store, run, unsure, at, names],
+  );
 }
 
 function Inside({ id }: { id: string }) {
@@ -160,84 +171,77 @@ function Inside({ id }: { id: string }) {
       known={known}
       progress={progress}
       run={live?.ended_at === null ? live.id : null}
-      bar={(parts) => <TitledBar id={id} {...parts} />}
-      list={(place) => <Lists id={id} create={create} choose={choose} place={place} />}
-      status={(summary: EditorSummary) => (
+      Bar={TitledBar}
+      list={<Lists create={create} choose={choose} />}
+      status={
         <PartBoundary waiting={null}>
-          <DraftStatus
-            run={inside === null ? live : null}
-            label={label}
-            graph={summary.graph}
-            seq={summary.seq}
-            settle={settle}
-            obstacle={summary.obstacle}
-          />
+          <Draft run={inside === null ? live : null} label={label} settle={settle} />
         </PartBoundary>
-      )}
-      start={(summary: EditorSummary) =>
-        mayStart && (
-          <StartControl
-            graph={id}
-            name={summary.graph.name || "untitled"}
-            seq={summary.seq}
-            settle={settle}
-            obstacle={summary.obstacle}
-            compact={summary.compact}
-            thumb={summary.phone}
-          />
-        )
       }
-      record={(summary, script, onStarted) =>
-        mayStart && (
-          <RecordDryRun
-            graph={id}
-            seq={summary.seq}
-            obstacle={summary.obstacle}
-            script={script}
-            onStarted={onStarted}
-          />
-        )
-      }
-      strip={(summary: EditorSummary) => (
-        <RunDrawer
+      start={mayStart && <Start settle={settle} />}
+      record={mayStart && <Record />}
+      strip={
+        <Strip
           run={run}
           cursor={replay.at}
           onSeek={seek}
           going={going}
           onChoose={chooseRun}
-          graph={summary.graph}
           versionLabel={label}
-          selected={summary.selected}
-          onPick={summary.pick}
-          folded={summary.folded}
-          onFold={summary.fold}
         />
-      )}
+      }
       seed={seed}
       corner={<ConnectionStatus run={live} whose={going.length > 1} />}
     />
   );
 }
 
+type Settled = Pick<ComponentProps<typeof StartControl>, "settle">;
+
+function Draft(props: Settled & Pick<ComponentProps<typeof DraftStatus>, "run" | "label">) {
+  const { graph, seq, obstacle } = useEditorSummary();
+  return <DraftStatus {...props} graph={graph} seq={seq} obstacle={obstacle} />;
+}
+
+function Start({ settle }: Settled) {
+  const { id, graph, seq, obstacle, compact, phone } = useEditorSummary();
+  const name = graph.name || "untitled";
+  return <StartControl {...{ graph: id, name, seq, settle, obstacle, compact, thumb: phone }} />;
+}
+
+/** Records the open dry-run as a run, by the decisions that were made in it. */
+function Record() {
+  const { id, seq, obstacle, dryRun } = useEditorSummary();
+  if (dryRun === null) return null;
+  const { decided, close } = dryRun;
+  return (
+    <RecordDryRun {...{ graph: id, seq, obstacle, script: scriptOf(decided), onStarted: close }} />
+  );
+}
+
+type StripProps = Omit<
+  ComponentProps<typeof RunDrawer>,
+  "graph" | "selected" | "onPick" | "folded" | "onFold"
+>;
+
+function Strip(props: StripProps) {
+  const { graph, selected, pick, folded, fold } = useEditorSummary();
+  return <RunDrawer {...props} {...{ graph, selected, onPick: pick, folded, onFold: fold }} />;
+}
+
 const StillSidebar = memo(Sidebar);
 
 /** Its functions stay the same, so that it is not drawn with each event of a run. */
-function Lists({ id, create, choose, place }: ListsProps) {
+function Lists({ create, choose }: Pick<ReturnType<typeof useNewGraphs>, "create" | "choose">) {
+  const { id, place } = useEditorSummary();
   const onNew = useStableCallback(create);
   const onImport = useStableCallback(choose);
   const onPlace = useStableCallback(place);
   return <StillSidebar current={id} onNew={onNew} onImport={onImport} onPlace={onPlace} />;
 }
 
-interface ListsProps {
-  id: string;
-  create: ReturnType<typeof useNewGraphs>["create"];
-  choose: ReturnType<typeof useNewGraphs>["choose"];
-  place: Parameters<Parameters<typeof Editor>[0]["list"]>[0];
-}
-
-function TitledBar(props: { id: string } & Parameters<typeof PageBar>[0]) {
-  const { id, ...parts } = props;
+function TitledBar(parts: Omit<ComponentProps<typeof PageBar>, "graph">) {
+  const { id } = useEditorSummary();
   const here = parts.crumbs.find(({ to, part }) => to === undefined && !part)?.label;
   useTitle(typeof here === "string" ? here : "Graph");
   return <PageBar graph={id} {...parts} />;
@@ -266,7 +270,9 @@ export function GraphScreen({ id }: { id: string }): ReactNode {
         keep={{ graph: id, person }}
         fallback={<PageBar crumbs={[{ label: "Graphs", to: "/" }]} />}
       >
-        <Inside id={id} />
+        <EditorStoreProvider>
+          <Inside id={id} />
+        </EditorStoreProvider>
       </RoomProvider>
     </PageFrame>
   );

@@ -4,8 +4,8 @@
  */
 import { IconGhost2, IconMessageCircle } from "@tabler/icons-react";
 import { Handle, type NodeProps, Position } from "@xyflow/react";
-import { memo, use, useRef } from "react";
-import type { Action } from "../graph/model";
+import { createContext, memo, type ReactNode, use, useRef } from "react";
+import type { Action, Key } from "../graph/model";
 import { cardRows } from "../graph/parameters/card-rows";
 import { durationText } from "../status/durations";
 import { type Progress, visitsText } from "../status/progress";
@@ -14,22 +14,25 @@ import { colorOfName } from "../ui/name-colors";
 import { stopwatch, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
 import style from "./action-card.module.css";
+import { CardLines } from "./card-lines";
 import {
-  CardStateContext,
+  InsideSpot,
+  SinceSpot,
   useDataRole,
+  useExpandedCard,
   useIsDimmed,
   useIsUnvisited,
   useOpenThreadCount,
-} from "./card-highlights";
-import { CardLines } from "./card-lines";
+} from "./editor-store";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
-import { InsideSpot, useExpandedCard } from "./graphs-inside";
 import { ChangeTag, useChangeMark } from "./marks/change-marks";
 import { ProblemBadge } from "./marks/problem-marks";
-import { SinceSpot } from "./marks/since-marks";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
 import { STATE_LETTER } from "./zoom-detail";
+
+/** Replaces the state on cards where the canvas shows something else than one run. */
+export const CardStateContext = createContext<((key: Key) => ReactNode) | null>(null);
 
 /** Shows the state of an action in a run, its duration and its number of visits. */
 export function CardState({ progress }: { progress: Progress }) {

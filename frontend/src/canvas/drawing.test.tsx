@@ -24,8 +24,8 @@ const ACTIONS = 1000;
 
 /** The actions whose cards React rendered: each card asks once for the comments about its action. */
 const { rendered } = vi.hoisted(() => ({ rendered: [] as string[] }));
-vi.mock("./card-highlights", async (original) => {
-  const real = await original<typeof import("./card-highlights")>();
+vi.mock("./editor-store", async (original) => {
+  const real = await original<typeof import("./editor-store")>();
   const useOpenThreadCount = (key: string) => {
     rendered.push(key);
     return real.useOpenThreadCount(key);

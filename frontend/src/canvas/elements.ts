@@ -44,6 +44,16 @@ export type CardNode = Node<
   "action"
 >;
 export type EndNode = Node<{ end: "entry" | "exit"; direction: Direction; progress: null }, "end">;
+/** Folded frames, and what each of them hides. */
+export interface Folding {
+  /** Frames that are drawn as one block, by key. */
+  readonly blocks: ReadonlyMap<string, Note>;
+  /** Hidden elements, each with the block that is drawn instead. */
+  readonly blockOf: ReadonlyMap<Key, string>;
+  /** The block on which the entry or the exit lies; these two are never hidden. */
+  readonly blockUnder: ReadonlyMap<Key, string>;
+}
+
 export type CanvasNode = CardNode | EndNode | NoteNode | FoldedNode;
 
 export interface OutcomeResponse {

@@ -1,6 +1,6 @@
 /** The threads of the open graph, kept in step with the document. */
 import { useEffect, useMemo, useRef, useSyncExternalStore } from "react";
-import { cardHighlights } from "../canvas/card-highlights";
+import { useEditorStore } from "../canvas/editor-store";
 import { rootOf } from "../graph/document-keys";
 import { openThreadCounts, readThreads, type Thread } from "../graph/edit/comments";
 import { useRoom } from "../sync/use-room";
@@ -30,6 +30,6 @@ export function useThreads(): readonly Thread[] {
 
 /** Cards show how many open threads there are about them. */
 export function useOpenThreadsOnCards(threads: readonly Thread[]): void {
-  useEffect(() => cardHighlights.set({ openThreads: openThreadCounts(threads) }), [threads]);
-  useEffect(() => cardHighlights.reset, []);
+  const { openThreads } = useEditorStore();
+  useEffect(() => openThreads.set(openThreadCounts(threads)), [openThreads, threads]);
 }

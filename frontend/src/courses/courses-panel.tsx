@@ -16,7 +16,6 @@ import type { Script } from "../api/dry-runs";
 import { authorName } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
-import { cardHighlights } from "../canvas/card-highlights";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { endName } from "../graph/relation-words";
 import { day, useNow } from "../ui/times";
@@ -27,7 +26,7 @@ import { isThere, UntakenList, untakenPlaces } from "./untaken-list";
 
 /** While this is open, the canvas says what no course takes; in a dry-run it has something else to say. */
 function useUntakenOnCanvas(
-  { graph, past, dryRun }: EditorContext,
+  { graph, past, dryRun, store: { untaken } }: EditorContext,
   found: CheckedCourses | undefined,
 ): void {
   const shows = past === null && dryRun === null && found !== undefined && found.courses.length > 0;
@@ -36,9 +35,9 @@ function useUntakenOnCanvas(
     [graph, shows, found],
   );
   useEffect(() => {
-    cardHighlights.set({ untaken: places });
-    return () => cardHighlights.set({ untaken: null });
-  }, [places]);
+    untaken.set(places);
+    return () => untaken.set(null);
+  }, [untaken, places]);
 }
 
 function Covered({ found: { coverage, courses } }: { found: CheckedCourses }) {

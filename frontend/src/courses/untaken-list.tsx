@@ -11,7 +11,7 @@ import {
 } from "../api/courses";
 import type { Script } from "../api/dry-runs";
 import { errorText } from "../api/http";
-import type { UntakenPlaces } from "../canvas/card-highlights";
+import type { UntakenPlaces } from "../canvas/editor-store";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";

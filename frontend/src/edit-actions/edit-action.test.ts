@@ -1,4 +1,5 @@
 import { expect, test } from "vitest";
+import { EditorStore } from "../canvas/editor-store";
 import { EMPTY_GRAPH } from "../graph/model";
 import { EDIT_ACTIONS } from "./all";
 import { editActionFor, isEnabled, isPressed, labelOf, printedKeys } from "./edit-action";
@@ -62,6 +63,7 @@ test("Mod is the command key on a Mac", () => {
 
 test("a viewer is offered no change of the graph, and is told why", () => {
   const context = {
+    store: new EditorStore(),
     mayEdit: false,
     canUndo: true,
     canRedo: true,

@@ -1,6 +1,7 @@
 /** The context of edit actions: the open graph, the selection, and the view. */
 import { createContext, use } from "react";
 import type * as Y from "yjs";
+import type { EditorStore } from "../canvas/editor-store";
 import { CARD, freeSpot, placeAfter, unplaced } from "../canvas/geometry/arrange";
 import type { DryRunSeed } from "../dry-run/seed";
 import type { DryRun } from "../dry-run/use-dry-run";
@@ -131,6 +132,7 @@ export interface EditorContext {
   /** Frames that this person sees folded, on this device: keys that may be gone. */
   readonly folded: ReadonlySet<string>;
   readonly view: CanvasView;
+  readonly store: EditorStore;
   /** The graph is played on the canvas; null while it is not. */
   readonly dryRun: DryRun | null;
   /** The past moment that is shown, to look at; null for the present. */

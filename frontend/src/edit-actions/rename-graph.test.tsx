@@ -2,18 +2,16 @@
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { act } from "react";
 import { createRoot } from "react-dom/client";
-import { afterEach, expect, test, vi } from "vitest";
+import { expect, test, vi } from "vitest";
 import * as Y from "yjs";
 import { queryKeys } from "../api/graphs";
-import { graphsInside } from "../canvas/graphs-inside";
+import { EditorStore, type GraphsInside } from "../canvas/editor-store";
 import { setGraphName } from "../graph/edit";
 import { graphIn } from "../testing/edited-graph";
 import type { EditorContext, Overlay } from "./editor-context";
 import { useRenameGraph } from "./rename-graph";
 
 vi.stubGlobal("IS_REACT_ACT_ENVIRONMENT", true);
-
-afterEach(() => act(() => graphsInside.set(null)));
 
 interface ProbeProps {
   context: EditorContext;
@@ -31,10 +29,12 @@ function renamed(name: string, isNamed: boolean, document: string | null = null)
   setGraphName(doc, "Lift");
   const client = new QueryClient({ defaultOptions: { queries: { staleTime: Infinity } } });
   client.setQueryData(queryKeys.actions, [{ name: "Lift", document, used_in: ["g", "round"] }]);
-  graphsInside.set({ isNamed } as Parameters<typeof graphsInside.set>[0]);
+  const store = new EditorStore();
+  store.graphsInside.set({ isNamed } as GraphsInside);
   const asked: (Overlay | null)[] = [];
   const context = {
     doc,
+    store,
     id: "g",
     graph: graphIn(doc),
     openOverlay: (overlay: Overlay | null) => asked.push(overlay),

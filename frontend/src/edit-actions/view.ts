@@ -17,7 +17,6 @@ import {
   IconZoomIn,
   IconZoomOut,
 } from "@tabler/icons-react";
-import { graphsInside } from "../canvas/graphs-inside";
 import { ENTRY, type Key } from "../graph/model";
 import type { EditAction } from "./edit-action";
 import { type EditorContext, selectedActions, selectedRelations } from "./editor-context";
@@ -217,7 +216,7 @@ export const WALK: readonly EditAction[] = (["up", "down", "left", "right"] as c
 /** The one action that is chosen, if it stands for a graph. */
 export function chosenGraph(context: EditorContext) {
   const [only, ...others] = selectedActions(context);
-  const stands = only !== undefined && graphsInside.now()?.byName.has(only.name);
+  const stands = only !== undefined && context.store.graphsInside.now()?.byName.has(only.name);
   return stands && others.length === 0 ? only : null;
 }
 
@@ -232,7 +231,7 @@ export const enter: EditAction = {
   idle: "Choose an action that stands for a graph first.",
   run: (context) => {
     const action = chosenGraph(context);
-    if (action) graphsInside.now()?.enter(action.key);
+    if (action) context.store.graphsInside.now()?.enter(action.key);
   },
 };
 
@@ -243,16 +242,16 @@ export const leave: EditAction = {
   label: "Out to the graph around",
   shortcuts: ["[", "Mod+ArrowUp"],
   icon: IconStairsUp,
-  enabled: () => (graphsInside.now()?.leave ?? null) !== null,
+  enabled: ({ store }) => (store.graphsInside.now()?.leave ?? null) !== null,
   idle: "You came here from no other graph.",
-  run: () => graphsInside.now()?.leave?.(),
+  run: ({ store }) => store.graphsInside.now()?.leave?.(),
 };
 
 const inPlace = { ...look, also: "sub-graph level hierarchy in place fold open" } as const;
 
 /** The actions that are chosen and stand for graphs. */
 const chosenGraphs = (context: EditorContext) =>
-  selectedActions(context).filter(({ name }) => graphsInside.now()?.byName.has(name));
+  selectedActions(context).filter(({ name }) => context.store.graphsInside.now()?.byName.has(name));
 
 export const expandGraph: EditAction = {
   ...inPlace,
@@ -263,7 +262,8 @@ export const expandGraph: EditAction = {
   enabled: (context) => chosenGraphs(context).length > 0,
   idle: "Choose an action that stands for a graph first.",
   run: (context) => {
-    for (const { key } of chosenGraphs(context)) graphsInside.now()?.expand.toggle(key);
+    for (const { key } of chosenGraphs(context))
+      context.store.graphsInside.now()?.expand.toggle(key);
   },
 };
 
@@ -273,10 +273,10 @@ export const expandMore: EditAction = {
   label: "Expand all graphs inside, one level more",
   shortcuts: [],
   icon: IconArrowsDiagonal,
-  enabled: ({ graph }) =>
-    graph.actions.some(({ name }) => graphsInside.now()?.byName.has(name) ?? false),
+  enabled: ({ graph, store }) =>
+    graph.actions.some(({ name }) => store.graphsInside.now()?.byName.has(name) ?? false),
   idle: "No action here stands for a graph.",
-  run: () => graphsInside.now()?.expand.expandMore(),
+  run: ({ store }) => store.graphsInside.now()?.expand.expandMore(),
 };
 
 export const collapseGraphs: EditAction = {
@@ -285,9 +285,9 @@ export const collapseGraphs: EditAction = {
   label: "Collapse all graphs inside",
   shortcuts: ["{", "Mod+Shift+ArrowUp"],
   icon: IconArrowsDiagonalMinimize2,
-  enabled: () => graphsInside.now()?.expand.isAnyExpanded() ?? false,
+  enabled: ({ store }) => store.graphsInside.now()?.expand.isAnyExpanded() ?? false,
   idle: "Nothing is expanded.",
-  run: () => graphsInside.now()?.expand.collapseAll(),
+  run: ({ store }) => store.graphsInside.now()?.expand.collapseAll(),
 };
 
 /** Makes one graph without graphs inside; listed among the actions on the whole graph. */
@@ -299,7 +299,7 @@ export const flatten: EditAction = {
   shortcuts: [],
   icon: IconSitemapOff,
   also: "flatten sub-graph inline hierarchy levels",
-  enabled: ({ graph }) =>
-    graph.actions.some(({ name }) => graphsInside.now()?.byName.has(name) ?? false),
+  enabled: ({ graph, store }) =>
+    graph.actions.some(({ name }) => store.graphsInside.now()?.byName.has(name) ?? false),
   run: (context) => context.openOverlay({ kind: "flat" }),
 };

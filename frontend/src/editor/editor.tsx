@@ -4,20 +4,21 @@ import { useLocalStorage } from "@mantine/hooks";
 import {
   type ComponentProps,
   type ComponentType,
+  createContext,
   memo,
   type ReactNode,
+  use,
   useEffect,
   useMemo,
   useState,
 } from "react";
 import { useSearch } from "wouter";
-import type { Script } from "../api/dry-runs";
-import { NameOfGraph } from "../canvas/graphs-inside";
+import { NameOfGraph } from "../canvas/editor-store";
 import { addressAround, levelsOf } from "../canvas/level-path";
 import { FoldFrameContext, type NoteLinks, NoteLinksContext } from "../canvas/notes/note-buttons";
 import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
-import { scriptOf } from "../dry-run/script";
 import type { DryRunSeed } from "../dry-run/seed";
+import type { DryRun } from "../dry-run/use-dry-run";
 import {
   type AddRequest,
   addActionAt,
@@ -156,20 +157,32 @@ const PastDetails = lazyPart(() =>
 );
 const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
 
-/** State of the editor for the parts that the page provides. */
-export interface EditorSummary {
+/** State of the editor for the parts that the page provides, such as those of runs. */
+interface EditorSummary {
+  id: string;
   graph: Graph;
+  dryRun: DryRun | null;
   seq: number;
   /** The reason why this moment cannot be started; null if it can. */
   obstacle: string | null;
   selected: string | null;
   pick: (aid: string) => void;
+  /** Adds an action where there is room. */
+  place: (template: NewAction) => void;
   compact: boolean;
   /** Phone layout: one part at a time. */
   phone: boolean;
   /** True if the strip shows only its head; null on a phone, where it has a pane of its own. */
   folded: boolean | null;
   fold: (folded: boolean) => void;
+}
+
+const EditorSummaryContext = createContext<EditorSummary | null>(null);
+
+export function useEditorSummary(): EditorSummary {
+  const summary = use(EditorSummaryContext);
+  if (summary === null) throw new Error("useEditorSummary needs an editor around it");
+  return summary;
 }
 
 interface EditorBarParts {
@@ -186,13 +199,14 @@ interface Props {
   progress: ReadonlyMap<Key, Progress>;
   /** The id of the current run; null without one. */
   run: string | null;
-  bar: (parts: EditorBarParts) => ReactNode;
-  list: (place: (template: NewAction) => void) => ReactNode;
-  strip: (summary: EditorSummary) => ReactNode;
-  start: (summary: EditorSummary) => ReactNode;
-  status: (summary: EditorSummary) => ReactNode;
-  /** Returns the button that turns the open dry-run into a run. */
-  record: (summary: EditorSummary, script: Script, onStarted: () => void) => ReactNode;
+  Bar: ComponentType<EditorBarParts>;
+  // These parts read `useEditorSummary`.
+  list: ReactNode;
+  strip: ReactNode;
+  start: ReactNode;
+  status: ReactNode;
+  /** The button that turns the open dry-run into a run. */
+  record: ReactNode;
   corner: ReactNode;
   /** The moment of a run at which a dry-run shall start; null without one. */
   seed: DryRunSeed | null;
@@ -218,6 +232,7 @@ function useSummary(
   context: EditorContext,
   link: RoomLink,
   checked: Checked,
+  place: EditorSummary["place"],
 ): EditorSummary & { onPlacing: (placing: boolean) => void } {
   const [placing, setPlacing] = useState(false);
   const wide = useIsWide();
@@ -231,7 +246,10 @@ function useSummary(
     .filter((action) => context.selection.has(action.key))
     .map((action) => action.key);
   return {
+    id: context.id,
     graph: context.graph,
+    dryRun: context.dryRun,
+    place,
     seq: link.seq,
     obstacle: obstacleOf(context, link, checked, placing),
     onPlacing: setPlacing,
@@ -335,11 +353,11 @@ function barParts(
         </PartBoundary>
         <SaveStatus />
         <ProblemCount told={told} />
-        {!summary.compact && status(summary)}
+        {!summary.compact && status}
       </>
     ),
     actions: <StillPeople me={me} />,
-    start: summary.phone ? null : withDryRun(start(summary)),
+    start: summary.phone ? null : withDryRun(start),
   };
 }
 
@@ -351,15 +369,6 @@ function useSeededDryRun({ beginDryRun }: EditorContext, seed: DryRunSeed | null
 }
 
 const NOTHING_TOLD: readonly never[] = [];
-
-/** Return the button that turns the open dry-run into a run; null without one. */
-function recordOf(
-  { dryRun }: EditorContext,
-  summary: EditorSummary,
-  record: Props["record"],
-): ReactNode {
-  return dryRun && record(summary, scriptOf(dryRun.decided), dryRun.close);
-}
 
 /** Memoized, so that the events of a run do not render the side panels again. */
 const StillInspector = memo(Inspector);
@@ -401,7 +410,7 @@ export function Editor(props: Props) {
   const place = (template: NewAction) => {
     if (placeAction(context, template)) panels.setLeft(false);
   };
-  const summary = useSummary(context, link, { seq: problems?.seq, told });
+  const summary = useSummary(context, link, { seq: problems?.seq, told }, place);
   const { compact, phone } = summary;
   const stage = (
     <CanvasPane
@@ -412,7 +421,7 @@ export function Editor(props: Props) {
       compact={compact}
       phone={phone}
       run={props.run}
-      record={recordOf(context, summary, props.record)}
+      record={props.record}
       writing={overlay?.kind === "note" ? overlay.key : null}
       corner={phone ? null : props.corner}
       onPlacing={summary.onPlacing}
@@ -422,7 +431,7 @@ export function Editor(props: Props) {
   // A dry-run or the past hides the strip of runs that are over; a current run always stays
   // visible.
   const isDryOrPast = context.dryRun !== null || context.past !== null;
-  const strip = isDryOrPast && props.run === null ? null : props.strip(summary);
+  const strip = isDryOrPast && props.run === null ? null : props.strip;
   const parts = {
     panels,
     stage,
@@ -446,16 +455,18 @@ export function Editor(props: Props) {
         </PartBoundary>
       </DetailsPane>
     ),
-    status: () => props.status(summary),
+    status: props.status,
   };
   return (
     <EditorContextProvider context={context}>
-      {props.bar(barParts(props, context, summary, told, search, rename))}
-      {phone ? (
-        <PhoneLayout {...parts} onCanvas={isDryOrPast} start={() => props.start(summary)} />
-      ) : (
-        <DesktopLayout {...parts} wide={!compact} told={told} list={() => props.list(place)} />
-      )}
+      <EditorSummaryContext value={summary}>
+        <props.Bar {...barParts(props, context, summary, told, search, rename)} />
+        {phone ? (
+          <PhoneLayout {...parts} onCanvas={isDryOrPast} start={props.start} />
+        ) : (
+          <DesktopLayout {...parts} wide={!compact} told={told} list={props.list} />
+        )}
+      </EditorSummaryContext>
       <RoomNotices />
       <LateParts />
       <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />

@@ -2,7 +2,7 @@
 import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
 import { useEffect, useMemo, useRef } from "react";
 import { useProblems } from "../api/graphs";
-import { toldOnCanvas } from "../canvas/graphs-inside";
+import { useEditorStore } from "../canvas/editor-store";
 import { problemMarksOf } from "../canvas/marks/problem-marks";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
@@ -21,10 +21,8 @@ export function useProblemGroups(id: string, seq: number, graph: Graph) {
   const found = problems?.problems;
   const told = useMemo(() => problemGroups(found ?? [], now.current), [found]);
   const marks = useMemo(() => problemMarksOf(told), [told]);
-  useEffect(() => {
-    toldOnCanvas.set(told);
-    return () => toldOnCanvas.set([]);
-  }, [told]);
+  const store = useEditorStore();
+  useEffect(() => store.problems.set(told), [store, told]);
   return { problems, told, marks };
 }
 

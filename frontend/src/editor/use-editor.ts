@@ -3,6 +3,7 @@
 import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/people";
+import { useEditorStore } from "../canvas/editor-store";
 import { CARD } from "../canvas/geometry/arrange";
 import { useDryRun } from "../dry-run/use-dry-run";
 import {
@@ -186,6 +187,7 @@ export function useEditor(
   past: Past = NO_PAST,
 ): EditorState {
   const latest = useRef<EditorContext | null>(null);
+  const store = useEditorStore();
   const edited = useEdited(id, past);
   const tools = useTools();
   const { keys: folded, put: fold } = useKeptKeys("aa.folded", id);
@@ -199,8 +201,11 @@ export function useEditor(
     if (latest.current) void exportGraph(latest.current, format);
   }, []);
   const context = useMemo<EditorContext>(
-    () => ({ ...edited, ...tools, folded, fold, ...openers, ...canvasOf(canvasHandle), download }),
-    [edited, tools, folded, fold, openers, download],
+    () => ({
+      ...{ ...edited, ...tools, ...openers, ...canvasOf(canvasHandle) },
+      ...{ store, folded, fold, download },
+    }),
+    [store, edited, tools, folded, fold, openers, download],
   );
   latest.current = context;
   return { context, canvasHandle, ...opened };

@@ -8,21 +8,13 @@ import {
   IconSquareRounded,
   IconX,
 } from "@tabler/icons-react";
-import {
-  useDeferredValue,
-  useEffect,
-  useId,
-  useMemo,
-  useRef,
-  useState,
-  useSyncExternalStore,
-} from "react";
+import { useDeferredValue, useEffect, useId, useMemo, useRef, useState } from "react";
 import type { Problem } from "../api/graphs";
-import { expandedGraphs } from "../canvas/graphs-inside";
 import { printedKeys } from "../edit-actions/edit-action";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { keyOf } from "../ui/keys";
 import { Tooltip } from "../ui/tooltip";
+import { useWatched } from "../ui/watched";
 import { find, findInside, type Hit } from "./find";
 import style from "./find-bar.module.css";
 
@@ -86,7 +78,7 @@ export function FindBar({ problems, onClose }: Props) {
   const [query, setQuery] = useState("");
   const [at, setAt] = useState(0);
   const asked = useDeferredValue(query);
-  const expanded = useSyncExternalStore(expandedGraphs.subscribe, expandedGraphs.now);
+  const expanded = useWatched(context.store.expanded);
   const hits = useMemo(
     () => [
       ...find(context.graph, problems, asked),

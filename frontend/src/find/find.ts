@@ -1,6 +1,6 @@
 /** Finding actions and arrows of a graph by anything that they say. Pure. */
 import type { Problem } from "../api/graphs";
-import type { PartOnCard } from "../canvas/graphs-inside";
+import type { PartOnCard } from "../canvas/editor-store";
 import { relationId } from "../graph/document-keys";
 import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS } from "../graph/model";
 import { placeOf } from "../graph/problems/problem-groups";

@@ -1,7 +1,7 @@
 /** Below the canvas while it shows the past: what one sees, the line of all moments, and the way back. */
 import { Button } from "@mantine/core";
 import { IconHistory } from "@tabler/icons-react";
-import { useEffect, useLayoutEffect, useMemo, useSyncExternalStore } from "react";
+import { useEffect, useLayoutEffect, useMemo } from "react";
 import { errorText } from "../api/http";
 import type { ChangeMarks } from "../canvas/marks/change-marks";
 import {
@@ -13,6 +13,7 @@ import type { Graph } from "../graph/model";
 import { usePersonColors, useThrottledLink } from "../sync/use-room";
 import { Segments } from "../ui/segments";
 import { useNow } from "../ui/times";
+import { useWatched } from "../ui/watched";
 import { ChangesWalk } from "./changes-walk";
 import { CompareWith, useRunning } from "./compare-with";
 import { momentWords, useCompared } from "./compared";
@@ -74,7 +75,7 @@ interface Props {
 }
 
 export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
-  const place = useSyncExternalStore(wanted.subscribe, wanted.now) ?? drawn;
+  const place = useWatched(wanted) ?? drawn;
   const context = useEditorContext();
   const { id, lookAt } = context;
   const { seq } = useThrottledLink();

@@ -8,13 +8,8 @@ import { fetchDocument, useBlame } from "../api/history";
 import { newestRun } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { listRuns, NO_FILTER } from "../api/review";
+import type { SinceMarks as MarksSince, SinceMark, SinceSignProps } from "../canvas/editor-store";
 import { CHANGE_SIGNS } from "../canvas/marks/change-marks";
-import {
-  type SinceMarks as MarksSince,
-  type SinceMark,
-  type SinceSignProps,
-  sinceMarks,
-} from "../canvas/marks/since-marks";
 import { type FieldChange, linesOf } from "../differences/difference-words";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { mapsFrom, relationId } from "../graph/document-keys";
@@ -68,7 +63,10 @@ function quietly(work: () => void): { soon(): void; stop(): void } {
 }
 
 function useMarks({ run, seq }: GoodRun): void {
-  const { id } = useEditorContext();
+  const {
+    id,
+    store: { sinceMarks },
+  } = useEditorContext();
   const client = useQueryClient();
   const { source } = useRoom();
   useEffect(() => {
@@ -102,7 +100,7 @@ function useMarks({ run, seq }: GoodRun): void {
       end();
       sinceMarks.set(null);
     };
-  }, [client, id, run, seq, source]);
+  }, [client, id, run, seq, source, sinceMarks]);
 }
 
 function Marks(good: GoodRun) {

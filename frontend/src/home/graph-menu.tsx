@@ -14,10 +14,9 @@ import {
   renameGraph,
 } from "../api/graphs";
 import { errorText } from "../api/http";
-import { fetchLibrary } from "../api/library";
+import { fetchLibrary, usedIn } from "../api/library";
 import { serverPath } from "../api/page-url";
 import { useMay } from "../api/people";
-import { usedIn } from "../canvas/graphs-inside";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { isolated } from "../words/isolated";
 import style from "./home.module.css";

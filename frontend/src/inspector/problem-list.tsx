@@ -3,7 +3,6 @@ import { ActionIcon, Button } from "@mantine/core";
 import { IconCircleCheck, IconLink, IconStairsDown, IconTool } from "@tabler/icons-react";
 import { useMemo } from "react";
 import type { Problems } from "../api/graphs";
-import { graphsInside } from "../canvas/graphs-inside";
 import { copyLinkTo } from "../edit-actions/clipboard";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
 import { linkToProblem } from "../edit-actions/graph-links";
@@ -76,6 +75,7 @@ function Values({ told }: { told: CheckedGroup }) {
 
 /** Leads to where in a graph inside it is. */
 function WayInside({ inside }: { inside: CheckedPlaceInside | undefined }) {
+  const { store } = useEditorContext();
   if (inside === undefined) return null;
   const { levels, aids, where } = inside;
   const steps = levels.map((level, i) => ({
@@ -87,7 +87,7 @@ function WayInside({ inside }: { inside: CheckedPlaceInside | undefined }) {
     <button
       type="button"
       className={style.jump}
-      onClick={() => graphsInside.now()?.show(steps, where?.relation ?? where?.aid ?? null)}
+      onClick={() => store.graphsInside.now()?.show(steps, where?.relation ?? where?.aid ?? null)}
       aria-label={`Show where it is inside ${words}`}
     >
       <IconStairsDown size={13} aria-hidden /> inside {levels.length > 1 && <bdi>{words}</bdi>}

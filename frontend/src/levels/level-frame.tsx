@@ -12,8 +12,8 @@ import card from "../canvas/action-card.module.css";
 import { pillWord } from "../canvas/arrows/bundles";
 import { pathOf } from "../canvas/arrows/line-path";
 import { CardLines } from "../canvas/card-lines";
+import { type LevelFrameProps, type LevelGraph, useEditorStore } from "../canvas/editor-store";
 import { CARD_LINES } from "../canvas/geometry/arrange";
-import { graphsInside, type LevelFrameProps, toldOnCanvas } from "../canvas/graphs-inside";
 import {
   ProblemBadge,
   type ProblemMark,
@@ -28,14 +28,13 @@ import { type Action, type Direction, fullName, type Key, type Precondition } fr
 import { cardRows } from "../graph/parameters/card-rows";
 import type { ProblemGroup } from "../graph/problems/problem-groups";
 import type { Progress } from "../status/progress";
-import { progressBelow, type RunOnCanvas, runOnCanvas } from "../status/progress-inside";
+import { progressBelow, type RunOnCanvas } from "../status/progress-inside";
 import { StateLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
 import { useWatched } from "../ui/watched";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./level-frame.module.css";
-import { expansion, type LevelGraph } from "./level-graph";
 import { type LevelLayout, layoutOf } from "./level-layout";
 
 const NO_PROGRESS: ReadonlyMap<Key, Progress> = new Map();
@@ -67,9 +66,9 @@ export function progressOf(
 }
 
 function useLevelProgress(level: LevelGraph): ReadonlyMap<Key, Progress> {
-  const { dryRun, graph } = useEditorContext();
+  const { dryRun, graph, store } = useEditorContext();
   const { name: outermost } = graph;
-  const run = useWatched(runOnCanvas);
+  const run = useWatched(store.run);
   return useMemo(
     () => progressOf(level, { dryRun, run, outermost }),
     [level, dryRun, run, outermost],
@@ -99,7 +98,7 @@ export function marksInside(told: readonly ProblemGroup[]): ProblemMarks {
 }
 
 function useMarkInside(path: string): ProblemMark | undefined {
-  return useWatched(toldOnCanvas, (told) => marksInside(told).get(path));
+  return useWatched(useEditorStore().problems, (told) => marksInside(told).get(path));
 }
 
 const NO_OUTCOMES: readonly Precondition[] = [];
@@ -190,8 +189,6 @@ export function CardButton({ label, keys, Sign, small = false, onClick }: Button
   );
 }
 
-const opensGraph = (name: string) => graphsInside.now()?.byName.has(name) ?? false;
-
 function MarkInside({ path }: { path: string }) {
   const mark = useMarkInside(path);
   return mark && <ProblemBadge mark={mark} on="card" />;
@@ -214,6 +211,7 @@ const InnerCard = memo(function InnerCard({
   box,
 }: InnerCardProps) {
   const { name, instanceId, actor, inputs } = action;
+  const { graphsInside } = useEditorStore();
   return (
     <div
       className={`${card.card} ${style.card}`}
@@ -238,11 +236,11 @@ const InnerCard = memo(function InnerCard({
           {name}
         </b>
         {instanceId > 0 && <span className={card.instance}>{instanceId}</span>}
-        {opensGraph(name) && (
+        {graphsInside.now()?.byName.has(name) && (
           <CardButton
             label={`Expand the graph inside ${isolated(name)}`}
             Sign={IconArrowsDiagonal}
-            onClick={() => expansion.now().toggle(path)}
+            onClick={() => graphsInside.now()?.expand.toggle(path)}
           />
         )}
       </div>
@@ -267,6 +265,7 @@ interface FrameProps {
 
 function Head({ level, name, progress }: FrameProps) {
   const { graph, path } = level;
+  const { graphsInside } = useEditorStore();
   const count =
     graph === null || typeof graph === "string" ? "" : counted(graph.actions.length, "action");
   return (
@@ -282,13 +281,13 @@ function Head({ level, name, progress }: FrameProps) {
           label={`Open the graph inside ${isolated(name)}`}
           keys="]"
           Sign={IconStairsDown}
-          onClick={() => expansion.now().enter(path)}
+          onClick={() => graphsInside.now()?.enter(path)}
         />
         <CardButton
           label={`Collapse the graph inside ${isolated(name)}`}
           keys="}"
           Sign={IconArrowsDiagonalMinimize2}
-          onClick={() => expansion.now().toggle(path)}
+          onClick={() => graphsInside.now()?.expand.toggle(path)}
         />
       </span>
     </div>
@@ -351,7 +350,7 @@ function LevelFrame({ level, name, progress }: FrameProps) {
 
 /** Draws the expanded graph on the card of an action of the canvas. */
 export function ExpandedCard({ of, progress }: LevelFrameProps) {
-  const level = useWatched(expansion, ({ levels }) => levels.get(of));
+  const level = useWatched(useEditorStore().expanded, (expanded) => expanded?.levels.get(of));
   if (!level) return null;
   const name = level.names.at(-1)?.name ?? "";
   return <LevelFrame level={level} name={name} progress={progress} />;

@@ -1,9 +1,10 @@
 /** What is expanded is a tree of the graphs for which actions stand; none is inside of itself. */
 import fc from "fast-check";
 import { expect, test } from "vitest";
+import type { LevelGraph } from "../canvas/editor-store";
 import { fromUmrf } from "../canvas/from-umrf";
 import type { Graph } from "../graph/model";
-import { type KnownGraphs, type LevelGraph, levelsBelow, pathsTo } from "./level-graph";
+import { type KnownGraphs, levelsBelow, pathsTo } from "./level-graph";
 import { layoutOf } from "./level-layout";
 import { roomFor } from "./room";
 

@@ -5,24 +5,11 @@ import { useMemo } from "react";
 import { editor } from "../api/client";
 import { queryKeys, useGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
+import type { LevelGraph } from "../canvas/editor-store";
 import { fromUmrf } from "../canvas/from-umrf";
-import type { Action, Graph, Key } from "../graph/model";
-import { Watched } from "../ui/watched";
+import type { Graph, Key } from "../graph/model";
 
-type LevelAction = Pick<Action, "name" | "instanceId">;
-
-/** The graph for which an action stands, with the graphs that are expanded in it. */
-export interface LevelGraph {
-  /** The id of the graph on the server. */
-  readonly id: string;
-  /** Keys of the actions that lead here, outermost first, joined by "/". */
-  readonly path: string;
-  /** Names and numbers of these actions. */
-  readonly names: readonly LevelAction[];
-  /** Null while it is loading; a text tells why it cannot be loaded. */
-  readonly graph: Graph | string | null;
-  readonly levels: ReadonlyMap<Key, LevelGraph>;
-}
+type LevelAction = LevelGraph["names"][number];
 
 /** The graphs of the server, as far as they are loaded. */
 export interface KnownGraphs {
@@ -94,19 +81,6 @@ export function pathsTo(
     return [path, ...pathsTo(inner, depth - 1, known, below)];
   });
 }
-
-interface Expansion {
-  /** Expanded graphs by the actions of the graph on the canvas. */
-  readonly levels: ReadonlyMap<Key, LevelGraph>;
-  toggle(path: string): void;
-  enter(path: string): void;
-}
-
-export const expansion = new Watched<Expansion>({
-  levels: new Map(),
-  toggle: () => {},
-  enter: () => {},
-});
 
 const read = (umrf: unknown): Graph => fromUmrf(umrf);
 

@@ -3,9 +3,9 @@ import { type Bundle, bundlesOf, pillSizeOf } from "../canvas/arrows/bundles";
 import { routed } from "../canvas/arrows/routes";
 import { gridOffset, type Scene, type SceneCard } from "../canvas/arrows/scene";
 import { type LineMap, type RoutedLine, simpleLines } from "../canvas/arrows/simple-lines";
+import type { LevelGraph } from "../canvas/editor-store";
 import { estimatedSizes, type Positions, positionsOf, type Size } from "../canvas/geometry/arrange";
 import { type Action, type Direction, ENTRY, EXIT, type Graph, type Key } from "../graph/model";
-import type { LevelGraph } from "./level-graph";
 import { placesIn, roomFor } from "./room";
 
 interface LevelCard extends Size {

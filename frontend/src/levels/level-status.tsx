@@ -8,8 +8,8 @@ import { notifications } from "@mantine/notifications";
 import { IconSitemap, IconStairsUp } from "@tabler/icons-react";
 import { useEffect } from "react";
 import { Link } from "wouter";
-import { useLibrary } from "../api/library";
-import { graphsInside, usedIn } from "../canvas/graphs-inside";
+import { usedIn, useLibrary } from "../api/library";
+import { useEditorStore } from "../canvas/editor-store";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { useWatched } from "../ui/watched";
 import { isolated } from "../words/isolated";
@@ -17,9 +17,9 @@ import style from "./levels.module.css";
 
 /** Return the ids of the graphs with an action that stands for this one. */
 function useUsedIn(): readonly string[] {
-  const { id, graph } = useEditorContext();
+  const { id, graph, store } = useEditorContext();
   const { data: actions = [] } = useLibrary();
-  const stands = useWatched(graphsInside, (inside) => inside?.isNamed ?? false);
+  const stands = useWatched(store.graphsInside, (inside) => inside?.isNamed ?? false);
   return stands ? usedIn(actions, { id, name: graph.name }) : [];
 }
 
@@ -29,13 +29,13 @@ const told = new Set<string>();
 
 /** Shows at the first edit that it changes several other graphs, too. */
 function useNoticeOfMany(graphs: readonly string[]): void {
-  const { id, undo } = useEditorContext();
+  const { id, undo, store } = useEditorContext();
   const count = graphs.length;
   useEffect(() => {
     const tell = ({ type }: { type: "undo" | "redo" }) => {
       if (type !== "undo" || count < MANY || told.has(id)) return;
       told.add(id);
-      const names = graphs.map((graph) => graphsInside.now()?.names.get(graph) || "Untitled");
+      const names = graphs.map((graph) => store.graphsInside.now()?.names.get(graph) || "Untitled");
       notifications.show({
         color: "yellow",
         autoClose: NOTICE_MS,
@@ -45,7 +45,7 @@ function useNoticeOfMany(graphs: readonly string[]): void {
     };
     undo.on("stack-item-added", tell);
     return () => undo.off("stack-item-added", tell);
-  }, [id, undo, graphs, count]);
+  }, [id, undo, store, graphs, count]);
 }
 
 const NOTICE_MS = 12_000;
@@ -53,6 +53,7 @@ const NAMED = 4;
 
 function UsedIn() {
   const graphs = useUsedIn();
+  const { graphsInside } = useEditorStore();
   useNoticeOfMany(graphs);
   if (graphs.length === 0) return null;
   const words = graphs.length === 1 ? "in 1 graph" : `in ${graphs.length} graphs`;
@@ -85,7 +86,7 @@ function UsedIn() {
 
 /** The button to leave an inner graph; it replaces the line of levels on narrow screens. */
 function LeaveButton() {
-  const leave = useWatched(graphsInside, (inside) => inside?.leave);
+  const leave = useWatched(useEditorStore().graphsInside, (inside) => inside?.leave);
   if (!leave) return null;
   return (
     <button type="button" className={`${style.used} ${style.out}`} onClick={leave}>

@@ -6,7 +6,7 @@ import { useCallback, useEffect, useMemo } from "react";
 import { useLocation, useSearch } from "wouter";
 import { refreshLibrary } from "../api/graphs";
 import { useGraphsAsActions, useLibrary } from "../api/library";
-import { graphsInside, type InnerStep, type InsideSignProps } from "../canvas/graphs-inside";
+import { type InnerStep, type InsideSignProps, useEditorStore } from "../canvas/editor-store";
 import { addressAround, addressInside, type Level, levelsOf } from "../canvas/level-path";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
@@ -14,11 +14,11 @@ import { announcer } from "../ui/announcer";
 import { useStableCallback } from "../ui/use-stable-callback";
 import { isolated } from "../words/isolated";
 import { CardButton } from "./level-frame";
-import { expansion } from "./level-graph";
 import style from "./levels.module.css";
-import { useExpansion } from "./use-expansion";
+import { NO_LEVELS, useExpansion } from "./use-expansion";
 
 function InsideSign({ of, name }: InsideSignProps) {
+  const { graphsInside } = useEditorStore();
   return (
     <span className={style.signs} data-signs>
       <CardButton
@@ -109,14 +109,14 @@ const nameIn = (graph: Pick<Graph, "actions">, action: string): string =>
  * graph that contains it. `path`: the expanded actions down to it.
  */
 function useWayIn(byName: ReadonlyMap<string, string>) {
-  const { id, graph } = useEditorContext();
+  const { id, graph, store } = useEditorContext();
   const [, go] = useLocation();
   const search = useSearch();
   return useStableCallback((path: string) => {
     const keys = path.split("/");
     const by: Level[] = [];
     let [here, at] = [id, graph as Pick<Graph, "actions">];
-    let levels = expansion.now().levels;
+    let levels = store.expanded.now()?.levels ?? NO_LEVELS;
     for (const [n, action] of keys.entries()) {
       const name = nameIn(at, action);
       const level = levels.get(action);
@@ -128,7 +128,7 @@ function useWayIn(byName: ReadonlyMap<string, string>) {
       by.push({ graph: here, action });
       here = inside;
       at = typeof level?.graph === "object" && level.graph !== null ? level.graph : { actions: [] };
-      levels = level?.levels ?? new Map();
+      levels = level?.levels ?? NO_LEVELS;
       if (n === keys.length - 1) announcer.say(`Inside ${isolated(name)}`);
     }
     go(addressInside(search, by, here));
@@ -158,7 +158,7 @@ function useWayTo(byName: ReadonlyMap<string, string>) {
 }
 
 export function Levels() {
-  const { id, graph, past } = useEditorContext();
+  const { id, graph, past, store } = useEditorContext();
   const [, go] = useLocation();
   const search = useSearch();
   useFlatLink();
@@ -170,12 +170,12 @@ export function Levels() {
   const around = addressAround(search, levelsOf(search).length - 1);
   const enter = useWayIn(byName);
   const show = useWayTo(byName);
-  const expand = useExpansion({ id, graph, idOf, off: past !== null, enter });
+  const expand = useExpansion({ id, graph, idOf, off: past !== null });
   const leave = useCallback(() => go(around ?? "/"), [go, around]);
   useEffect(() => {
     const way = around === null ? null : leave;
-    graphsInside.set({ names, byName, isNamed, enter, show, leave: way, expand, Sign: InsideSign });
-  }, [names, byName, isNamed, enter, show, around, leave, expand]);
-  useEffect(() => () => graphsInside.set(null), []);
+    const ways = { enter, show, leave: way, expand };
+    store.graphsInside.set({ names, byName, isNamed, ...ways, Sign: InsideSign });
+  }, [store, names, byName, isNamed, enter, show, around, leave, expand]);
   return null;
 }

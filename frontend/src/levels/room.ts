@@ -1,6 +1,6 @@
 /** Moves everything apart as far as expanded cards need, and maps places between the canvas and the document. Pure. */
-import type { Folding } from "../canvas/folding/folding";
-import type { PlaceMap, Spread, StandingGraph } from "../canvas/folding/spread";
+import type { PlaceMap, Spread, StandingGraph } from "../canvas/editor-store";
+import type { Folding } from "../canvas/elements";
 import { cardSize, type Positions, type Sizes } from "../canvas/geometry/arrange";
 import { notesOf } from "../graph/edit/notes";
 import type { Graph, JsonText, Key, Position, Relation } from "../graph/model";

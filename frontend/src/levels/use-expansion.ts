@@ -1,30 +1,21 @@
 /** Keeps which graphs are expanded, and tells the canvas, which makes room for them. */
 
 import { useEffect, useMemo, useRef, useState } from "react";
-import { spreading } from "../canvas/folding/spread";
-import { expandedGraphs, type PartOnCard } from "../canvas/graphs-inside";
+import type { LevelGraph, PartOnCard } from "../canvas/editor-store";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph, Key } from "../graph/model";
-import { runOnCanvas } from "../status/progress-inside";
 import { announcer } from "../ui/announcer";
 import { useKeptKeys } from "../ui/hooks";
 import { useStableCallback } from "../ui/use-stable-callback";
 import { useWatched } from "../ui/watched";
 import { ExpandedCard, progressOf, type StateSource } from "./level-frame";
-import {
-  expansion,
-  type KnownGraphs,
-  type LevelGraph,
-  levelsBelow,
-  pathsTo,
-  useLevelGraphs,
-} from "./level-graph";
+import { type KnownGraphs, levelsBelow, pathsTo, useLevelGraphs } from "./level-graph";
 import { layoutOf } from "./level-layout";
 import { spreadOf } from "./room";
 
 /** More graphs than this are not expanded at once: deep hierarchies grow too fast to be looked at. */
 const MOST = 400;
-const NO_LEVELS: ReadonlyMap<Key, LevelGraph> = new Map();
+export const NO_LEVELS: ReadonlyMap<Key, LevelGraph> = new Map();
 const NO_IDS: readonly string[] = [];
 
 /** Return the ids of all expanded graphs. */
@@ -55,7 +46,6 @@ interface ExpansionInput {
   readonly idOf: KnownGraphs["idOf"];
   /** True if nothing can be expanded, for example while the past is shown. */
   readonly off: boolean;
-  enter(path: string): void;
 }
 
 /** Return the tree of expanded graphs. It grows level by level, since each graph must be loaded first. */
@@ -98,8 +88,8 @@ function partsOf(level: LevelGraph | undefined, source: StateSource): PartOnCard
 
 /** Return a ref to the current sources of states, for callers outside of rendering. */
 function useStateSource() {
-  const { dryRun, graph } = useEditorContext();
-  const run = useWatched(runOnCanvas);
+  const { dryRun, graph, store } = useEditorContext();
+  const run = useWatched(store.run);
   const source = useRef<StateSource>({ dryRun, run, outermost: graph.name });
   source.current = { dryRun, run, outermost: graph.name };
   return source;
@@ -107,8 +97,11 @@ function useStateSource() {
 
 /** Manages the expanded graphs of the canvas. Returns the functions that expand and collapse them. */
 export function useExpansion(given: ExpansionInput) {
-  const { id, graph, enter } = given;
-  const { view } = useEditorContext();
+  const { id, graph } = given;
+  const {
+    view,
+    store: { expanded: onCards },
+  } = useEditorContext();
   const { keys: expanded, put } = useKeptKeys("aa.expanded", id);
   const { levels, known } = useLevels(given, expanded);
   const [goal, setGoal] = useState(0);
@@ -125,12 +118,16 @@ export function useExpansion(given: ExpansionInput) {
   const source = useStateSource();
   useEffect(() => {
     const sizes = new Map([...levels].map(([key, level]) => [key, layoutOf(level).size]));
-    expansion.set({ levels, toggle, enter });
-    const known = (key: Key) => partsOf(levels.get(key), source.current);
-    const none = sizes.size === 0;
-    expandedGraphs.set(none ? null : { sizes, Frame: ExpandedCard, partsOf: known });
-    spreading.set(none ? null : (standing) => spreadOf(standing, sizes));
-  }, [levels, toggle, enter, source]);
+    onCards.set(
+      sizes.size === 0
+        ? null
+        : {
+            ...{ levels, sizes, Frame: ExpandedCard },
+            partsOf: (key) => partsOf(levels.get(key), source.current),
+            spread: (standing) => spreadOf(standing, sizes),
+          },
+    );
+  }, [onCards, levels, source]);
   // Once it is loaded and has its room, the expanded graph is brought into view.
   useEffect(() => {
     const [first = ""] = toReveal.current?.split("/") ?? [];
@@ -141,13 +138,6 @@ export function useExpansion(given: ExpansionInput) {
     }, SETTLED_MS);
     return () => clearTimeout(timer);
   }, [levels, view]);
-  useEffect(
-    () => () => {
-      expandedGraphs.set(null);
-      spreading.set(null);
-    },
-    [],
-  );
   // Inner graphs become known one level after the other.
   useEffect(() => {
     if (goal === 0) return;

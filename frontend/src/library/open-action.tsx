@@ -12,6 +12,7 @@ import { errorText } from "../api/http";
 import { type LibraryAction, takeFromGraph } from "../api/library";
 import { usePackagesAt } from "../api/packages";
 import { useMay } from "../api/people";
+import { EditorStoreProvider } from "../canvas/editor-store";
 import { redo, undo } from "../edit-actions/all";
 import { editActionFor, isEnabled } from "../edit-actions/edit-action";
 import { type EditorContext, EditorReactContext } from "../edit-actions/editor-context";
@@ -306,7 +307,9 @@ export function OpenAction(props: Props) {
       keep={{ graph: id, person }}
       fallback={<Skeleton height={180} m="lg" />}
     >
-      <OpenedAction key={id} {...props} />
+      <EditorStoreProvider key={id}>
+        <OpenedAction {...props} />
+      </EditorStoreProvider>
     </RoomProvider>
   );
 }

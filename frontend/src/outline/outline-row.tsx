@@ -10,7 +10,7 @@ import {
 } from "@tabler/icons-react";
 import { memo, type ReactNode, useId, useState } from "react";
 import { checkedColor } from "../api/people";
-import { useOpenThreadCount } from "../canvas/card-highlights";
+import { useEditorStore, useOpenThreadCount } from "../canvas/editor-store";
 import { noteColor } from "../canvas/notes/note-nodes";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import type { Note } from "../graph/edit/notes";
@@ -163,6 +163,7 @@ interface RowActionsProps {
 /** The menu itself is made when it is first opened: there may be thousands of rows. */
 export function RowActions(props: RowActionsProps) {
   const { row, active, label, mayEdit, handlers, chip } = props;
+  const store = useEditorStore();
   const [opened, setOpened] = useState<boolean | null>(null);
   const button = chip ? (
     <button
@@ -189,7 +190,7 @@ export function RowActions(props: RowActionsProps) {
     <Menu opened={opened} onChange={setOpened} trapFocus returnFocus={false}>
       <Menu.Target>{button}</Menu.Target>
       <Menu.Dropdown>
-        {rowActionsOf(row).map((rowAction) => (
+        {rowActionsOf(row, store).map((rowAction) => (
           <Menu.Item
             key={rowAction.name}
             disabled={rowAction.changes && !mayEdit}

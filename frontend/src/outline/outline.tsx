@@ -6,18 +6,16 @@
  */
 import { Button, Kbd } from "@mantine/core";
 import { IconListTree, IconPlus } from "@tabler/icons-react";
-import { useCallback, useEffect, useMemo, useRef, useState, useSyncExternalStore } from "react";
-import { useHighlightedRobot } from "../canvas/card-highlights";
-import { expandedGraphs, graphsInside } from "../canvas/graphs-inside";
+import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { ENTRY, type Graph, type Key } from "../graph/model";
 import type { Progress } from "../status/progress";
-import { runOnCanvas } from "../status/progress-inside";
 import { useSelectedByOthers } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
 import { Empty } from "../ui/empty";
 import { useIsPhone } from "../ui/hooks";
 import { keyOf } from "../ui/keys";
+import { useWatched } from "../ui/watched";
 import { isolated } from "../words/isolated";
 import style from "./outline.module.css";
 import { OutlineRow, type RowHandlers } from "./outline-row";
@@ -80,13 +78,13 @@ function stepFrom(rows: readonly OutlineItem[], at: number, key: string): number
 
 export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) {
   const context = useEditorContext();
-  const { graph, selection, select, setPanel, mayEdit } = context;
+  const { graph, selection, select, setPanel, mayEdit, store } = context;
   const phone = useIsPhone();
-  const robot = useHighlightedRobot();
   const others = useSelectedByOthers();
   const { isOpen, flip } = useOpen(graph.actions.length);
-  const expanded = useSyncExternalStore(expandedGraphs.subscribe, expandedGraphs.now);
-  const run = useSyncExternalStore(runOnCanvas.subscribe, runOnCanvas.now);
+  const robot = useWatched(store.robot);
+  const expanded = useWatched(store.expanded);
+  const run = useWatched(store.run);
   // biome-ignore lint/correctness/useExhaustiveDependencies: with each change of the run there are other states
   const rows = useMemo(() => {
     const all = rowsOf(graph, phone ? closed : isOpen, expanded?.partsOf);
@@ -115,7 +113,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
   };
   const choose = (row: OutlineItem) => {
     setActive(row.id);
-    if (row.kind === "inside") return graphsInside.now()?.enter(row.part.path);
+    if (row.kind === "inside") return store.graphsInside.now()?.enter(row.part.path);
     const subject = subjectOf(row);
     select([subject]);
     if (!phone) context.view.show(subject.split(">").map((end) => end.split(";")[0] ?? end));
@@ -142,10 +140,10 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
         setPanel("comments");
         break;
       case "enter":
-        graphsInside.now()?.enter(subjectOf(row));
+        store.graphsInside.now()?.enter(subjectOf(row));
         break;
       case "expand":
-        graphsInside.now()?.expand.toggle(subjectOf(row));
+        store.graphsInside.now()?.expand.toggle(subjectOf(row));
         break;
       case "delete":
         announcer.say(removeRow(context, row));
@@ -166,7 +164,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     if (row === undefined || target.dataset.row === undefined || event.ctrlKey || event.metaKey)
       return;
     const key = keyOf(event);
-    const rowAction = rowActionFor(row, event);
+    const rowAction = rowActionFor(row, event, store);
     const next = event.altKey ? null : stepFrom(rows, at, key);
     const opens = key === "ArrowRight" && row.open === false;
     const closes = key === "ArrowLeft" && row.open === true;

@@ -1,8 +1,8 @@
 /** The robots of a graph: what each is called, its colour, and highlighting the actions of one. */
 import { memo, useMemo } from "react";
-import { cardHighlights, useHighlightedRobot } from "../canvas/card-highlights";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { colorOfName } from "../ui/name-colors";
+import { useWatched } from "../ui/watched";
 import style from "./robot-filter.module.css";
 
 /** Returns the number of actions of each robot, by name; those for any robot come last. */
@@ -14,12 +14,12 @@ function robotCounts(actors: readonly string[]): [name: string, actions: number]
 
 /** Buttons that highlight the actions of one robot; not drawn where there is only one robot. */
 export const RobotFilter = memo(function Robots() {
-  const { graph } = useEditorContext();
+  const { graph, store } = useEditorContext();
   const robots = useMemo(
     () => robotCounts(graph.actions.map(({ actor }) => actor)),
     [graph.actions],
   );
-  const lit = useHighlightedRobot();
+  const lit = useWatched(store.robot);
   if (robots.length < 2 && lit === null) return null;
   return (
     <fieldset className={style.robots}>
@@ -31,7 +31,7 @@ export const RobotFilter = memo(function Robots() {
           className={style.robot}
           aria-pressed={lit === name}
           data-dim={(lit !== null && lit !== name) || undefined}
-          onClick={() => cardHighlights.set({ robot: lit === name ? null : name })}
+          onClick={() => store.robot.set(lit === name ? null : name)}
         >
           <i style={{ background: colorOfName(name) }} aria-hidden />
           <span>{name || "any robot"}</span>

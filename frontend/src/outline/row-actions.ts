@@ -1,6 +1,6 @@
 /** Defines the actions on a row of the outline, with their keys. */
 
-import { graphsInside } from "../canvas/graphs-inside";
+import type { EditorStore } from "../canvas/editor-store";
 import type { EditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import {
@@ -66,19 +66,19 @@ const EXPAND: RowAction = {
 };
 
 /** Returns the actions for a row whose action stands for a graph. */
-const levelActions = ({ name }: Action): readonly RowAction[] =>
+const levelActions = ({ name }: Action, { graphsInside }: EditorStore): readonly RowAction[] =>
   graphsInside.now()?.byName.has(name) ? [EXPAND, ENTER] : [];
 
-export function rowActionsOf(row: OutlineItem): readonly RowAction[] {
+export function rowActionsOf(row: OutlineItem, store: EditorStore): readonly RowAction[] {
   switch (row.kind) {
     case "entry":
       return [{ ...CONNECT, label: "Start with …" }];
     case "action":
-      return [DETAILS, ...levelActions(row.action), RENAME, CONNECT, TALK, UP, DOWN, DELETE];
+      return [DETAILS, ...levelActions(row.action, store), RENAME, CONNECT, TALK, UP, DOWN, DELETE];
     case "inside":
       return [
         { ...ENTER, label: "Open its level", key: "Enter" },
-        ...levelActions(row.part.action),
+        ...levelActions(row.part.action, store),
       ];
     case "outcome":
       return [CONNECT, DETAILS];
@@ -94,10 +94,11 @@ export function rowActionsOf(row: OutlineItem): readonly RowAction[] {
 export function rowActionFor(
   row: OutlineItem,
   event: KeyPress & { readonly altKey: boolean },
+  store: EditorStore,
 ): RowAction | null {
   const pressed = event.altKey ? `Alt+${keyOf(event)}` : keyOf(event);
   const key = pressed === "Backspace" ? "Delete" : pressed;
-  return rowActionsOf(row).find((rowAction) => rowAction.key === key) ?? null;
+  return rowActionsOf(row, store).find((rowAction) => rowAction.key === key) ?? null;
 }
 
 /** After which outcomes a row says what it says. */

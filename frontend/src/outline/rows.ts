@@ -1,5 +1,5 @@
 /** The graph as rows of an outline: actions, their outcomes, and what follows each. Pure. */
-import type { PartOnCard } from "../canvas/graphs-inside";
+import type { PartOnCard } from "../canvas/editor-store";
 import { relationId } from "../graph/document-keys";
 import { type Note, notesOf } from "../graph/edit/notes";
 import {

@@ -4,7 +4,7 @@ import { ReactFlowProvider } from "@xyflow/react";
 import { useCallback, useMemo } from "react";
 import type { Comparison } from "../api/review";
 import type { Run } from "../api/runs";
-import { CardStateContext } from "../canvas/card-highlights";
+import { CardStateContext } from "../canvas/action-card";
 import { fromUmrf } from "../canvas/from-umrf";
 import { GraphView } from "../canvas/graph-view";
 import type { Tone } from "../status/progress";

@@ -6,7 +6,6 @@
 import { useRef } from "react";
 import type { Run } from "../api/runs";
 import { fullName, type Graph } from "../graph/model";
-import { Watched } from "../ui/watched";
 import { placesOf } from "./level-places";
 import { type Progress, progressAt, progressByAid, progressOfAction } from "./progress";
 
@@ -28,9 +27,6 @@ export interface RunOnCanvas {
   /** The names of the graphs below the run's, down to the one on the canvas. */
   readonly names: readonly string[];
 }
-
-/** One for the page: there is one canvas. Null while none is shown. */
-export const runOnCanvas = new Watched<RunOnCanvas | null>(null);
 
 const nameOf = (action: string): string => action.slice(0, Math.max(0, action.lastIndexOf("_")));
 

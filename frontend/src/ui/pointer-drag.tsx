@@ -1,7 +1,8 @@
 /** Drag and drop by pointer events, so that it works for fingers too. */
-import { type PointerEvent as ReactPointerEvent, useEffect, useSyncExternalStore } from "react";
+import { type PointerEvent as ReactPointerEvent, useEffect } from "react";
 import { keyOf } from "./keys";
 import style from "./pointer-drag.module.css";
+import { useWatched, Watched } from "./watched";
 
 export interface DraggedItem<T> {
   readonly payload: T;
@@ -16,15 +17,11 @@ const THRESHOLD = 6; // px until a press becomes a drag
 
 /** One carrier for each kind of load. */
 export class PointerDrag<T> {
-  #now: DraggedItem<T> | null = null;
-  #listeners = new Set<() => void>();
+  readonly #dragged = new Watched<DraggedItem<T> | null>(null);
   #taker: DropHandler<T> | null = null;
 
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
-  now = (): DraggedItem<T> | null => this.#now;
+  readonly subscribe = this.#dragged.subscribe;
+  readonly now = this.#dragged.now;
 
   /** Subscribe a handler of drops. Return the function that unsubscribes it. */
   onDrop(taker: DropHandler<T>): () => void {
@@ -41,9 +38,9 @@ export class PointerDrag<T> {
     const onMove = (move: PointerEvent) => {
       if (move.pointerId !== id) return;
       const far = Math.hypot(move.clientX - x0, move.clientY - y0) > THRESHOLD;
-      if (this.#now === null && !far) return;
+      if (this.now() === null && !far) return;
       move.preventDefault();
-      this.#set({ payload: load, label, x: move.clientX, y: move.clientY });
+      this.#dragged.set({ payload: load, label, x: move.clientX, y: move.clientY });
     };
     const end = (drop: boolean) => (up: PointerEvent | KeyboardEvent) => {
       if ("pointerId" in up && up.pointerId !== id) return;
@@ -52,8 +49,8 @@ export class PointerDrag<T> {
       window.removeEventListener("pointerup", onUp);
       window.removeEventListener("pointercancel", onCancel);
       window.removeEventListener("keydown", onCancel);
-      const draggedItem = this.#now;
-      this.#set(null);
+      const draggedItem = this.now();
+      this.#dragged.set(null);
       if (drop && draggedItem) {
         swallowClick();
         this.#taker?.(draggedItem);
@@ -66,11 +63,6 @@ export class PointerDrag<T> {
     window.addEventListener("pointercancel", onCancel);
     window.addEventListener("keydown", onCancel);
   }
-
-  #set(next: DraggedItem<T> | null): void {
-    this.#now = next;
-    for (const listener of this.#listeners) listener();
-  }
 }
 
 /** The click that a browser makes of the end of a drag is none. */
@@ -82,7 +74,7 @@ function swallowClick(): void {
 
 /** Preview of the dragged thing, under the pointer. */
 export function DragPreview<T>({ carrier }: { carrier: PointerDrag<T> }) {
-  const draggedItem = useSyncExternalStore(carrier.subscribe, carrier.now);
+  const draggedItem = useWatched(carrier);
   const active = draggedItem !== null;
   useEffect(() => {
     document.body.classList.toggle(style.carrying ?? "", active);

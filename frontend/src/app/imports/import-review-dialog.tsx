@@ -1,9 +1,9 @@
 /** Dialog that shows the translations in a file of an old dialect before it is kept. */
 import { Button, Group, Modal, Text } from "@mantine/core";
-import { useSyncExternalStore } from "react";
 import type { ProblemPlace } from "../../api/graphs";
 import { problemGroups } from "../../graph/problems/problem-groups";
 import { countsOf, countWords } from "../../graph/problems/problem-kinds";
+import { useWatched } from "../../ui/watched";
 import { type ImportUnderReview, importReviews } from "./import-review";
 import style from "./import-review-dialog.module.css";
 import { dialectWords } from "./take-files";
@@ -75,7 +75,7 @@ function Body({ waiting }: { waiting: ImportUnderReview }) {
 }
 
 export function ImportReviewDialog() {
-  const waiting = useSyncExternalStore(importReviews.subscribe, importReviews.now);
+  const waiting = useWatched(importReviews);
   return (
     <Modal
       opened={waiting !== null}

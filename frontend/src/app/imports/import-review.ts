@@ -1,5 +1,6 @@
 /** Files of old dialects that wait for a person to look at what was translated. */
 import type { Preview } from "../../api/graphs";
+import { Watched } from "../../ui/watched";
 
 /** One file that waits. `answer` lets the import go on (true) or drops it. */
 export interface ImportUnderReview {
@@ -8,18 +9,14 @@ export interface ImportUnderReview {
   answer(keep: boolean): void;
 }
 
-/** Usable without React: `subscribe` and `now` fit `useSyncExternalStore`. */
+/** A queue for the whole page: files arrive on every screen. */
 export class ImportReviews {
-  #waiting: readonly ImportUnderReview[] = [];
-  readonly #listeners = new Set<() => void>();
+  readonly #waiting = new Watched<readonly ImportUnderReview[]>([]);
 
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
+  readonly subscribe = this.#waiting.subscribe;
 
   /** The first that waits; null when none does. */
-  now = (): ImportUnderReview | null => this.#waiting[0] ?? null;
+  now = (): ImportUnderReview | null => this.#waiting.now()[0] ?? null;
 
   /** Asks whether a file shall be kept, after those that wait already. */
   ask(file: string, preview: Preview): Promise<boolean> {
@@ -28,17 +25,12 @@ export class ImportReviews {
         file,
         preview,
         answer: (keep) => {
-          this.#set(this.#waiting.filter((other) => other !== waiting));
+          this.#waiting.set(this.#waiting.now().filter((other) => other !== waiting));
           resolve(keep);
         },
       };
-      this.#set([...this.#waiting, waiting]);
+      this.#waiting.set([...this.#waiting.now(), waiting]);
     });
-  }
-
-  #set(waiting: readonly ImportUnderReview[]): void {
-    this.#waiting = waiting;
-    for (const listener of [...this.#listeners]) listener();
   }
 }
 

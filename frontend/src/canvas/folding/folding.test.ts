@@ -8,11 +8,10 @@ import { ENTRY, EXIT, type Graph, type Key, type Position } from "../../graph/mo
 import type { Progress, Tone } from "../../status/progress";
 import { graphIn } from "../../testing/edited-graph";
 import { bundlesOf } from "../arrows/bundles";
-import { edgesOf, nodesOf, sceneOf, surroundingsOf } from "../elements";
+import { edgesOf, type Folding, nodesOf, sceneOf, surroundingsOf } from "../elements";
 import { positionsOf } from "../geometry/arrange";
 import { notePlaces } from "../notes/note-nodes";
 import {
-  type Folding,
   foldedArrows,
   foldedNodes,
   foldedScene,

@@ -16,20 +16,11 @@ import type { Progress, Tone } from "../../status/progress";
 import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
 import type { Scene } from "../arrows/scene";
-import type { Arrow, CanvasNode } from "../elements";
+import type { Arrow, CanvasNode, Folding } from "../elements";
 import { estimatedSizes, type Positions, type Sizes } from "../geometry/arrange";
 import { type ProblemMark, type ProblemMarks, problemMarkWords } from "../marks/problem-marks";
 import type { FoldedNode, FrameBlock, NoteNode, StateCount } from "../notes/note-nodes";
 import { OUTCOMES } from "../outcome";
-
-export interface Folding {
-  /** Frames that are drawn as one block, by key. */
-  readonly blocks: ReadonlyMap<string, Note>;
-  /** Hidden elements, each with the block that is drawn instead. */
-  readonly blockOf: ReadonlyMap<Key, string>;
-  /** The block on which the entry or the exit lies; these two are never hidden. */
-  readonly blockUnder: ReadonlyMap<Key, string>;
-}
 
 const areaOf = ({ size: [width, height] }: Note) => width * height;
 

@@ -14,11 +14,10 @@ import {
 import { type MouseEvent, type RefObject, useEffect, useMemo, useRef } from "react";
 import { actionDrag } from "../../canvas/action-drag";
 import { LineContext, LineEditingContext } from "../../canvas/arrows/line-store";
+import type { PlaceMap } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import { FoldedFrame } from "../../canvas/folding/folded-frame";
-import type { PlaceMap } from "../../canvas/folding/spread";
 import { CARD } from "../../canvas/geometry/arrange";
-import { graphsInside } from "../../canvas/graphs-inside";
 import { edgeTypes, nodeTypes } from "../../canvas/node-types";
 import { type NoteEditing, NoteEditingContext } from "../../canvas/notes/note-card";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../../canvas/outcome";
@@ -308,7 +307,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
     const inner = target.closest<HTMLElement>("[data-inner]")?.dataset.inner;
     const card = target.closest<HTMLElement>(".react-flow__node-action")?.dataset.id;
     const path = inner ?? card;
-    if (path !== undefined) graphsInside.now()?.enter(path);
+    if (path !== undefined) context.store.graphsInside.now()?.enter(path);
     if (!target.classList.contains("react-flow__pane")) return;
     openAddAt([event.clientX, event.clientY], null);
   };

@@ -1,7 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
+import type { PartOnCard } from "../../canvas/editor-store";
 import { CARD } from "../../canvas/geometry/arrange";
-import { expandedGraphs, type PartOnCard } from "../../canvas/graphs-inside";
 import type { Progress } from "../../status/progress";
 import { followedBox, followingViewport, runningInside, runningKeys } from "./follow-run";
 
@@ -63,18 +63,15 @@ test("an action that runs in a folded frame is followed at its block", () => {
   expect(runningKeys(progress, blockOf)).toEqual(["g/1", "c"]);
 });
 
-const Nothing = () => null;
-
 test("an action in an expanded graph is followed at its place, not the whole card", () => {
   const places = new Map([["a", [1_000, 500] as const]]);
   const sizes = new Map([["a", { width: 900, height: 400 }]]);
   const part = (path: string, x: number, tone: string, expanded = false) =>
     ({ path, x, y: 60, width: 208, height: 88, expanded, progress: { tone } }) as PartOnCard;
   const parts = [part("a/b", 20, "run", true), part("a/b/c", 60, "run"), part("a/d", 400, "true")];
-  expandedGraphs.set({ sizes, Frame: Nothing, partsOf: (key) => (key === "a" ? parts : []) });
-  const found = runningInside(["a"], { places, sizes });
+  const partsOf = (key: string) => (key === "a" ? parts : []);
+  const found = runningInside(["a"], { places, sizes }, { partsOf });
   expect(found.keys).toEqual(["a/b/c"]);
   expect(found.places.get("a/b/c")).toEqual([1_060, 560]);
-  expandedGraphs.set(null);
-  expect(runningInside(["a"], { places, sizes }).keys).toEqual(["a"]);
+  expect(runningInside(["a"], { places, sizes }, null).keys).toEqual(["a"]);
 });

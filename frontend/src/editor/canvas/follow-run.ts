@@ -1,10 +1,10 @@
 /** Moves the view along with a run until the person moves it. */
 import type { ReactFlowInstance, Viewport } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useRef, useState } from "react";
+import { type ExpandedGraphs, useEditorStore } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
 import type { Positions, Sizes } from "../../canvas/geometry/arrange";
 import { type Bounds, boundsOf } from "../../canvas/geometry/viewport";
-import { expandedGraphs } from "../../canvas/graphs-inside";
 import { tick } from "../../clock/server-clock";
 import { GRID } from "../../edit-actions/editor-context";
 import type { Key } from "../../graph/model";
@@ -93,11 +93,15 @@ interface DrawnPlaces {
  * Replace running actions with expanded graphs by the actions that run inside, with their places on
  * the canvas.
  */
-export function runningInside(keys: readonly Key[], { places, sizes }: DrawnPlaces) {
+export function runningInside(
+  keys: readonly Key[],
+  { places, sizes }: DrawnPlaces,
+  expanded: Pick<ExpandedGraphs, "partsOf"> | null,
+) {
   const found = { keys: [] as Key[], places: new Map(places), sizes: new Map(sizes) };
   for (const key of keys) {
     const [x, y] = places.get(key) ?? [0, 0];
-    const parts = expandedGraphs.now()?.partsOf(key) ?? [];
+    const parts = expanded?.partsOf(key) ?? [];
     const running = parts.filter((part) => part.progress?.tone === "run" && !part.expanded);
     for (const part of running) {
       found.places.set(part.path, [x + part.x, y + part.y]);
@@ -208,6 +212,7 @@ export function useFollowRun({ flow, frame, now, run, progress, blockOf, glide }
   const { keys: running, ...drawn } = runningInside(
     run === null || lost ? [] : runningKeys(progress, blockOf),
     now.current,
+    useEditorStore().expanded.now(),
   );
   const key = running.join(" ");
   const { isBusy, release } = useHandsOn(frame);

@@ -1,7 +1,7 @@
 /** The map shows everything, each in its colour, and what is seen. */
 import { expect, test } from "vitest";
+import type { PartOnCard } from "../../canvas/editor-store";
 import type { CanvasNode } from "../../canvas/elements";
-import type { PartOnCard } from "../../canvas/graphs-inside";
 import type { Action } from "../../graph/model";
 import { isWithin, mapFrame, mapMarks, seenArea } from "./graph-map";
 

@@ -7,12 +7,11 @@
 import { useThrottledValue } from "@mantine/hooks";
 import { Panel, type ReactFlowInstance, useStore, type Viewport } from "@xyflow/react";
 import { memo, type PointerEvent, type RefObject, useEffect, useMemo, useRef } from "react";
+import { type PartOnCard, useEditorStore } from "../../canvas/editor-store";
 import type { Arrow, CanvasNode } from "../../canvas/elements";
-import { expandedGraphs, type PartOnCard } from "../../canvas/graphs-inside";
 import { noteColor } from "../../canvas/notes/note-nodes";
 import { onMac } from "../../edit-actions/edit-action";
 import type { Key } from "../../graph/model";
-import { runOnCanvas } from "../../status/progress-inside";
 import { toneColor } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 import { useWatched } from "../../ui/watched";
@@ -200,8 +199,9 @@ export function GraphMap({ nodes, flow }: Props) {
   const map = useRef<SVGSVGElement>(null);
   // Each update computes and paints all paths again.
   const throttled = useThrottledValue(nodes, REST);
-  const run = useThrottledValue(useWatched(runOnCanvas), REST);
-  const expanded = useWatched(expandedGraphs);
+  const store = useEditorStore();
+  const run = useThrottledValue(useWatched(store.run), REST);
+  const expanded = useWatched(store.expanded);
   // biome-ignore lint/correctness/useExhaustiveDependencies: with each change of the run there are other states
   const { paths, area } = useMemo(
     () => mapMarks(throttled, expanded?.partsOf),

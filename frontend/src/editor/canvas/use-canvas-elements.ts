@@ -23,26 +23,30 @@ import {
 import { checkedColor } from "../../api/people";
 import { LineStore } from "../../canvas/arrows/line-store";
 import {
+  type EditorStore,
+  type PlaceMap,
+  useEditorStore,
+  useSpread,
+} from "../../canvas/editor-store";
+import {
   type Arrow,
   type CanvasNode,
   type CardSurroundings,
   edgesOf,
+  type Folding,
   keepEqual,
   nodesOf,
   sceneOf,
   surroundingsOf,
 } from "../../canvas/elements";
 import {
-  type Folding,
   foldedArrows,
   foldedNodes,
   foldedScene,
   foldingOf,
   wholeSizes,
 } from "../../canvas/folding/folding";
-import { type PlaceMap, useSpread } from "../../canvas/folding/spread";
 import { type Positions, positionsOf, unplaced } from "../../canvas/geometry/arrange";
-import { expandedGraphs } from "../../canvas/graphs-inside";
 import type { ProblemMarks } from "../../canvas/marks/problem-marks";
 import { notePlaces } from "../../canvas/notes/note-nodes";
 import { asOneEdit, insertInto, moveActions } from "../../graph/edit";
@@ -226,8 +230,12 @@ function afterMoves(
 }
 
 /** Return the measured sizes; an expanded card keeps its former size, which it has in the document. */
-function afterSizes(before: Placed["sizes"], sized: readonly NodeChange<CanvasNode>[]) {
-  const expanded = expandedGraphs.now()?.sizes;
+function afterSizes(
+  before: Placed["sizes"],
+  sized: readonly NodeChange<CanvasNode>[],
+  onCards: EditorStore["expanded"],
+) {
+  const expanded = onCards.now()?.sizes;
   const next = new Map(before);
   for (const change of sized)
     if (change.type === "dimensions" && change.dimensions && !expanded?.has(change.id))
@@ -243,6 +251,7 @@ function useNodeChanges(
   takeSelection: ReturnType<typeof useSelectionChanges>,
 ) {
   const store = useStoreApi();
+  const { expanded } = useEditorStore();
   const now = useRef(placed);
   now.current = placed;
   // A marquee within a frame selects its contents, not the frame, unless the frame is folded.
@@ -256,7 +265,7 @@ function useNodeChanges(
     (all: NodeChange<CanvasNode>[]) => {
       const changes = store.getState().userSelectionActive ? all.filter(isNoFrame) : all;
       const sized = changes.filter((change) => change.type === "dimensions");
-      if (sized.length > 0) setSizes((before) => afterSizes(before, sized));
+      if (sized.length > 0) setSizes((before) => afterSizes(before, sized, expanded));
       const moves = changes.filter((change) => change.type === "position" && change.dragging);
       if (moves.length > 0) {
         const { current } = now;
@@ -264,7 +273,7 @@ function useNodeChanges(
       }
       takeSelection(changes);
     },
-    [store, isNoFrame, setSizes, setDrag, takeSelection],
+    [store, expanded, isNoFrame, setSizes, setDrag, takeSelection],
   );
 }
 

@@ -3,7 +3,7 @@ import { notifications } from "@mantine/notifications";
 import { useMemo } from "react";
 import { pillWord } from "../../canvas/arrows/bundles";
 import type { LineEditing } from "../../canvas/arrows/line-store";
-import type { PlaceMap } from "../../canvas/folding/spread";
+import type { PlaceMap } from "../../canvas/editor-store";
 import { type EditorContext, nudging } from "../../edit-actions/editor-context";
 import { moveRelation, retarget } from "../../graph/edit";
 import { setWaypoints } from "../../graph/edit/waypoints";

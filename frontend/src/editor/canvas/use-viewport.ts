@@ -3,9 +3,9 @@
 import type { ReactFlowInstance } from "@xyflow/react";
 import { type RefObject, useCallback, useEffect, useMemo, useRef } from "react";
 import type { LineStore } from "../../canvas/arrows/line-store";
-import type { Arrow, CanvasNode } from "../../canvas/elements";
-import { type Folding, hiding } from "../../canvas/folding/folding";
-import type { PlaceMap } from "../../canvas/folding/spread";
+import type { PlaceMap } from "../../canvas/editor-store";
+import type { Arrow, CanvasNode, Folding } from "../../canvas/elements";
+import { hiding } from "../../canvas/folding/folding";
 import { CARD, type Positions, pillSize, type Sizes } from "../../canvas/geometry/arrange";
 import {
   boundsOf,

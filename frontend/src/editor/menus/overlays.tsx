@@ -1,7 +1,6 @@
 /** Opens menus, the command palette and dialogs over the editor, one at a time. */
 
 import { useEffect } from "react";
-import { graphsInside } from "../../canvas/graphs-inside";
 import type { EditorContext, Overlay } from "../../edit-actions/editor-context";
 import type { NewAction } from "../../graph/edit";
 import { lazyPart, OverlayBoundary, PartBoundary } from "../../ui/lazy-part";
@@ -84,7 +83,7 @@ function OpenOverlay({ context, known, overlay, onClose }: Props) {
     case "renamed": {
       const uses = overlay.uses.map((id) => ({
         id,
-        name: graphsInside.now()?.names.get(id) ?? "",
+        name: context.store.graphsInside.now()?.names.get(id) ?? "",
       }));
       return <RenamedUses graph={context.id} {...overlay} uses={uses} onClose={onClose} />;
     }

@@ -66,13 +66,13 @@ interface Parts {
   find: ReactNode;
   details: ReactNode;
   strip: ReactNode;
-  status: () => ReactNode;
+  status: ReactNode;
 }
 
 interface PhoneParts extends Parts {
   /** A dry-run is open or the past is shown; both need the canvas. */
   onCanvas: boolean;
-  start: () => ReactNode;
+  start: ReactNode;
 }
 
 export function PhoneLayout(props: PhoneParts) {
@@ -98,14 +98,14 @@ export function PhoneLayout(props: PhoneParts) {
         {pane === "details" && <div className={style.sheet}>{details}</div>}
         {pane === "run" && (
           <div className={style.sheet}>
-            <div className={style.status}>{status()}</div>
+            <div className={style.status}>{status}</div>
             {strip}
           </div>
         )}
       </div>
       {/* Start is at the left and STOP at the right; Dry-run keeps them apart. */}
       <div className={style.reach} role="toolbar" aria-label="Run">
-        {start()}
+        {start}
         <DryRunButton stacked />
       </div>
     </main>
@@ -171,7 +171,7 @@ function FoldButton({ fold }: { fold: Panels["fold"] }) {
 interface DesktopParts extends Parts {
   wide: boolean;
   told: readonly ProblemGroup[];
-  list: () => ReactNode;
+  list: ReactNode;
 }
 
 /** Chooses the list to show; actions only for people who may edit. */
@@ -223,7 +223,7 @@ function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) 
           {beside && <FoldButton fold={fold} />}
         </div>
         <div className={style.side}>
-          {side === "outline" ? outline : side === "history" ? history : list()}
+          {side === "outline" ? outline : side === "history" ? history : list}
         </div>
       </aside>
     </>
@@ -283,7 +283,7 @@ export function DesktopLayout(props: DesktopParts) {
         {asked && <DetailsButton panels={panels} />}
       </section>
       <div className={style.strip}>
-        {!wide && <div className={style.draft}>{status()}</div>}
+        {!wide && <div className={style.draft}>{status}</div>}
         {strip}
       </div>
       <aside

@@ -2,7 +2,7 @@
 
 import { IconArrowLeft } from "@tabler/icons-react";
 import { createContext, useEffect, useRef } from "react";
-import { cardHighlights } from "../../canvas/card-highlights";
+import { useEditorStore } from "../../canvas/editor-store";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import { flatName, type ParameterSide } from "../../graph/document-keys";
 import type { Key } from "../../graph/model";
@@ -50,9 +50,10 @@ export function useDataLights(
   side: ParameterSide,
   paths: readonly string[],
 ) {
+  const { touched } = useEditorStore();
   const lit = useRef(false);
   const dim = () => {
-    if (lit.current) cardHighlights.set({ touched: null });
+    if (lit.current) touched.set(null);
     lit.current = false;
   };
   const latest = useRef(dim);
@@ -63,11 +64,9 @@ export function useDataLights(
     onFocus: () => {
       const all = paths.map((path) => touchedBy(flow, key, side, path));
       lit.current = true;
-      cardHighlights.set({
-        touched: {
-          producers: new Set(all.flatMap(({ producers }) => producers)),
-          consumers: new Set(all.flatMap(({ consumers }) => consumers)),
-        },
+      touched.set({
+        producers: new Set(all.flatMap(({ producers }) => producers)),
+        consumers: new Set(all.flatMap(({ consumers }) => consumers)),
       });
     },
     onBlur: dim,

@@ -3,7 +3,7 @@ import { MantineProvider } from "@mantine/core";
 import { act } from "react";
 import { createRoot, type Root } from "react-dom/client";
 import { afterEach, beforeEach, expect, test, vi } from "vitest";
-import { cardHighlights } from "../../canvas/card-highlights";
+import { EditorStore, EditorStoreProvider } from "../../canvas/editor-store";
 import { type EditorContext, EditorReactContext } from "../../edit-actions/editor-context";
 import { addAction, connect } from "../../graph/edit";
 import { graphNow } from "../../graph/edit/document-writes";
@@ -29,6 +29,7 @@ vi.stubGlobal(
 Object.assign(document, { fonts: new EventTarget() });
 
 let root: Root;
+let store: EditorStore;
 let server: FakeServer;
 
 function Page() {
@@ -44,6 +45,7 @@ function Page() {
 
 beforeEach(() => {
   vi.useFakeTimers();
+  store = new EditorStore();
   server = new FakeServer();
   const text = '{"pvf_type":"string"}';
   const say = addAction(server.doc, { name: "Say", inputs: [{ path: "text", text }] });
@@ -70,7 +72,9 @@ beforeEach(() => {
     root.render(
       <MantineProvider>
         <RoomProvider url="ws://host/room">
-          <Page />
+          <EditorStoreProvider store={store}>
+            <Page />
+          </EditorStoreProvider>
         </RoomProvider>
       </MantineProvider>,
     ),
@@ -127,7 +131,7 @@ test("while a field is in focus, those that give and take it stand out", () => {
   act(() => document.querySelector<HTMLElement>("[role=option]")?.click());
   const names = new Map(graphNow(server.doc).actions.map(({ key, name }) => [key, name]));
   const lit = () => {
-    const { touched } = cardHighlights.now();
+    const touched = store.touched.now();
     return (
       touched &&
       [touched.producers, touched.consumers].map((set) => [...set].map((key) => names.get(key)))

@@ -20,9 +20,9 @@ test("a start that waits for its answer is not unsure, and one that was answered
   const tab = new Tab();
   const starts = new UnansweredStarts(tab);
   starts.sends(sent);
-  expect(starts.list()).toEqual([]);
+  expect(starts.now()).toEqual([]);
   starts.settle("q");
-  expect(new UnansweredStarts(tab).list()).toEqual([]);
+  expect(new UnansweredStarts(tab).now()).toEqual([]);
 });
 
 test("a start without an answer is unsure, and stays so when the page is loaded again", () => {
@@ -33,18 +33,18 @@ test("a start without an answer is unsure, and stays so when the page is loaded 
     heard += 1;
   });
   starts.sends(sent);
-  expect(new UnansweredStarts(tab).list()).toEqual([sent]); // loaded again while it waits
+  expect(new UnansweredStarts(tab).now()).toEqual([sent]); // loaded again while it waits
   starts.doubt("q");
-  expect(starts.list()).toEqual([sent]);
+  expect(starts.now()).toEqual([sent]);
   expect(heard).toBe(2);
-  expect(new UnansweredStarts(tab).list()).toEqual([sent]);
+  expect(new UnansweredStarts(tab).now()).toEqual([sent]);
 });
 
 test("what somebody else has put into the tab's store is no start", () => {
   const tab = new Tab();
   for (const text of ["", "{", "7", '{"a":1}', '[null, 1, {"request":"q"}]']) {
     tab.setItem("aa.starts", text);
-    expect(new UnansweredStarts(tab).list()).toEqual([]);
+    expect(new UnansweredStarts(tab).now()).toEqual([]);
   }
   const throws = {
     getItem: () => {
@@ -57,7 +57,7 @@ test("what somebody else has put into the tab's store is no start", () => {
   const starts = new UnansweredStarts(throws);
   starts.sends(sent);
   starts.doubt("q");
-  expect(starts.list()).toEqual([sent]);
+  expect(starts.now()).toEqual([sent]);
 });
 
 test("of a group it is told which robots have a run and which are not known", () => {

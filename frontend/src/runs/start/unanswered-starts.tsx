@@ -4,13 +4,14 @@
  */
 import { CloseButton, Loader } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
-import { useEffect, useSyncExternalStore } from "react";
+import { useEffect } from "react";
 import { Link } from "wouter";
 import { useLive } from "../../api/page-link";
 import { SIMULATOR } from "../../api/robots";
 import { findStart, type Run, type StartFound } from "../../api/runs";
 import { useRunStatus } from "../../status/run-status";
 import { colorOfName } from "../../ui/name-colors";
+import { useWatched, Watched } from "../../ui/watched";
 import { isolated } from "../../words/isolated";
 import style from "./unanswered-starts.module.css";
 
@@ -91,7 +92,7 @@ function Start({ sent }: { sent: SentStart }) {
 }
 
 export function UnansweredStartNotice() {
-  const starts = useSyncExternalStore(unansweredStarts.subscribe, unansweredStarts.list);
+  const starts = useWatched(unansweredStarts);
   if (starts.length === 0) return null;
   return (
     <section className={style.notice} aria-label="Starts without an answer">
@@ -118,29 +119,25 @@ const MOST = 20;
 
 type Storing = Pick<Storage, "getItem" | "setItem">;
 
-/** Usable without React: `subscribe` and `list` fit `useSyncExternalStore`. */
+/** Lives as long as the tab: whoever leaves a graph is still told what became of its start. */
 export class UnansweredStarts {
   readonly #storage: Storing | null;
-  readonly #listeners = new Set<() => void>();
   #sent: readonly SentStart[];
   /** Requests whose answer this page still waits for. */
   readonly #awaited = new Set<string>();
-  #unsure: readonly SentStart[];
+  readonly #unsure: Watched<readonly SentStart[]>;
 
   /** Starts in the storage were sent by an earlier page, which can no longer get their answers. */
   constructor(storage: Storing | null) {
     this.#storage = storage;
     this.#sent = stored(storage);
-    this.#unsure = this.#sent;
+    this.#unsure = new Watched(this.#sent);
   }
 
-  subscribe = (listener: () => void): (() => void) => {
-    this.#listeners.add(listener);
-    return () => this.#listeners.delete(listener);
-  };
+  subscribe = (listener: () => void): (() => void) => this.#unsure.subscribe(listener);
 
   /** Return the starts that no answer will come for. */
-  list = (): readonly SentStart[] => this.#unsure;
+  now = (): readonly SentStart[] => this.#unsure.now();
 
   /**
    * Note a start right before it is sent: from then on its outcome is unknown until an answer
@@ -165,13 +162,12 @@ export class UnansweredStarts {
 
   #put(sent: readonly SentStart[]): void {
     this.#sent = sent;
-    this.#unsure = sent.filter(({ request }) => !this.#awaited.has(request));
     try {
       this.#storage?.setItem(KEY, JSON.stringify(sent));
     } catch {
       // A tab that stores nothing still knows it until it is loaded anew.
     }
-    for (const listener of this.#listeners) listener();
+    this.#unsure.set(sent.filter(({ request }) => !this.#awaited.has(request)));
   }
 }
 

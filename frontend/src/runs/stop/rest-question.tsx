@@ -1,9 +1,10 @@
 /** Asks a person at the robot whether it rests, when the notice beside STOP is pressed, which draws no dialog. */
-import { useEffect, useSyncExternalStore } from "react";
+import { useEffect } from "react";
 import { useLive } from "../../api/page-link";
 import { useMay } from "../../api/people";
 import { needsRestConfirmation } from "../../api/run-stop";
 import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
+import { useWatched } from "../../ui/watched";
 import { askedRun, mayAnswer } from "./stop-surroundings";
 
 const ConfirmRestDialog = lazyPart(() =>
@@ -13,7 +14,7 @@ const ConfirmRestDialog = lazyPart(() =>
 export function RestQuestion() {
   const may = useMay("operate");
   const { now } = useLive();
-  const asked = useSyncExternalStore(askedRun.subscribe, askedRun.now);
+  const asked = useWatched(askedRun);
   useEffect(() => {
     mayAnswer.set(may);
     return () => mayAnswer.set(false);

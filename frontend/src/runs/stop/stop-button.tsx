@@ -1,10 +1,10 @@
 /** STOP: one, always at the same place, never disabled; STOP ALL by keys from anywhere. */
 
-import { useSyncExternalStore } from "react";
 import type { LiveLink } from "../../api/live-socket";
 import { foreignGraphs, openRuns, unheardRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import type { Run } from "../../api/runs";
+import { useWatched } from "../../ui/watched";
 import { isolated } from "../../words/isolated";
 import style from "./stop-button.module.css";
 import { drawnStop, graphOnScreen } from "./stop-surroundings";
@@ -38,7 +38,7 @@ const SOFT = "A software stop: no replacement for the emergency stop.";
 
 export function StopButton() {
   const { live, now } = useLive();
-  const graph = useSyncExternalStore(graphOnScreen.subscribe, graphOnScreen.now);
+  const graph = useWatched(graphOnScreen);
   const open = openRuns(now);
   const here = graph === null ? [] : open.filter((run) => run.graph === graph);
   const meant = runToStop(here);

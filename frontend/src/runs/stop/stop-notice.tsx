@@ -1,6 +1,6 @@
 /** Notice with the state of a Stop, in words, until it is proven. */
 
-import { useState, useSyncExternalStore } from "react";
+import { useState } from "react";
 import type { LiveState, StopRequest } from "../../api/live-socket";
 import { foreignGraphs, openRuns, stopTargets, unheardRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
@@ -11,6 +11,7 @@ import { serverTimeOf, tick } from "../../clock/server-clock";
 import { HelpLink } from "../../status/help-link";
 import { clock, duration, instant, useTick } from "../../ui/times";
 import { useRootMark } from "../../ui/use-root-mark";
+import { useWatched } from "../../ui/watched";
 import { isolated } from "../../words/isolated";
 import style from "./stop-notice.module.css";
 import { askedRun, mayAnswer } from "./stop-surroundings";
@@ -239,7 +240,7 @@ function Cross() {
 
 export function StopNotice() {
   const { now } = useLive();
-  const canAnswer = useSyncExternalStore(mayAnswer.subscribe, mayAnswer.now);
+  const canAnswer = useWatched(mayAnswer);
   const [dismissed, setDismissed] = useState("");
   const last = now.stops.at(-1);
   const watching = last !== undefined && last.id !== dismissed;

@@ -2,17 +2,11 @@
  * STOP with its key and its notices, as a root of its own beside the page: whatever breaks there, STOP
  * stands. It needs React, the link to the runner and its own styles, and nothing else of the page.
  */
-import {
-  Component,
-  type ReactNode,
-  StrictMode,
-  useLayoutEffect,
-  useRef,
-  useSyncExternalStore,
-} from "react";
+import { Component, type ReactNode, StrictMode, useLayoutEffect, useRef } from "react";
 import { createRoot } from "react-dom/client";
 import { pageLink } from "../../api/page-link";
 import { isStopKey } from "../../ui/keys";
+import { useWatched } from "../../ui/watched";
 import { StopButton } from "./stop-button";
 import { StopNotice } from "./stop-notice";
 import style from "./stop-root.module.css";
@@ -93,9 +87,9 @@ function ChangedPage() {
 }
 
 function Stop() {
-  const { signedIn } = useSyncExternalStore(pageLink.subscribe, pageLink.now);
-  const error = useSyncExternalStore(pageError.subscribe, pageError.now);
-  const changed = useSyncExternalStore(changedFromOutside.subscribe, changedFromOutside.now);
+  const { signedIn } = useWatched(pageLink);
+  const error = useWatched(pageError);
+  const changed = useWatched(changedFromOutside);
   return (
     <>
       {error !== "" && (
