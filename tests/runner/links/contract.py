@@ -9,6 +9,7 @@ from contextlib import suppress
 
 import anyio
 import msgspec
+import pytest
 
 from action_assistant.runner.execution.evidence import difference
 from action_assistant.runner.links.observations import Snapshot
@@ -18,6 +19,7 @@ from action_assistant.runner.links.port import (
     Feedback,
     Link,
     NoAnswer,
+    NotSent,
     Order,
     Report,
     Transitions,
@@ -154,6 +156,17 @@ async def commands_of_our_own_are_not_reported_as_those_of_others(bench: Bench) 
     assert not [each for each in heard if type(each).__name__ == "ForeignCommand"]
 
 
+async def a_start_that_is_held_back_in_its_last_step_never_leaves(bench: Bench) -> None:
+    def hold() -> None:
+        raise NotSent("held")
+
+    with pytest.raises(NotSent, match="held"):
+        await bench.link.start(placed(bench.endless, "r10"), hold)
+    await bench.link.start(placed(bench.quick, "r11"))
+    await shown(bench, bench.quick, lambda snapshot: snapshot.run == "r11")
+    assert not [each for each in (await answer(bench)).graphs if each.run == "r10"]
+
+
 PROMISES: tuple[Promise, ...] = (
     an_answer_shows_a_graph_under_the_identity_it_was_started_with,
     the_answer_to_a_get_tells_when_it_was_asked_for,
@@ -164,6 +177,7 @@ PROMISES: tuple[Promise, ...] = (
     what_goes_on_is_told_without_being_asked_for,
     what_is_shown_is_what_was_sent,
     commands_of_our_own_are_not_reported_as_those_of_others,
+    a_start_that_is_held_back_in_its_last_step_never_leaves,
 )
 
 

@@ -325,6 +325,37 @@ async def test_a_start_that_is_stopped_before_its_turn_was_never_sent_and_no_ala
         assert (await control.start(order(sequence("next"), engine="David"), ANN)).fresh
 
 
+class InTurn(Open):
+    """A robot whose start leaves in the very step in which its turn comes."""
+
+    def __init__(self, *more: Any) -> None:
+        super().__init__(*more)
+        self.turn = anyio.Event()
+
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
+        """It waits for its turn, and leaves without a further wait."""
+        await self.turn.wait()
+        await super().start(order, leaves)
+
+
+@virtual
+async def test_a_start_whose_turn_comes_together_with_a_stop_never_leaves() -> None:
+    david = InTurn(NEVER)
+    async with fleet(Harness(), David=david) as control, anyio.create_task_group() as tasks:
+        tasks.start_soon(control.start, order(sequence(), engine="David"), ANN)
+        await until(lambda: bool(control.open))
+        ((run, opened),) = control.open.items()
+        await anyio.sleep(0.5)
+        david.turn.set()
+        await control.stop(run, BEN)  # before the task that sends the start goes on
+        await until(lambda: run not in control.open)
+        assert (opened.run.state, opened.run.detail) == (
+            "stopped",
+            "Stopped before anything was sent.",
+        )
+        assert david.starts == []
+
+
 @virtual
 async def test_a_start_whose_turn_does_not_come_is_refused_and_was_never_sent() -> None:
     david = Waiting(NEVER)

@@ -69,8 +69,13 @@ _GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
 _NO_TURN: Final = (
     "It was not sent: its turn among the starts on its domain did not come within 5 seconds."
 )
+_STOPPED_BEFORE: Final = "Stopped before anything was sent."
 _LINES: Final = 2_000  # of the engine's log, kept with one run
 _LONGEST_LINE: Final = 2_000  # characters
+
+
+class _HeldBack(NotSent):
+    """A Stop was pressed before the start message left."""
 
 
 class OpenRun:
@@ -409,17 +414,26 @@ class OpenRun:
         at = self._clock_us()
         self.watch.starts(order.umrf, self._link.standing.process)
         if self.run.desired == "stopped":
-            self.end("stopped", "Stopped before anything was sent.")
+            self.end("stopped", _STOPPED_BEFORE)
             return
         leaving = anyio.Event()
+
+        def leave() -> None:
+            """Let the message leave now, unless a Stop has been pressed by now."""
+            if self.run.desired == "stopped":
+                raise _HeldBack
+            leaving.set()
+
         try:
             with anyio.fail_after(_HAND_OVER_S), self._handing:
-                await self._link.start(order, leaving.set)
+                await self._link.start(order, leave)
             if self._handing.cancelled_caught and not leaving.is_set():
-                self.end("stopped", "Stopped before anything was sent.")
-                return
+                raise _HeldBack
             if self._handing.cancelled_caught:
                 raise TimeoutError("somebody stopped it while it was handed over")
+        except _HeldBack:
+            self.end("stopped", _STOPPED_BEFORE)
+            return
         except (EngineRefused, NotSent, NoAnswer) as refused:
             self.end("refused", str(refused))
             return

@@ -166,7 +166,7 @@ class ForeignCommand(msgspec.Struct, frozen=True, kw_only=True):
 Report: TypeAlias = Transitions | Feedback | EngineLog | EngineChanged | ForeignCommand
 
 
-#: Is called right before a message leaves.
+#: Is called right before a message leaves. It may raise NotSent, which holds the message back.
 Leaves: TypeAlias = Callable[[], None]
 
 
@@ -193,9 +193,10 @@ class Link(Protocol):
         ...
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start message. `leaves` is called right before the message leaves; a start
-        that is given up before that call has certainly not left. Raise NotSent if the message
-        has certainly not left, EngineRefused if the engine refuses the start."""
+        """Publish one start message. `leaves` is called right before the message leaves, on a robot
+        with no wait in between: a start that is given up before that call has certainly not left,
+        and NotSent from `leaves` holds the message back. Raise NotSent if the message has certainly
+        not left, EngineRefused if the engine refuses the start."""
         ...
 
     async def stop(self, graph_name: str) -> None:

@@ -120,7 +120,7 @@ class Outlets:
         self, robot: str, run: str, message: UmrfGraphStart, leaves: Callable[[], None]
     ) -> None:
         """Publish the start of a run once its engine has taken in the start before, or `TAKEN_S` after that.
-        `leaves` is called right before the message leaves."""
+        `leaves` is called right before the message leaves, and may hold it back by raising NotSent."""
 
         def leaving() -> UmrfGraphStart:
             leaves()
