@@ -36,14 +36,18 @@ MANY: Final[dict[str, dict[str, Any]]] = {
 
 
 def tables() -> Iterator[Table]:
-    """Rounds; loads; many people."""
-    head = ["in rounds", "server", "CPU per delivered", "of Hocuspocus's", "p50", "p99", "missing"]
-    yield Table(head, list(_rows("lockstep", LOCKSTEP, RUNS, ("ratio", "p50", "p99", "missing"))))
-    figures = ("ratio", "share", "p50", "p99", "missing", "memory")
-    head = ["load", "server", "CPU per delivered", "of Hocuspocus's", "CPU", "p50", "p99"]
-    head += ["missing", "memory"]
-    yield Table(head, list(_rows("fan out", OPEN, RUNS, figures)))
-    yield Table(head, list(_rows("fan out", MANY, RUNS, figures)))
+    """Rounds; loads; many people. A cell has our figure, then that of Hocuspocus."""
+    rounds = ("cost", "ratio", "p50", "p99", "missing")
+    loads = ("cost", "ratio", "CPU", "p50", "p99", "missing", "memory")
+    yield Table(_head("in rounds", rounds), list(_rows("lockstep", LOCKSTEP, RUNS, rounds)))
+    yield Table(_head("load", loads), list(_rows("fan out", OPEN, RUNS, loads)))
+    yield Table(_head("load", loads), list(_rows("fan out", MANY, RUNS, loads)))
+
+
+def _head(first: str, figures: Sequence[str]) -> list[str]:
+    headings = {"cost": "CPU per delivered, µs", "p50": "p50, ms", "p99": "p99, ms"}
+    headings |= {"CPU": "CPU, %", "memory": "memory, MB"}
+    return [first, *(headings.get(figure, figure) for figure in figures)]
 
 
 def in_turn(operation: str, plan: dict[str, Any], count: int) -> dict[str, list[Run]]:
@@ -61,29 +65,33 @@ def in_turn(operation: str, plan: dict[str, Any], count: int) -> dict[str, list[
 def _rows(
     operation: str, loads: dict[str, dict[str, Any]], count: int, figures: Sequence[str]
 ) -> Iterator[list[str]]:
-    """The median of each figure; of the ratio of two runs in turn also the least and the most; of what
-    went missing the sum."""
+    """Yield one row for each load. The ratio is that of two runs in turn, with the least and the most;
+    of missing edits the sum is given, of all other figures the median."""
     for load, plan in loads.items():
         found = in_turn(operation, plan, count)
         ratios = [
             ours["cpu_us"] / theirs["cpu_us"]
             for ours, theirs in zip(found[Ours.name], found[Hocuspocus.name], strict=True)
         ]
-        for name, runs in found.items():
-            ratio = ""
-            if name == Ours.name:
-                least, most = min(ratios), max(ratios)
-                ratio = f"{statistics.median(ratios):.2f} ({least:.2f}–{most:.2f})"
-            told = {
-                "ratio": lambda ratio=ratio: ratio,
-                "share": lambda runs=runs: f"{median(runs, 'cpu_share') * 100:.0f} %",
-                "p50": lambda runs=runs: f"{median(runs, 'p50_ms'):.1f} ms",
-                "p99": lambda runs=runs: f"{median(runs, 'p99_ms'):.1f} ms",
-                "missing": lambda runs=runs: str(sum(run["missing"] for run in runs)),
-                "memory": lambda runs=runs: f"{median(runs, 'memory_mb'):.0f} MB",
-            }
-            cost = f"{median(runs, 'cpu_us'):.1f} µs"
-            yield [load, name, cost, *(told[figure]() for figure in figures)]
+        cells = {
+            name: " / ".join(_figure(runs, name) for runs in found.values())
+            for name in figures
+            if name != "ratio"
+        }
+        cells["ratio"] = f"{statistics.median(ratios):.2f} ({min(ratios):.2f}–{max(ratios):.2f})"
+        yield [load, *(cells[name] for name in figures)]
+
+
+def _figure(runs: Sequence[Run], name: str) -> str:
+    """Return one figure of the runs of one server, without its unit."""
+    if name == "missing":
+        return str(sum(run["missing"] for run in runs))
+    if name == "CPU":
+        return f"{median(runs, 'cpu_share') * 100:.0f}"
+    if name == "memory":
+        return f"{median(runs, 'memory_mb'):.0f}"
+    keys = {"cost": "cpu_us", "p50": "p50_ms", "p99": "p99_ms"}
+    return f"{median(runs, keys[name]):.1f}"
 
 
 def median(runs: Sequence[Run], figure: str) -> float:
