@@ -17,7 +17,7 @@ from action_assistant.umrf.check import (
     check_reading,
     refused_by_parser,
 )
-from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.files.codec import Unreadable, read
 from action_assistant.umrf.model import Graph, Problem, Signature
 from action_assistant.umrf.semantics import HazardEvent, NodeStateEvent, simulate
@@ -110,7 +110,7 @@ def test_a_sound_graph_has_no_problems() -> None:
         (file(entry=[], exits=[]), "empty", "warning"),
         (file(A | {"input_parameters": {"p": TEXT}}, B), "H7", "error"),
         (file(A, B | {"input_parameters": {"p": TEXT}}), "H8", "error"),
-        (file(A | {"actor": "x"}, B | {"actor": "y"}), "actors", "error"),
+        (file(A | {"actor": "x"}, B | {"actor": "y"}), "actors", "warning"),
         (file(A, action("B", parents=[{"name": "A", "conditions": ["on_true -> restart", *SAFE]}])), "restart", "warning"),
         (
             file(A, action("B", parents=[{"name": "A", "required": False, "conditions": ["on_true -> pause", *SAFE]}]), entry=["A", "B"]),
@@ -283,7 +283,8 @@ def test_facts_decide_which_hazards_there_are() -> None:
     value = file(A | {"actor": "x"}, action("B", parents=[{"name": "A"}]) | {"actor": "y"})
     graph = read(json.dumps(value)).graph
     assert {p.code for p in check(graph)} == {"H3", "actors"}
-    assert check(graph, None, fixed) == []
+    assert [p.code for p in check(graph, None, fixed)] == ["synchroniser"]
+    assert check(graph, None, SIMULATED) == []
 
 
 def test_the_first_thousand_of_equal_problems_are_reported() -> None:

@@ -366,8 +366,9 @@ def _report(event: semantics.Trace, *, as_json: bool) -> None:
         print(msgspec.json.encode(event).decode())
         return
     match event:
-        case semantics.NodeStateEvent(t_ms=at, graph=graph, node=node, state=state):
-            print(told(f"{at / 1000:10.3f} s  {graph}  {node}: {state}"))
+        case semantics.NodeStateEvent(t_ms=at, graph=graph, node=node, state=state, actor=actor):
+            who = f"{node} ({actor})" if actor else node
+            print(told(f"{at / 1000:10.3f} s  {graph}  {who}: {state}"))
         case semantics.GraphStateEvent(t_ms=at, graph=graph, state=state):
             print(told(f"{at / 1000:10.3f} s  {graph}: {state}"))
         case semantics.GraphResultEvent(t_ms=at, graph=graph, value=value):

@@ -6,6 +6,7 @@ See docs/umrf-and-the-engine.md 3.
 from collections.abc import Collection, Mapping
 
 from action_assistant.umrf.checks.flow import check_flow
+from action_assistant.umrf.checks.performers import check_performers
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.subgraphs import (
@@ -15,7 +16,7 @@ from action_assistant.umrf.checks.subgraphs import (
 )
 from action_assistant.umrf.checks.trials import check_scenarios
 from action_assistant.umrf.checks.values import check_static, check_values
-from action_assistant.umrf.codes import FINAL, REFUSED, STRUCTURAL, rank
+from action_assistant.umrf.codes import FINAL, REFUSED, REFUSED_ALONE, STRUCTURAL, rank
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.files.codec import ActionReading, Reading
 from action_assistant.umrf.files.origins import placed
@@ -52,8 +53,8 @@ def check(
     check_structure(subject)
     check_flow(subject, set(graphs or ()) - set(library or ()))
     check_values(subject, library, graphs or {})
-    check_subgraphs(subject, graphs or {}, library or {}, resolution)
-    _check_actors(subject)
+    inside = check_subgraphs(subject, graphs or {}, library or {}, resolution)
+    check_performers(subject, inside)
     check_scenarios(subject)
     return sorted(subject.problems, key=rank)
 
@@ -114,7 +115,8 @@ def refused_by_parser(reading: Reading) -> list[Problem]:
 
 
 def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ()) -> list[Problem]:
-    """Return the errors that forbid a start.
+    """Return the problems that forbid a start on one robot: the errors, and warnings for which one
+    engine refuses the graph.
 
     `overridden`: codes of errors that a person accepts. A final error forbids the start even if its
     code is overridden.
@@ -122,7 +124,8 @@ def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ())
     return [
         problem
         for problem in problems
-        if problem.severity == "error" and (is_final(problem) or problem.code not in overridden)
+        if (problem.severity == "error" or problem.code in REFUSED_ALONE)
+        and (is_final(problem) or problem.code not in overridden)
     ]
 
 
@@ -131,13 +134,3 @@ def is_final(problem: Problem) -> bool:
     problem in a sub-graph that the error reports."""
     inner = problem.inside.code if problem.inside is not None else problem.code
     return problem.severity == "error" and not FINAL.isdisjoint({problem.code, inner})
-
-
-def _check_actors(subject: Subject) -> None:
-    actors = sorted({action.actor for action in subject.real if action.actor})
-    if len(actors) > 1 and not subject.facts.synchronises:
-        message = (
-            f"The actions belong to {len(actors)} actors ({', '.join(actors)}). This engine cannot "
-            "synchronise with others: it refuses the graph."
-        )
-        subject.report("actors", "error", message)

@@ -156,10 +156,20 @@ CODES: Final[dict[str, Code]] = {
         "other", _WARNING, "an action of the library with the name of a graph",
         "the action is taken, never the graph",
     ),
+    # Several actors, in the graph or its sub-graphs
     "actors": Code(
-        "hazard", _ERROR, "several actors, and an engine that cannot synchronise",
-        "the engine refuses to start the graph",
+        "hazard", _WARNING, "several actors, and an engine that cannot synchronise",
+        "one engine refuses the graph, so it cannot be started on robots yet; it plays everywhere else",
     ),
+    "synchroniser": Code(
+        "hazard", _WARNING, "several actors, and a profile that claims `synchronises`",
+        "a robot that is not reached for 5 s, or two ends at about the same time, abort engines, and a graph that waits cannot be stopped",
+    ),
+    "values-across-robots": Code("hazard", _WARNING, "an arrow that hands an output to an action of another actor", "a runner that leads the robots cannot hand values on"),
+    "two-at-once": Code("hazard", _WARNING, "two actions of one actor that may run at the same time", "on a robot that is led, a Stop reaches the second one up to 5 s later"),
+    "loaded-anew": Code("hazard", _WARNING, "an action that can run more than once", "on a robot that is led, it is loaded anew each time and forgets what it remembers"),
+    "spontaneous-across": Code("hazard", _WARNING, "a spontaneous action that leads to an action of another actor", "a runner that leads the robots cannot stop what comes after it at each of its ends"),
+    "stop-across": Code("hazard", _WARNING, "an arrow that stops an action of another actor", "the stop is a message of the runner that leads the robots, and does not come without it"),
     # The rest
     "instance-id-cut": Code("other", _WARNING, "a number with decimals", "the engine cuts them"),
     "name-class": Code("other", _WARNING, "a name that no C++ class can have", "no action package can have it; a sub-graph may"),
@@ -196,6 +206,9 @@ STRUCTURAL: Final[frozenset[str]] = REFUSED | {
 FINAL: Final[frozenset[str]] = STRUCTURAL | {
     name for name, code in CODES.items() if code.kind == "unsendable"
 }
+
+#: Warnings for which one engine refuses a graph that several robots or the simulator can play.
+REFUSED_ALONE: Final = frozenset({"actors"})
 
 #: The order of possible hazards: the engine dies or blocks, the graph cannot be stopped, it never ends.
 _WORST: Final = ("H4", "H5", "H12", "H8", "H14")

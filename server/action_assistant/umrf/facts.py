@@ -44,7 +44,11 @@ class EngineFacts(msgspec.Struct, frozen=True, kw_only=True):
 
 PINNED: Final = EngineFacts(commit="5819055")
 SIMULATED: Final = EngineFacts(
-    commit="simulator", bypass_fixed=True, restart_matches=True, simulated=True
+    commit="simulator",
+    bypass_fixed=True,
+    synchronises=True,
+    restart_matches=True,
+    simulated=True,
 )
 
 _KNOWN: Final = {facts.commit: facts for facts in (PINNED, SIMULATED)}

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import msgspec
+from msgspec.structs import replace
 
 from action_assistant.umrf.model import ENTRY, PRECONDITIONS, Graph, Key, Precondition, Relation
 
@@ -45,6 +46,25 @@ def laps(graph: Graph, *, inside: bool = False) -> Laps:
     }
     barring = tuple(name for name, joined in once.items() if joined)
     return Laps(tuple(once), barring, needs=tuple(_needs(graph, () if inside else once, names)))
+
+
+def repeated(graph: Graph) -> set[Key]:
+    """Return the keys of the actions that can run more than once, as far as the arrows tell: they
+    are spontaneous, several parents may start them one after the other, or they lie on or after
+    such actions or a loop.
+
+    Unlike `laps`, this does not take stops for failures: a stop ends a run and begins none.
+    """
+    arrows = []
+    for arrow in graph.relations:
+        answers = {
+            outcome: answer if answer in {"run", "bypass"} else "ignore"
+            for outcome in PRECONDITIONS
+            for answer in [arrow.conditions.answer(outcome)]
+        }
+        if arrow.parent == ENTRY or set(answers.values()) != {"ignore"}:
+            arrows.append(replace(arrow, conditions=replace(arrow.conditions, **answers)))
+    return {a.key for a in graph.actions} - _walked(replace(graph, relations=tuple(arrows))).keys()
 
 
 def _needs(
@@ -98,8 +118,9 @@ def _walked(graph: Graph) -> dict[Key, bool]:
     """Return the actions that end at most once, by key. The value tells whether this holds only as
     long as no action fails.
 
-    Actions that lie on a loop, or after one, are not in the result.
+    Spontaneous actions, actions on a loop, and actions after either are not in the result.
     """
+    lively = {each.key for each in graph.actions if each.type == "spontaneous"}
     arriving: dict[Key, list[Relation]] = {each.key: [] for each in graph.actions}
     leaving: dict[Key, list[Key]] = {}
     for arrow in graph.relations:
@@ -111,7 +132,7 @@ def _walked(graph: Graph) -> dict[Key, bool]:
     while ready:
         key = ready.pop()
         joined = _joined(arriving.get(key, []))
-        if joined is None:
+        if joined is None or key in lively:
             continue
         known[key] = joined or any(known[each.parent] for each in arriving.get(key, []))
         for child in leaving.get(key, []):

@@ -16,7 +16,7 @@ from action_assistant.runner.start.admission import (
     prepared,
     read_request,
 )
-from action_assistant.umrf.check import check, check_reading
+from action_assistant.umrf.check import blocking, check, check_reading
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.files import codec
@@ -167,9 +167,10 @@ def refusal_of(text: str, engine: str) -> set[str] | None:
     return None
 
 
-def errors_of(text: str) -> set[str] | None:
-    found = {each.code for each in check_reading(codec.read(text)) if each.severity == "error"}
-    return found or None
+def errors_of(text: str, engine: str) -> set[str] | None:
+    """The codes that the check calls errors, or refused by one engine; None without any."""
+    facts = SIMULATED if engine == "simulator" else PINNED
+    return {each.code for each in blocking(check_reading(codec.read(text), None, facts))} or None
 
 
 @given(named_graphs(), st.sampled_from(["simulator", "David"]))
@@ -179,7 +180,7 @@ def test_a_start_refuses_of_a_graph_what_the_check_calls_an_error_and_nothing_el
 ) -> None:
     """A start may show fewer of many errors."""
     text = codec.write(graph)
-    refused, errors = refusal_of(text, engine), errors_of(text)
+    refused, errors = refusal_of(text, engine), errors_of(text, engine)
     assert (refused is None) == (errors is None), (refused, errors)
     assert (refused or set()) <= (errors or set())
 
@@ -192,7 +193,7 @@ def test_a_start_refuses_of_real_files_what_the_check_calls_an_error() -> None:
             codec.read(text)
         except (UnicodeDecodeError, codec.Unreadable):
             continue
-        assert (refusal_of(text, "David") is None) == (errors_of(text) is None), path.name
+        assert (refusal_of(text, "David") is None) == (errors_of(text, "David") is None), path.name
 
 
 def test_a_script_is_for_the_simulator_and_never_instant() -> None:

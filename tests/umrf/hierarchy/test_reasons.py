@@ -177,7 +177,6 @@ REFUSED = {
     ),
     "other parameters": ("signature", CHAIN, with_values(ONE, X=({"p": TEXT}, {}))),
     "itself": ("recursion", CHAIN, inner("entry>S", "S>exit")),
-    "two actors": ("actors", changed(CHAIN, "A", actor="one"), changed(ONE, "X", actor="two")),
     "a ghost": ("faulty", CHAIN, changed(TWO, "Y", missing=True)),
 }  # fmt: skip
 

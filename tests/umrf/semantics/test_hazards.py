@@ -85,7 +85,8 @@ def test_a_graph_of_several_actors_is_refused_where_engines_do_not_synchronise()
     graph = msgspec.structs.replace(graph, actions=actions)
     with pytest.raises(GraphRefused, match="synchronizer"):
         Engine(facts=PINNED).start(graph, 0)
-    assert hazards(list(simulate(graph))) == ["refused"]
+    assert hazards(list(simulate(graph, facts=PINNED))) == ["refused"]
+    assert graph_states(list(simulate(graph)))[-1] == "FINISHED"
 
 
 def test_an_action_with_the_name_of_an_end_is_none() -> None:

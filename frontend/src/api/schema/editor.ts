@@ -330,6 +330,8 @@ export interface EditorApi {
         graph: string;
         node: string;
         response: string;
+        /** @default  */
+        actor?: string;
     };
     /**
      * DocumentStep
@@ -1087,10 +1089,15 @@ export interface EditorApi {
         node: string;
         result: string;
         message?: string;
+        /** @default  */
+        actor?: string;
     };
     /**
      * NodeStateEvent
      * @description An action changed its state. Times are milliseconds on the caller's clock.
+     *
+     *     `actor`: the actor that performs the action, here and in other events; "" if none is named. An
+     *     action of a sub-graph that names none belongs to the actor of the action that stands for it.
      */
     NodeStateEvent: {
         /** @enum {string} */
@@ -1099,6 +1106,8 @@ export interface EditorApi {
         graph: string;
         node: string;
         state: string;
+        /** @default  */
+        actor?: string;
     };
     /**
      * NotReady

@@ -218,9 +218,9 @@ def silence_item(engine: str, why: str) -> Item:
     return Item(code="answers", verdict="blocked", text=text.rstrip())
 
 
-def robot_items(view: EngineView, graph: Graph) -> tuple[Item, ...]:
+def robot_items(view: EngineView, graph: Graph, inside: Collection[Graph] = ()) -> tuple[Item, ...]:
     """Return the items for a robot that has answered, as far as its answer and its standing decide
-    them."""
+    them. `inside`: the sub-graphs."""
     return (
         answer_item(view),
         _proof(view),
@@ -229,7 +229,7 @@ def robot_items(view: EngineView, graph: Graph) -> tuple[Item, ...]:
         _quiet(view, graph),
         _rest(view),
         _others(view),
-        _actors(view, graph),
+        _actors(view, (graph, *inside)),
     )
 
 
@@ -437,15 +437,16 @@ def _others(view: EngineView) -> Item:
     return Item(code="others", verdict="blocked", text=text, codes=("others",), overridable=True)
 
 
-def _actors(view: EngineView, graph: Graph) -> Item:
+def _actors(view: EngineView, graphs: Collection[Graph]) -> Item:
     """Check that all actions belong to this robot, or that its engine synchronises with others."""
-    named = {action.actor for action in graph.actions if not action.missing} - {""}
+    named = {each.actor for graph in graphs for each in graph.actions if not each.missing} - {""}
     foreign = sorted(named - {view.name, view.standing.actor})
     if not foreign or view.facts.synchronises:
         return Item(code="actors", verdict="passed", text=f"The actions are {view.name}'s to do.")
     text = (
         f"Actions belong to {', '.join(foreign)}, not to {view.name}, and its engine cannot "
-        "synchronise with others: it refuses the graph."
+        "synchronise with others: it refuses the graph. A graph of several robots cannot be started on "
+        "robots yet; the simulator plays it."
     )
     return Item(code="actors", verdict="blocked", text=text, codes=("actors",), overridable=True)
 
@@ -522,7 +523,7 @@ def engine_items(view: EngineView, ready: Prepared, prefixes: Sequence[Path]) ->
     `prefixes`: those of the workspace that is sourced here. For workers."""
     graph, pinned = codec.read(ready.umrf).graph, graphs_in(ready.subgraphs)
     return (
-        *robot_items(view, graph),
+        *robot_items(view, graph, pinned.values()),
         *_library_items(view, graph, prefixes),
         *(_with_folder(each, view, pinned) for each in subgraph_items(view, pinned)),
     )

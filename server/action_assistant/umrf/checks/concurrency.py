@@ -73,6 +73,13 @@ class Concurrency:
             return False
         return not self.known or bool(self._with[self.index[other]] >> self.index[key] & 1)
 
+    def beside(self, key: Key) -> set[Key]:
+        """Return the keys of the actions that may run while `key` runs: all others that can run if
+        the graph was not followed."""
+        if not self.known:
+            return (self._runs & self.index.keys()) - {key}
+        return {self.keys[index] for index in nodes_in(self._with[self.index[key]])}
+
     def running_after(
         self, key: Key, outcome: Precondition, waited: Iterable[Key] = ()
     ) -> set[Key]:

@@ -137,25 +137,22 @@ class Subject:
         member: str = "",
         fix: str | None = None,
         side: Literal["parents", "children"] | None = None,
-        also: Iterable[Relation] = (),
+        also: Iterable[Relation | Action] = (),
         inside: PlaceInside | None = None,
     ) -> None:
         """Add a problem that concerns an action, a relation, or, without either, the whole graph.
 
         `member` is the JSON pointer of the faulty value below that action, relation or graph.
         `side` is the list in which the relation is shown, since a file lists each relation twice.
-        `also`: other relations with the same problem. `inside`: the place in the sub-graph for
+        `also`: other relations or actions with the same problem. `inside`: the place in the sub-graph for
         which the action stands.
 
         Only the first `MAX_EACH` problems of one code and severity are kept.
         """
         if not self._problems.has_room(severity, code):
             return
-        where = Where(path=member)
-        if action is not None:
-            where = Where(path=self.paths.get(action.key, "") + member, aid=action.key)
-        elif relation is not None:
-            where = self._where(relation, member, side)
+        about = action or relation
+        where = Where(path=member) if about is None else self._where(about, member, side)
         others = tuple(self._where(other, member, side) for other in islice(also, MAX_EACH))
         self._problems.found.append(
             Problem(
@@ -169,7 +166,10 @@ class Subject:
             )
         )
 
-    def _where(self, relation: Relation, member: str, side: str | None) -> Where:
+    def _where(self, about: Relation | Action, member: str, side: str | None) -> Where:
+        if isinstance(about, Action):
+            return Where(path=self.paths.get(about.key, "") + member, aid=about.key)
+        relation = about
         path = self.parent_paths.get(id(relation)) or self.child_paths.get(id(relation), "")
         if side == "children" or (side is None and member.startswith("/remap")):
             path = self.child_paths.get(id(relation), path)

@@ -80,9 +80,9 @@ CERTAIN: Final = Resolution()
 
 
 @dataclass(frozen=True)
-class _Graphs:
+class SubGraphs:
     """The graphs by name, the names of actions that take precedence over graphs of the same name
-    (`known`), and the results of the check of each graph."""
+    (`known`), and the results of the check of each graph inside (`found`, the innermost first)."""
 
     by_name: Mapping[str, Graph]
     known: Container[str]
@@ -150,23 +150,25 @@ def check_subgraphs(
     graphs: Mapping[str, Graph],
     known: Container[str] = frozenset(),
     resolution: Resolution = CERTAIN,
-) -> None:
-    """Report all problems of the sub-graphs. `graphs`: the indexed graphs by name. `known`: names
-    of actions, which take precedence over graphs of the same name."""
+) -> SubGraphs:
+    """Report all problems of the sub-graphs, and return what was found. `graphs`: the indexed
+    graphs by name. `known`: names of actions, which take precedence over graphs of the same
+    name."""
     if resolution.cut:
         message = (
             "There are more graphs inside this one than are examined. Deeper graphs were not checked, "
             "and a dry-run plays it as one action."
         )
         subject.report("not-tried", "warning", message)
-    inside = _Graphs(graphs, known, resolution)
+    inside = SubGraphs(graphs, known, resolution)
     for name in inside.inmost_first(subject.graph):
         inside.found[name] = _inner(name, subject.facts, inside)
     _check_each(subject, subject.graph.name, inside)
     _check_again(subject, graphs, known)
+    return inside
 
 
-def _check_each(subject: Subject, within: str, graphs: _Graphs) -> None:
+def _check_each(subject: Subject, within: str, graphs: SubGraphs) -> None:
     """Report how each sub-graph of one graph affects this graph. `within`: the name by which the
     graph around uses it."""
     for action in subject.real:
@@ -201,9 +203,7 @@ def _report(subject: Subject, action: Action, graph: Graph, found: _Inner) -> No
     own = slots_of(action.inputs), slots_of(action.outputs)
     check_signature(subject, action, found.signature, *own)
     for each in found.findings:
-        levels = (action.full_name, *each.place.levels)
-        aids = (action.key, *each.place.aids)
-        place = msgspec.structs.replace(each.place, levels=levels, aids=aids)
+        place = at_action(each.place, action)
         code = "subgraph" if each.severity == "error" else place.code
         message = _sentence(each.severity, place)
         subject.report(code, each.severity, message, action=action, member="/name", inside=place)
@@ -231,26 +231,21 @@ def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container
     """Report sub-graphs that an engine has used already when it comes to them a second time. Each
     engine (actor) resolves only its own actions."""
     reported: set[tuple[Key, str]] = set()
-    for actor in sorted({action.actor for action in subject.real} - {""}) or [""]:
-
-        def is_other(action: Action, own: tuple[str, str] = ("", actor)) -> bool:
-            return action.actor not in own or action.name in known
-
-        for found in unresolved(subject.graph, graphs, is_other):
-            place = (found.action.key, found.name)
-            if found.why == "recursion" or place in reported:
-                continue
-            reported.add(place)
-            inside = "" if found.action.name == found.name else f" inside {found.action.full_name}"
-            message = (
-                f"The sub-graph “{found.name}”{inside} comes a second time: the engine has used it up "
-                "then and cannot resolve the graph. Give the sub-graph another name for the second "
-                "place, or put its actions there."
-            )
-            subject.report("subgraph-twice", "error", message, action=found.action, member="/name")
+    for found in unresolved(subject.graph, graphs, known):
+        place = (found.action.key, found.name)
+        if found.why == "recursion" or place in reported:
+            continue
+        reported.add(place)
+        inside = "" if found.action.name == found.name else f" inside {found.action.full_name}"
+        message = (
+            f"The sub-graph “{found.name}”{inside} comes a second time: the engine has used it up "
+            "then and cannot resolve the graph. Give the sub-graph another name for the second "
+            "place, or put its actions there."
+        )
+        subject.report("subgraph-twice", "error", message, action=found.action, member="/name")
 
 
-def _inner(name: str, facts: EngineFacts, graphs: _Graphs) -> _Inner:
+def _inner(name: str, facts: EngineFacts, graphs: SubGraphs) -> _Inner:
     """Check one sub-graph, and return the results. The graphs inside it must have been checked
     before."""
     graph = graphs.by_name[name]
@@ -293,10 +288,17 @@ def _findings(inside: Subject) -> tuple[_Finding, ...]:
 def _finding(inside: Subject, problem: Problem, left: int = 0) -> _Finding:
     """Return a problem of a sub-graph as a finding for the graph around.
 
-    `left`: how many further problems this finding stands for. A problem from a deeper graph keeps
-    its place there.
+    `left`: how many further problems this finding stands for.
     """
-    place = problem.inside or PlaceInside(
+    place = place_inside(inside, problem)
+    message = place.message + more(left, "problem", "problems")
+    return _Finding(problem.severity, msgspec.structs.replace(place, message=message))
+
+
+def place_inside(inside: Subject, problem: Problem) -> PlaceInside:
+    """Return the place of a problem of a sub-graph. A problem from a deeper graph keeps its place
+    there."""
+    return problem.inside or PlaceInside(
         levels=(),
         aids=(),
         graph=inside.graph.name,
@@ -304,8 +306,13 @@ def _finding(inside: Subject, problem: Problem, left: int = 0) -> _Finding:
         message=problem.message,
         where=problem.where,
     )
-    message = place.message + more(left, "problem", "problems")
-    return _Finding(problem.severity, msgspec.structs.replace(place, message=message))
+
+
+def at_action(place: PlaceInside, action: Action) -> PlaceInside:
+    """Return a place within a sub-graph as seen from the graph around, in which `action` stands for
+    this sub-graph."""
+    levels, aids = (action.full_name, *place.levels), (action.key, *place.aids)
+    return msgspec.structs.replace(place, levels=levels, aids=aids)
 
 
 def _check_pauses(subject: Subject, action: Action) -> None:

@@ -134,7 +134,7 @@ class Trials:
         return found
 
 
-_BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost", "actors"}
+_BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost"}
 
 
 def check_scenarios(subject: Subject) -> Coverage:

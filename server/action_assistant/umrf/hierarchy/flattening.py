@@ -207,10 +207,6 @@ def flattened(
         message = f"One graph would have {count} actions; {MOST:,} are the most."
         return _unflattenable([FlatteningReason("too-large", message)])
     found = hierarchy.level(graph, ())
-    actors = {*hierarchy.actors, *(action.actor for action in graph.actions)} - {""}
-    if len(actors) > 1:
-        message = f"Its actions belong to several actors ({', '.join(sorted(actors))})."
-        return _unflattenable((*found.reasons, FlatteningReason("actors", message)))
     return _unflattenable(found.reasons) if found.flat is None else _named(found.flat)
 
 
@@ -241,7 +237,6 @@ class _Hierarchy:
     def __init__(self, graphs: Mapping[str, Graph], known: Container[str]) -> None:
         self.graphs = graphs
         self.known = known
-        self.actors: set[str] = set()
         self.budget = BUDGET
         self._indexed = IndexedGraphs(graphs)
         self._found: dict[str, _Found] = {}
@@ -300,7 +295,6 @@ class _Hierarchy:
     def _sub(self, action: Action, above: tuple[str, ...]) -> _Found:
         """Flatten the sub-graph for which an action stands."""
         graph = self.graphs[action.name]
-        self.actors |= {action.actor, *(each.actor for each in graph.actions)}
         if graph.name in above or action.name in above:
             return _refused("recursion", "The sub-graph contains itself, or the graph it is in.")
         if len(above) > DEEPEST:

@@ -200,7 +200,8 @@ def inlined(
     """Return the graph `around` with the actions of `inside` in place of the action `own`.
 
     `kept`: full names that no moved action may get. `room`: move the actions of `around` away
-    always, or only if something would overlap.
+    always, or only if something would overlap. Actions of `inside` that name no actor get that of
+    `own`, which performed them.
     """
     action = next(a for a in around.actions if a.key == own)
     taken = {a.key for a in around.actions}
@@ -212,6 +213,7 @@ def inlined(
             a,
             key=keys[a.key],
             instance_id=_free(a, kept),
+            actor=a.actor or action.actor,
             position=drawing.inner(a),
         )
         for a in actions

@@ -67,7 +67,8 @@ class Clock:
         graph.count(node.state, -1)
         graph.count(state, 1)
         node.state = state
-        self._out.append(NodeStateEvent(self._t(), graph.name, node.full_name, state))
+        event = NodeStateEvent(self._t(), graph.name, node.full_name, state, graph.performer(node))
+        self._out.append(event)
         if state not in ACTIVE or state in HELD:
             self._touched.add(graph)
 

@@ -148,7 +148,8 @@ class Core(Clock):
         if child is graph.exit:
             self._finish(graph, node, result)
             return "done"
-        self._out.append(Dispatch(self._t(), graph.name, child.full_name, response))
+        performer = graph.performer(child)
+        self._out.append(Dispatch(self._t(), graph.name, child.full_name, response, performer))
         match response:
             case "run":
                 self._run(graph, child)
@@ -374,7 +375,10 @@ class Core(Clock):
     def _result(self, graph: Running, node: Node, result: str) -> None:
         scripted = node.execution is None or not node.execution.number
         said = node.call.message if result != "on_stopped" or not scripted else None
-        self._out.append(NodeResultEvent(self._t(), graph.name, node.full_name, result, said))
+        performer = graph.performer(node)
+        self._out.append(
+            NodeResultEvent(self._t(), graph.name, node.full_name, result, said, performer)
+        )
 
     # Stop and pause of one action
 

@@ -37,7 +37,7 @@ class Engine(Graphs):
     same trace.
 
     `library`: graphs that can be sub-graphs, by name. `actor`: the engine's name; without one it
-    plays the only actor that a graph names. `signatures`: the actions that it has; without them it
+    plays the only actor that a graph names, or every actor if its `facts` say that it synchronises. `signatures`: the actions that it has; without them it
     has every action with any parameters. `performer`: carries out the actions that it names as its
     own; the script says how the others behave. `serial`: commands wait for each other as they do
     over ROS; otherwise a second stop during a stop reaches the engine and kills it. `loading_ms`:

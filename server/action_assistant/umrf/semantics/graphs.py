@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from functools import partial
 
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.model import Action, Graph, Signature
+from action_assistant.umrf.model import Graph, Signature
 from action_assistant.umrf.semantics.clock import Task
 from action_assistant.umrf.semantics.core import Core
 from action_assistant.umrf.semantics.matching import IndexedGraphs, has_action, unresolved
@@ -100,13 +100,8 @@ class Graphs(Core):
     def _resolves(self, graph: Running) -> bool:
         """Return whether the engine can resolve every action that it has to run itself, as an
         action or as a sub-graph."""
-        own = {"", self.actor} if self.actor else {node.actor for node in graph.nodes.values()}
         known = self.signatures or {}
-
-        def is_other(action: Action) -> bool:
-            return action.actor not in own or action.name in known
-
-        if next(unresolved(graph.graph, self.library, is_other), None) is not None:
+        if next(unresolved(graph.graph, self.library, known, self.actor), None) is not None:
             return False
         if self.signatures is None:
             return True

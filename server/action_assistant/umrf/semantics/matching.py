@@ -1,6 +1,6 @@
 """Finds the indexed action or graph that a node stands for (docs/umrf-and-the-engine.md 2.1)."""
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
 from typing import Final, Literal
 
 import msgspec
@@ -63,16 +63,29 @@ class _Level:
 
 
 def unresolved(
-    graph: Graph, library: Mapping[str, Graph], is_other: Callable[[Action], bool]
+    graph: Graph, library: Mapping[str, Graph], known: Container[str], actor: str = ""
 ) -> Iterator[Unresolved]:
     """Yield the sub-graphs for which an engine refuses this graph although it has indexed them.
+
+    `known`: names of plain actions, which take precedence over graphs. `actor`: the engine's name;
+    if it is empty, each actor of the graph has an engine, and each of these resolves its own
+    actions and those without an actor.
+    """
+    named = {action.actor for action in graph.actions if not action.missing} - {""}
+    for each in [actor] if actor else sorted(named) or [""]:
+        yield from _unresolved_by(("", each), graph, library, known)
+
+
+def _unresolved_by(
+    own: tuple[str, str], graph: Graph, library: Mapping[str, Graph], known: Container[str]
+) -> Iterator[Unresolved]:
+    """Yield what the engine that resolves the actions of the actors `own` refuses.
 
     The engine goes through the actions by full name. Once it has used a graph, it takes this graph
     off its list for the later actions of the same graph and for all graphs inside, but not for
     graphs beside it. So the engine refuses one sub-graph twice in one graph, and a sub-graph beside
     a later one that contains it; it accepts the same sub-graph inside two different ones
-    (measured). `is_other` returns True for an action that is no sub-graph of this engine: a plain
-    action, or an action of another actor.
+    (measured).
     """
     indexed = IndexedGraphs(library)
     levels = [_Level(graph, frozenset(), frozenset())]
@@ -86,7 +99,7 @@ def unresolved(
             levels.pop()
             continue
         top = action if len(levels) == 1 or top is None else top
-        if action.name not in library or is_other(action):
+        if action.name not in library or action.actor not in own or action.name in known:
             continue
         given = slots_of(action.inputs).keys(), slots_of(action.outputs).keys()
         sub = indexed.fitting(action.name, *given)

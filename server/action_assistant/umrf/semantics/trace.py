@@ -10,13 +10,20 @@ import msgspec
 from action_assistant.safe_text import hold_names
 
 
-class NodeStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="node_state"):
-    """An action changed its state. Times are milliseconds on the caller's clock."""
+class NodeStateEvent(
+    msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="node_state"
+):
+    """An action changed its state. Times are milliseconds on the caller's clock.
+
+    `actor`: the actor that performs the action, here and in other events; "" if none is named. An
+    action of a sub-graph that names none belongs to the actor of the action that stands for it.
+    """
 
     t_ms: float
     graph: str
     node: str
     state: str
+    actor: str = ""
 
 
 class GraphStateEvent(msgspec.Struct, frozen=True, tag_field="kind", tag="graph_state"):
@@ -37,13 +44,14 @@ class EdgeEval(msgspec.Struct, frozen=True, tag_field="kind", tag="edge"):
     eval: str
 
 
-class Dispatch(msgspec.Struct, frozen=True, tag_field="kind", tag="dispatch"):
+class Dispatch(msgspec.Struct, frozen=True, omit_defaults=True, tag_field="kind", tag="dispatch"):
     """A child was ready, and its response was carried out."""
 
     t_ms: float
     graph: str
     node: str
     response: str
+    actor: str = ""
 
 
 class NotReady(msgspec.Struct, frozen=True, tag_field="kind", tag="not_ready"):
@@ -94,6 +102,7 @@ class NodeResultEvent(
     node: str
     result: str
     message: str | None = None
+    actor: str = ""
 
 
 Trace: TypeAlias = (

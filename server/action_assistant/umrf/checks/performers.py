@@ -1,0 +1,259 @@
+"""Checks graphs whose actions belong to several actors: which of their parts a runner that leads
+several robots would refuse, or ask people about.
+
+See docs/umrf-and-the-engine.md 2.11 and docs/decisions/112-several-actors.md.
+"""
+
+from collections.abc import Container, Iterable, Mapping
+from typing import Final, NamedTuple, TypeAlias
+
+import msgspec
+
+from action_assistant.umrf.checks.concurrency import Concurrency
+from action_assistant.umrf.checks.flow import Reachability
+from action_assistant.umrf.checks.places import Subject, joined, more
+from action_assistant.umrf.checks.subgraphs import SubGraphs, at_action, place_inside
+from action_assistant.umrf.laps import repeated
+from action_assistant.umrf.model import (
+    ENTRY,
+    EXIT,
+    PRECONDITIONS,
+    Action,
+    Graph,
+    Key,
+    PlaceInside,
+    Precondition,
+    Relation,
+)
+from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
+
+#: The most problems of one sub-graph that are reported at each action that stands for it.
+_INSIDE: Final = 20
+#: The most levels of sub-graphs that are looked into. Deeper ones cannot become flat either.
+_DEEPEST: Final = 32
+_NAMED: Final = 3  # names in one sentence
+
+_Reports: TypeAlias = Mapping[Key, set[Precondition]]
+
+
+class _Performers(NamedTuple):
+    """The actors that perform an action, or the actions of a sub-graph: all of them (`every`), those
+    of its first actions and those of its last ones. "" is no actor; in a sub-graph it stands for the
+    actor of the action around."""
+
+    every: frozenset[str]
+    first: frozenset[str]
+    last: frozenset[str]
+
+
+_ByKey: TypeAlias = Mapping[Key, _Performers]
+
+
+def check_performers(subject: Subject, graphs: SubGraphs) -> None:
+    """Report what a graph with several actors means on robots. A graph has several actors if its
+    actions and those of its sub-graphs, at any depth, name more than one.
+
+    `graphs`: the sub-graphs of this graph, which have been checked. Nothing is reported for the
+    simulator, which performs the actions of all actors.
+    """
+    everywhere = (subject.graph, *(graphs.by_name[name] for name in graphs.found))
+    named = {a.actor for graph in everywhere for a in graph.actions if not a.missing} - {""}
+    facts = subject.facts
+    if len(named) < 2 or (facts.simulated and facts.synchronises):
+        return
+    if facts.synchronises:
+        message = (
+            "The profile of this robot says that its engine synchronises with others. By the source of "
+            "that mechanism, a robot that is not reached for 5 s aborts the engines of all others (S1), "
+            "two actions that end at about the same time on two robots abort both engines (S2), and a "
+            "graph that waits for another robot cannot be stopped (S3)."
+        )
+        subject.report("synchroniser", "warning", message)
+        return
+    message = (
+        f"The actions belong to {len(named)} actors ({joined(named)}). Checks, dry-runs and the simulator "
+        "play this graph, but it cannot be started on robots yet: one engine cannot synchronise with "
+        "others and refuses it, and the runner does not lead several robots so far."
+    )
+    subject.report("actors", "warning", message)
+    _LedGraph(graphs).check(subject, "", 0)
+
+
+class _LedGraph:
+    """Checks a graph and its sub-graphs as a runner would lead them, one action after the other."""
+
+    def __init__(self, graphs: SubGraphs) -> None:
+        self._graphs = graphs
+        self._performers: dict[str, _Performers] = {}
+        self._found: dict[tuple[str, str], tuple[PlaceInside, ...]] = {}
+        for name in graphs.found:  # the innermost graphs first
+            self._performers[name] = self._of_graph(graphs.by_name[name])
+
+    def check(self, subject: Subject, around: str, depth: int) -> None:
+        """Report the problems of one graph. `around`: the actor of the action for which the graph
+        stands; `depth`: the number of graphs around it."""
+        performers = {a.key: self._of_action(a, around) for a in subject.real}
+        flow = Reachability(subject)
+        concurrency = Concurrency(subject, flow.runs, flow.reports)
+        for relation in sorted(subject.sound, key=subject.place):
+            is_end = relation.parent == ENTRY or relation.child == EXIT
+            if not is_end and not relation.listing:
+                _check_arrow(subject, relation, performers, flow.reports)
+        _check_at_once(subject, performers, flow.runs, concurrency)
+        _check_repeated(subject, flow.runs, self._performers)
+        _check_spontaneous(subject, performers, flow.runs)
+        for action in subject.real:
+            if len(performers[action.key].every) > 1 and depth < _DEEPEST:
+                self._check_inside(subject, action, action.actor or around, depth)
+
+    def _check_inside(self, subject: Subject, action: Action, actor: str, depth: int) -> None:
+        """Report the problems of a sub-graph of several actors at the action that stands for it."""
+        if (action.name, actor) not in self._found:
+            inner = Subject(self._graphs.by_name[action.name], subject.facts)
+            self.check(inner, actor, depth + 1)
+            places = (place_inside(inner, problem) for problem in inner.problems[:_INSIDE])
+            self._found[action.name, actor] = tuple(places)
+        for found in self._found[action.name, actor]:
+            place = at_action(found, action)
+            message = f"In the sub-graph “{place.graph}”: {place.message}"
+            subject.report(
+                place.code, "warning", message, action=action, member="/name", inside=place
+            )
+
+    def _of_action(self, action: Action, around: str) -> _Performers:
+        actor = action.actor or around
+        inner = self._performers.get(action.name)
+        if inner is None:
+            return _Performers(*[frozenset({actor})] * 3)
+        return _Performers(*(frozenset(each or actor for each in side) for side in inner))
+
+    def _of_graph(self, graph: Graph) -> _Performers:
+        own = {a.key: self._of_action(a, "") for a in graph.actions if not a.missing}
+        children = [own[r.child] for r in graph.relations if r.parent == ENTRY and r.child in own]
+        parents = [own[r.parent] for r in graph.relations if r.child == EXIT and r.parent in own]
+        none = frozenset[str]()
+        return _Performers(
+            none.union(*(each.every for each in own.values())),
+            none.union(*(each.first for each in children)),
+            none.union(*(each.last for each in parents)),
+        )
+
+
+def _check_arrow(
+    subject: Subject, relation: Relation, performers: _ByKey, reports: _Reports
+) -> None:
+    """Report an arrow that stops an action of another actor, or hands values to one."""
+    parent, child = performers[relation.parent], performers[relation.child]
+    reported = reports.get(relation.parent, set())
+    answers = {
+        relation.conditions.answer(outcome) for outcome in PRECONDITIONS if outcome in reported
+    }
+    one = _with_actor(subject, relation.parent, parent.every)
+    other = _with_actor(subject, relation.child, child.every)
+    if "stop" in answers and len(parent.last | child.every) > 1:
+        message = (
+            f"{one} stops {other}. On robots this is a message of the runner that leads them: without "
+            "the runner or its network it does not come."
+        )
+        subject.report("stop-across", "warning", message, relation=relation, member="/conditions")
+    if answers <= {"ignore", "bypass"} or len(parent.last | child.first) < 2:
+        return
+    if values := _handed_over(subject, relation):
+        message = (
+            f"{one} hands {joined(values)} to {other}. An engine does not tell its outputs, so a runner "
+            "that leads the robots cannot hand values from one to another."
+        )
+        subject.report("values-across-robots", "warning", message, relation=relation)
+
+
+def _handed_over(subject: Subject, relation: Relation) -> set[str]:
+    """Return the names of the child's inputs that get outputs of the parent along an arrow."""
+    outputs = slots_of(subject.actions[relation.parent].outputs)
+    inputs = slots_of(subject.actions[relation.child].inputs)
+    try:
+        return set(renamed(outputs, relation.remap, inputs))
+    except RemapUnknown:  # another problem: the engine aborts
+        return set()
+
+
+def _check_at_once(
+    subject: Subject, performers: _ByKey, runs: Container[Key], concurrency: Concurrency
+) -> None:
+    """Report each action that may run at the same time as later ones of its actor. If too many pairs
+    of actions may run at once to be known, only the first action of each actor is reported."""
+    members: dict[str, list[Key]] = {}
+    for action in subject.real:
+        for actor in sorted(performers[action.key].every) if action.key in runs else ():
+            members.setdefault(actor, []).append(action.key)
+    for actor, keys in members.items():
+        left = set(keys)
+        for key in keys if concurrency.known else keys[:1]:
+            left.discard(key)
+            beside = [each for each in keys if each in left & concurrency.beside(key)]
+            if not beside:
+                continue
+            names = joined({subject.name(each) for each in beside[:_NAMED]})
+            whose = f"both of {actor}" if actor else "both without an actor"
+            message = (
+                f"{subject.name(key)} may run at the same time as {names}, {whose}. An engine stops one "
+                "graph after the other: on a robot that is led, a Stop reaches the second action up to "
+                f"5 s later.{more(len(beside) - _NAMED, 'action', 'actions')}"
+            )
+            also = [subject.actions[each] for each in beside]
+            subject.report(
+                "two-at-once", "warning", message, action=subject.actions[key], also=also
+            )
+
+
+def _check_repeated(subject: Subject, runs: Container[Key], nested: Container[str]) -> None:
+    """Report the actions that can run more than once. `nested`: names of sub-graphs, whose actions
+    an engine loads anew in any case."""
+    graph = msgspec.structs.replace(subject.graph, relations=tuple(subject.sound))
+    again = repeated(graph)
+    for action in subject.real:
+        if action.key in again and action.key in runs and action.name not in nested:
+            message = (
+                f"{action.full_name} can run more than once. On a robot that is led it is loaded anew each "
+                "time: what it remembers in itself is forgotten."
+            )
+            subject.report("loaded-anew", "warning", message, action=action)
+
+
+def _check_spontaneous(subject: Subject, performers: _ByKey, runs: Container[Key]) -> None:
+    """Report spontaneous actions that lead to actions of other actors."""
+    for action in subject.real:
+        if action.type != "spontaneous" or action.key not in runs:
+            continue
+        own = performers[action.key].every
+        others = [
+            key for key in _after(subject, action.key) if len(own | performers[key].every) > 1
+        ]
+        if others:
+            names = joined({subject.name(key) for key in others[:_NAMED]})
+            message = (
+                f"{_with_actor(subject, action.key, own)} is spontaneous: each time it ends, all that comes "
+                f"after it is stopped, also {names} of another actor. A runner that leads the robots "
+                f"cannot do that.{more(len(others) - _NAMED, 'action', 'actions')}"
+            )
+            subject.report(
+                "spontaneous-across", "warning", message, action=action, member="/type",
+                also=[subject.actions[key] for key in others],
+            )  # fmt: skip
+
+
+def _after(subject: Subject, key: Key) -> list[Key]:
+    """Return the actions to which paths of arrows lead from an action, without itself, in the order
+    of the file."""
+    seen, stack = {key}, [key]
+    while stack:
+        for relation in subject.outgoing.get(stack.pop(), []):
+            if relation.child not in seen and relation.child != EXIT:
+                seen.add(relation.child)
+                stack.append(relation.child)
+    return [action.key for action in subject.real if action.key in seen - {key}]
+
+
+def _with_actor(subject: Subject, key: Key, actors: Iterable[str]) -> str:
+    """Return the name of an action with whose it is, for a sentence."""
+    whose = joined(set(actors) - {""})
+    return f"{subject.name(key)} of {whose}" if whose else f"{subject.name(key)} without an actor"
