@@ -1,6 +1,7 @@
 """The tables of the runner: a fold of the events, written in the transactions that store them."""
 
 from collections.abc import Sequence
+from typing import Final
 
 import msgspec
 from sqlalchemy import Executable, func, insert, update
@@ -25,6 +26,9 @@ from action_assistant.runner.runs.events import (
 from action_assistant.runner.runs.queries import OPEN
 from action_assistant.runner.runs.word_index import holds
 from action_assistant.schema.runner_tables import review, robot, run
+
+#: Columns of a run that have the same names in its request.
+_AS_REQUESTED: Final = set(run.c.keys()) & set(Requested.__struct_fields__)
 
 
 def fold(event: Event) -> Sequence[Executable]:
@@ -98,33 +102,20 @@ def _open_again(id_: str, moves: MovesAgain) -> Sequence[Executable]:
 
 def _run(asked: Requested) -> Executable:
     return insert(run).values(
+        **{name: getattr(asked, name) for name in _AS_REQUESTED},
         id=asked.run,
-        number=asked.number,
-        graph=asked.graph,
-        graph_name=asked.graph_name,
-        version=asked.version,
-        digest=asked.digest,
-        tree_digest=asked.tree_digest,
-        engine=asked.engine,
         author_id=asked.author.id,
         author_name=asked.author.name,
         state=OPEN,
         desired="running",
-        simulated=asked.simulated,
-        request_id=asked.request_id,
         requested_at=asked.at,
         summary={"alarms": []} if asked.group is None else {"alarms": [], "group": asked.group},
     )
 
 
 def _robot(robot_: RobotRegistered) -> Executable:
-    values = {
-        "domain": robot_.domain,
-        "rmw": robot_.rmw,
-        "get_service": robot_.get_service,
-        "profile": robot_.profile,
-        "registered_at": robot_.at,
-        "retired_at": None,
-    }
-    statement = upsert(robot).values(name=robot_.name, **values)
+    values = msgspec.structs.asdict(robot_)
+    name, at = values.pop("name"), values.pop("at")
+    values |= {"registered_at": at, "retired_at": None}
+    statement = upsert(robot).values(name=name, **values)
     return statement.on_conflict_do_update(index_elements=["name"], set_=values)

@@ -1,6 +1,5 @@
 """The routes of review: replays, marks, comparisons, statistics, files, archiving."""
 
-import time
 from collections.abc import AsyncIterator
 from typing import Annotated, Any, Final, TypeVar, cast
 
@@ -13,6 +12,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant import paths
 from action_assistant.errors import BadInput
+from action_assistant.kit.clock import utc_us
 from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.analysis.comparison import RunComparison
 from action_assistant.runner.analysis.replay import RunReplay
@@ -181,7 +181,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         here = (
             [] if found.simulated or recordings is None else await recordings.listed(found.engine)
         )
-        text = await services.worker_queries.text(StoredRuns.raw, run, here, time.time_ns() // 1000)
+        text = await services.worker_queries.text(StoredRuns.raw, run, here, utc_us())
         return json_of(text, RawMessages)
 
     return [film, found_causes, umrf, marks, mark, script, fit, export, raw]

@@ -1,6 +1,5 @@
 """The store of runs: a run in an archive is read as if it were in the journal."""
 
-from collections import OrderedDict
 from collections.abc import Callable, Sequence
 from itertools import islice
 from pathlib import Path
@@ -19,6 +18,7 @@ from action_assistant.journal.events import (
     bare,
 )
 from action_assistant.journal.removal import StreamRemoved
+from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.runs import views
@@ -27,6 +27,7 @@ from action_assistant.web.workers.lanes import RunInWorker
 
 _PREFIX: Final = "run/"
 _CACHED: Final = 64 << 20  # bytes of archived events in memory
+_RUNS: Final = 1_000  # archived runs in memory
 
 
 class Archived(Refused):
@@ -61,7 +62,7 @@ class ArchiveStore:
         self.folder = folder
         self._journal = journal
         self._run_in_worker = run_in_worker
-        self._cache: OrderedDict[str, tuple[list[Event], int]] = OrderedDict()
+        self._cache: LruCache[str, list[Event]] = LruCache(_RUNS, weight=_CACHED)
 
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
@@ -118,20 +119,17 @@ class ArchiveStore:
         return rows[0] if rows else None
 
     async def _events(self, stream: str, place: Row[Any]) -> list[Event]:
-        if stream not in self._cache:
-            path = self.folder / place.archived_as
-            try:
-                events = await self._run_in_worker(lambda: list(archive_file.read(path)))
-            except OSError as error:
-                raise Archived(
-                    f"Run {place.number} was archived on {views.time(place.archived_at):%Y-%m-%d} "
-                    f"as {place.archived_as}, which is not in {self.folder} ({error.strerror}). "
-                    "`action-assistant runs restore FILE` puts it back."
-                ) from error
-            if not events or events[0].stream != stream:
-                raise archive_file.Damaged(f"{place.archived_as} holds another run.")
-            self._cache[stream] = events, sum(len(each.body) + 200 for each in events)
-        self._cache.move_to_end(stream)
-        while len(self._cache) > 1 and sum(size for _, size in self._cache.values()) > _CACHED:
-            self._cache.popitem(last=False)
-        return self._cache[stream][0]
+        if (known := self._cache.get(stream)) is not None:
+            return known
+        path = self.folder / place.archived_as
+        try:
+            events = await self._run_in_worker(lambda: list(archive_file.read(path)))
+        except OSError as error:
+            raise Archived(
+                f"Run {place.number} was archived on {views.time(place.archived_at):%Y-%m-%d} "
+                f"as {place.archived_as}, which is not in {self.folder} ({error.strerror}). "
+                "`action-assistant runs restore FILE` puts it back."
+            ) from error
+        if not events or events[0].stream != stream:
+            raise archive_file.Damaged(f"{place.archived_as} holds another run.")
+        return self._cache.put(stream, events, sum(len(each.body) + 200 for each in events))

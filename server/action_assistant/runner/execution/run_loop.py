@@ -219,17 +219,13 @@ class OpenRun:
     def tell(self, event: RunEvent, author: str = "") -> None:
         """Show an event to everybody, and store it as soon as the journal can. `author` is the id
         of a person, or "" for the engine."""
-        changes = self._changes()
-        changes.tell(event, author)
-        self._apply(changes)
-
-    def _changes(self) -> RunChanges:
-        return RunChanges(self.run, self._clock_us)
+        with self._changing() as changes:
+            changes.tell(event, author)
 
     @contextmanager
     def _changing(self) -> Iterator[RunChanges]:
         """Collect changes, and apply them at the end of the block, also after an exception in it."""
-        changes = self._changes()
+        changes = RunChanges(self.run, self._clock_us)
         try:
             yield changes
         finally:
@@ -373,9 +369,8 @@ class OpenRun:
                 for job in self.watch.take_jobs():
                     beside.start_soon(self._work_on, job)
                 if self.run.process is not None and has_ended(self.run.process):
-                    over = self._changes()
-                    over.engine_ended()
-                    self._apply(over)
+                    with self._changing() as changes:
+                        changes.engine_ended()
                 cost = anyio.current_time() - look.began
                 wait = max(self.watch.pace(self.run), 5 * cost)
 
@@ -467,10 +462,9 @@ class OpenRun:
             self._early.append(report)
             return
         match report:
-            case Transitions(run=run, changes=changes) if run == self.run.id:
-                seen = self._changes()
-                seen.observe(changes)
-                self._apply(seen)
+            case Transitions(run=run, changes=seen) if run == self.run.id:
+                with self._changing() as changes:
+                    changes.observe(seen)
             case Feedback(snapshots=snapshots):
                 ours = tuple(each for each in snapshots if each.run == self.run.id)
                 inside = f"{self.run.graph_name}__"
@@ -504,26 +498,22 @@ class OpenRun:
 
     def lose(self, why: str) -> None:
         """Note that it is unknown whether the code of the run has ended; `why`: the reason."""
-        changes = self._changes()
-        changes.lose(why)
-        self._apply(changes)
+        with self._changing() as changes:
+            changes.lose(why)
 
     def confirm_rest(self, author: Author, how: str) -> None:
         """End the run by the word of a person who has seen that it rests, where no answer of the engine
         can prove it."""
-        changes = self._changes()
         why = self.run.doubt or self.run.lost or self.watch.trouble
-        changes.rests(AtRest(author, self._clock_us(), how), "error", why, author.id)
-        self._apply(changes)
+        with self._changing() as changes:
+            changes.rests(AtRest(author, self._clock_us(), how), "error", why, author.id)
 
     def end(self, state: End, detail: str) -> None:
         """End the run in this state, unless it has ended already."""
-        changes = self._changes()
-        changes.end(state, detail)
-        self._apply(changes)
+        with self._changing() as changes:
+            changes.end(state, detail)
 
     def alarm(self, code: str, text: str) -> None:
         """Raise an alarm for people, unless the run has the same alarm already."""
-        changes = self._changes()
-        changes.alarm(code, text)
-        self._apply(changes)
+        with self._changing() as changes:
+            changes.alarm(code, text)

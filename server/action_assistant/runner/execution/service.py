@@ -9,6 +9,7 @@ from contextlib import asynccontextmanager
 from typing import Any, Final
 
 import anyio
+import msgspec
 from sqlalchemy import Row
 
 from action_assistant.errors import Conflict, NotFound
@@ -299,12 +300,7 @@ class ExecutionService:
         self._late_activity.sent_by_others(command)
         run = self._runs.hear_of(robot, command)
         event = Commanded(
-            at=command.at,
-            command=command.command,
-            graph=command.graph,
-            umrf=command.umrf,
-            targets=command.targets,
-            sender=command.sender,
+            **msgspec.structs.asdict(command),
             run=None if run is None else run.id,
             number=None if run is None else run.number,
         )

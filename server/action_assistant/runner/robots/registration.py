@@ -93,13 +93,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
 
 def registration_of(row: Row[Any]) -> Registration:
     """Return the registration in a row of the table."""
-    return Registration(
-        name=row.name,
-        domain=row.domain,
-        rmw=row.rmw,
-        get_service=row.get_service,
-        profile=row.profile,
-    )
+    return Registration(**{name: getattr(row, name) for name in Registration.__struct_fields__})
 
 
 def check_registration(registration: Registration) -> None:

@@ -188,14 +188,10 @@ class Robots:
         known = self.registration(name)
         engine = self._engines.get(name)
         plain = Robot(
-            name=name,
+            **msgspec.structs.asdict(known),
             simulated=False,
             state="no_link",
             why=f"No link: {self._reach} {_NO_LINK}" if engine is None else engine.why,
-            domain=known.domain,
-            rmw=known.rmw,
-            get_service=known.get_service,
-            profile=known.profile,
         )
         if engine is None:
             return plain

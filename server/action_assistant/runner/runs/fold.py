@@ -63,6 +63,8 @@ from action_assistant.umrf.laps import Laps, laps
 _SEEN: Final[Callable[[RunEvent], tuple[Seen, ...]]] = attrgetter("seen")  # of `Observed` events
 #: Microseconds after which a get is given up: an answer was asked for at most so long before it came.
 _ASKED_US: Final = 1_000_000
+#: Fields that a run has from its request, under the same names.
+_AS_REQUESTED: Final = set(Run.__struct_fields__) & set(Requested.__struct_fields__) - {"actions"}
 #: The state of an action of which nothing has been seen.
 _UNSEEN: Final = ActionRun()
 
@@ -87,22 +89,9 @@ def begin(event: Requested) -> Run:
     known = event.laps if event.laps is not None else _laps(event.umrf)
     once, joined = frozenset(known.once), frozenset(known.barring_errors)
     return Run(
+        **{name: getattr(event, name) for name in _AS_REQUESTED},
         id=event.run,
-        number=event.number,
-        request_id=event.request_id,
-        author=event.author,
-        graph=event.graph,
-        graph_name=event.graph_name,
-        version=event.version,
-        digest=event.digest,
-        engine=event.engine,
-        simulated=event.simulated,
         requested_at=event.at,
-        override=event.override,
-        despite=event.despite,
-        group=event.group,
-        like=event.like,
-        behaviours=event.behaviours,
         actions={
             name: ActionRun(aid=aid, once=name in once, joined=name in joined)
             for name, aid in event.actions.items()
