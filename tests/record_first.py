@@ -25,7 +25,7 @@ from support.used_server import Guest
 
 
 def answers(editor: httpx.Client, runner: httpx.Client) -> dict[str, Any]:
-    """What a server says of its graphs, their versions, and runs, by the path that was asked."""
+    """Return the server's answers about its graphs, versions and runs, by path."""
     said = {}
 
     def ask(client: httpx.Client, path: str) -> Any:
@@ -45,7 +45,7 @@ def answers(editor: httpx.Client, runner: httpx.Client) -> dict[str, Any]:
 
 
 async def draw(product: Product, editor: httpx.Client) -> str:
-    """What people could draw then; the graph that has versions."""
+    """Draw as people could at that version, and return the graph that has versions."""
     with (
         Guest(product, "Ann", {"token": TOKEN}) as ann,
         Guest(product, "Ben", {"token": TOKEN}) as ben,

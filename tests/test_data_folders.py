@@ -27,7 +27,7 @@ def unpacked(file: Path, data: Path) -> None:
 
 
 def told(folder: Path, name: str) -> Any:
-    """What that version said."""
+    """Return a recorded answer of that version."""
     return msgspec.json.decode(lzma.decompress((folder / f"{name}.json.xz").read_bytes()))
 
 

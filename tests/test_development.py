@@ -1,4 +1,4 @@
-"""What people and editors work with: hooks, the container, and targets of make agree."""
+"""Hooks, the development container and targets of make agree."""
 
 import json
 import re

@@ -48,12 +48,12 @@ class Term:
 
 @cache
 def terms() -> list[Term]:
-    """All rows."""
+    """Return all rows of the glossary."""
     return [Term(row) for row in map(_ROW.match, GLOSSARY.read_text().splitlines()) if row]
 
 
 def instead(text: str) -> list[str]:
-    """What a text says that the glossary has another word for, with that word."""
+    """Return the words of a text for which the glossary has another word, with that word."""
     return [
         f"{other!r}, not {term.names[0]!r}"
         for term in terms()
@@ -64,7 +64,7 @@ def instead(text: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def schemas(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
-    """What the editor and the runner say of their routes, without starting either."""
+    """Return the OpenAPI documents of the editor and the runner, without starting either."""
     return list(documents(tmp_path_factory.mktemp("data")).values())
 
 

@@ -1,4 +1,4 @@
-"""That the measure of growth tells linear work from the square of it."""
+"""The measure of growth tells linear work from quadratic work."""
 
 from collections.abc import Callable
 

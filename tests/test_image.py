@@ -1,5 +1,5 @@
-"""What the container files promise, as far as it can be told without a container engine; `make
-containers` runs them."""
+"""The container files keep their promises, as far as that shows without a container engine;
+`make containers` runs them."""
 
 import re
 import tomllib
@@ -60,7 +60,7 @@ def defaults() -> dict[str, set[str]]:
 
 
 def arguments() -> dict[str, str]:
-    """Of the Dockerfile, with their defaults."""
+    """Return the arguments of the Dockerfile, with their defaults."""
     return dict(re.findall(r"^ARG (\w+)=(\S*)$", (ROOT / "Dockerfile").read_text(), re.MULTILINE))
 
 
@@ -98,7 +98,7 @@ def test_an_image_runs_as_nobody_special_and_tells_its_health(target: str) -> No
 
 @pytest.mark.parametrize("target", ["editor", "runner"])
 def test_an_image_holds_nothing_that_only_building_needs(target: str) -> None:
-    """What is needed to make an environment stays in the stage that made it."""
+    """Tools that only make an environment stay in the stage that made it."""
     own = [" ".join(words) for words in stages()[target] if words[0] in {"RUN", "COPY"}]
     copied = [line.split() for line in own if line.startswith("COPY")]
     assert copied.pop(0) == ["COPY", "scripts/image", "/opt/build/"]
@@ -118,7 +118,7 @@ def test_an_image_holds_nothing_that_only_building_needs(target: str) -> None:
 
 @pytest.mark.parametrize("target", ["editor", "runner"])
 def test_a_changed_line_of_python_builds_nothing_but_the_package(target: str) -> None:
-    """Nothing of ours is in a layer below it but locks and the steps themselves."""
+    """The layers below the package hold only locks and the build steps of ours."""
     for stage in (f"{target}-dependencies", "messages", "page"):
         copied = {word for words in stages()[stage] if words[0] == "COPY" for word in words[1:-1]}
         assert not copied & {"server", "migrations", "pyproject.toml", "--from=wheel"}
@@ -172,7 +172,8 @@ def test_the_example_has_every_setting_and_every_variable_and_no_other() -> None
 
 @pytest.mark.parametrize("name", OURS)
 def test_every_setting_reaches_every_container_of_ours(name: str) -> None:
-    """By the file in which people write them; what compose says beside it is what it has to."""
+    """Settings reach containers by the file in which people write them; compose adds only
+    required ones."""
     service = SERVICES[name]
     assert service["env_file"] == [{"path": ".env", "required": False}]
     said = set(service.get("environment", {}))

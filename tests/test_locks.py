@@ -1,4 +1,4 @@
-"""What the package asks for is what every environment installs."""
+"""Every environment installs what the package asks for."""
 
 import re
 import tomllib

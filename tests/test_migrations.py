@@ -36,13 +36,13 @@ class Empty(NamedTuple):
         return migrate(self.url, self.branch, revision)
 
     def migrate_by_scripts(self) -> None:
-        """To the newest revision, one script after the other."""
+        """Migrate to the newest revision, one script after the other."""
         for revision in steps(self):
             self.migrate(revision)
         assert self.migrate() == steps(self)[-1]
 
     def do(self, step: Step) -> Any:
-        """Something in one transaction."""
+        """Run a step in one transaction."""
         return database_of(self.url).migrate(step)
 
 
@@ -59,7 +59,7 @@ def empty(request: pytest.FixtureRequest, tmp_path: Path) -> Empty:
 
 
 def schema(connection: Connection) -> dict[str, Any]:
-    """Everything that a database says about its tables."""
+    """Return a database's own description of its tables."""
     found = inspect(connection)
     return {
         name: {
@@ -79,7 +79,7 @@ def schema(connection: Connection) -> dict[str, Any]:
 
 
 def steps(empty: Empty) -> list[str]:
-    """All revisions, the oldest first."""
+    """Return all revisions, the oldest first."""
     script = empty.do(lambda c: ScriptDirectory.from_config(config_for(c, empty.branch)))
     found = script.iterate_revisions(f"{empty.branch}@head", "base")
     return [step.revision for step in found][::-1]

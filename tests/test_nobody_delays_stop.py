@@ -40,7 +40,7 @@ ENDLESS = {"*": [{"never": True}]}
 
 @pytest.fixture(scope="module")
 def runner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunnerProcess]:
-    """With a long run behind it, and few descriptors."""
+    """A runner with a long run and few descriptors."""
     data = tmp_path_factory.mktemp("hostile") / "data"
     long_run(data, events=20_000 if WHOLE else 3_000)
     process = RunnerProcess(data)
@@ -51,7 +51,7 @@ def runner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunnerProcess]:
 
 @contextmanager
 def load(runner: RunnerProcess, *what: str) -> Iterator[subprocess.Popen[bytes]]:
-    """Everybody who presses hard."""
+    """Run all clients that press hard, beside the block."""
     path = Path(__file__).parent
     process = subprocess.Popen(
         [sys.executable, "-m", "support.load_on_runner", str(runner.port), *what],
@@ -86,7 +86,7 @@ class Share:
 
 @contextmanager
 def overslept(late: list[float]) -> Iterator[None]:
-    """How late an idle process wakes up that asks for a millisecond."""
+    """Measure how late an idle process wakes up that sleeps for a millisecond."""
     script = (
         "import time,sys\n"
         "while True:\n"
@@ -129,7 +129,7 @@ def _told(answer: httpx.Response, what: str) -> float:
 
 
 class Stops:
-    """How long stops took, and whose time that was, in seconds."""
+    """Measures the duration of stops, and the runner's share of it, in seconds."""
 
     def __init__(self, share: Share) -> None:
         self._share = share
@@ -248,7 +248,7 @@ def test_stop_is_taken_while_a_socket_is_flooded(runner: RunnerProcess, first: i
 
 
 def _workers(runner: RunnerProcess) -> list[psutil.Process]:
-    """Those that live, without the process they are forked from."""
+    """Return the living workers, without the process that forks them."""
     workers = []
     for child in psutil.Process(runner.pid).children(recursive=True):
         with suppress(psutil.NoSuchProcess):  # it may die between the two questions

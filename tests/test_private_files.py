@@ -1,4 +1,4 @@
-"""What other users of the computer can see of a data folder, and do to it: nothing."""
+"""Other users of the computer can neither see nor change anything in a data folder."""
 
 import fcntl
 import json
@@ -29,7 +29,7 @@ GRAPH = {
 
 
 def modes(data: Path) -> dict[str, str]:
-    """What others may do, by name, where that is anything."""
+    """Return the modes of files that others may use, by name."""
     return {
         str(path.relative_to(data.parent)): stat.filemode(path.stat().st_mode)
         for path in (data, *data.rglob("*"))
@@ -84,7 +84,7 @@ def test_a_folder_of_an_older_version_is_closed_and_doctor_tells(tmp_path: Path)
 
 
 def test_a_folder_with_other_things_in_it_is_left_as_it_is(tmp_path: Path) -> None:
-    """Somebody may name their home, or a folder that belongs to all."""
+    """The folder may be a person's home, or one that belongs to all."""
     home = tmp_path / "home"
     home.mkdir(mode=0o755)
     (home / "holidays.jpg").touch(mode=0o644)
@@ -125,7 +125,7 @@ def held(lock: Path, user: int | None) -> Iterator[int]:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can be somebody else")
 def test_a_lock_that_another_user_holds_stops_nobody(public: Path) -> None:
-    """As versions before this one made them: readable by everybody, hence to be locked."""
+    """Earlier versions made locks that everybody could read, and therefore lock."""
     lock = public / "runner.db.lock"
     lock.touch(mode=0o644)
     (public / "runner.db").touch(mode=0o644)

@@ -43,7 +43,7 @@ _ELSEWHERE: Final = re.compile(
 
 @cache
 def files() -> tuple[Path, ...]:
-    """Everything that people read and write here."""
+    """Return all files that people read and write here."""
     found = [path for path in ROOT.iterdir() if path.suffix in _READ]
     for top in _TOPS:
         found += _below(ROOT / top)
@@ -62,7 +62,7 @@ def _below(folder: Path) -> Iterator[Path]:
 
 @cache
 def text_of(path: Path) -> str:
-    """What a file says."""
+    """Return the text of a file."""
     return path.read_text(encoding="utf-8")
 
 
@@ -77,8 +77,8 @@ def places() -> frozenset[str]:
 
 
 def is_there(path: str, beside: Path) -> bool:
-    """Whether a path leads somewhere: from the top, from a package, from its own folder, or as the
-    end of one."""
+    """Return whether a path leads somewhere: from the top, from a package, from its own folder,
+    or as the end of a known path."""
     found = any((ROOT / base / path).exists() for base in _BASES)
     return found or (beside.parent / path).exists() or path in places()
 
@@ -90,7 +90,7 @@ def sections(name: str) -> frozenset[str]:
 
 
 def anchors(path: Path) -> frozenset[str]:
-    """What a link may name in a document, as the usual viewers make it from headings."""
+    """Return the anchors of a document, as the usual viewers make them from headings."""
     found = (
         re.sub(r"[^\w\- ]", "", heading.lower()) for heading in _HEADING.findall(text_of(path))
     )

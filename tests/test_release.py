@@ -29,7 +29,8 @@ def git(clone: Path, *arguments: str) -> str:
 
 @pytest.fixture
 def clone(tmp_path: Path) -> Path:
-    """What a release touches, as it is here, in a clone of a repository that holds only that."""
+    """A clone of a repository that holds the present files that a release changes, and no
+    others."""
     origin, found = tmp_path / "origin", tmp_path / "clone"
     for name in FILES:
         (origin / name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,5 @@
-"""Of a sourced ROS 2 only what the runner asks for comes in, and only what was built for it."""
+"""The runner takes from a sourced ROS 2 only the packages that it asks for and that fit its
+Python."""
 
 import importlib.machinery
 import os
@@ -43,7 +44,7 @@ def environ(*prefixes: Path, python: str = HERE) -> dict[str, str]:
 
 
 def run(code: str, added: dict[str, str]) -> subprocess.CompletedProcess[str]:
-    """What a process of ours says that was started in this environment."""
+    """Return the output of one of our processes, started in this environment."""
     return subprocess.run(
         [sys.executable, "-c", code],
         env={**os.environ, **added},

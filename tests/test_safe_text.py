@@ -1,5 +1,5 @@
-"""What strangers write steers no terminal, and what lets somebody in stands in no log and no list of
-processes."""
+"""Texts of strangers cannot steer a terminal, and no log and no list of processes holds a
+secret."""
 
 import json
 import logging
@@ -50,7 +50,8 @@ _TURNS = {"R", "AL", "AN", "RLE", "LRE", "RLO", "LRO", "PDF", "RLI", "LRI", "FSI
 
 
 def _turns(text: str) -> bool:
-    """Whether a character outside of isolates has a class by which the order can change (UAX 9)."""
+    """Return whether a character outside of isolates has a class that can change the order (UAX
+    9)."""
     return any(unicodedata.bidirectional(each) in _TURNS for each in _ISOLATED.sub("", text))
 
 

@@ -1,4 +1,4 @@
-"""What the environment says, where the command line does not."""
+"""The environment gives settings that the command line does not."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""From the click to the message: a Stop leaves at once, whatever the computer and the editor do.
+"""A Stop leaves at once after the click, whatever the computer and the editor do.
 
 Real processes. The click is the moment before the request is sent; the message is what the runner
 notes when it has handed a stop to the engine's link. `TEST_STOP_CLICKS` is how many for each way and
@@ -141,7 +141,7 @@ def _clicked(client: httpx.Client, press: Press) -> float:
 
 
 def _left_at(client: httpx.Client, run: str) -> int:
-    """When the first stop of a run left, in microseconds UTC."""
+    """Return when the first stop of a run left, in microseconds UTC."""
     told = client.get(f"/api/runs/{run}/events").text.split("\n\n")
     stops = [each for each in told if "event: run.stop_sent.v1" in each]
     data = next(line for line in stops[0].splitlines() if line.startswith("data: "))

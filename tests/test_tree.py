@@ -52,7 +52,8 @@ def imports(path: Path) -> Iterator[str]:
 
 
 def children(package: str) -> dict[str, set[str]]:
-    """What stands directly in a package, folders as one, and what of it each imports."""
+    """Return the direct children of a package, folders as one, with the children that each
+    imports."""
     found: dict[str, set[str]] = defaultdict(set)
     inside = f"{package}."
 
@@ -70,7 +71,7 @@ def children(package: str) -> dict[str, set[str]]:
 
 
 def floors(package: str) -> dict[str, int]:
-    """On which floor each child stands: above everything that it imports. Fails for a circle."""
+    """Return the floor of each child, above everything that it imports. Fails for a circle."""
     graph, found = children(package), dict[str, int]()
 
     def floor(name: str, above: tuple[str, ...]) -> int:

@@ -64,7 +64,7 @@ class Place(NamedTuple):
             await database.close()
 
     def opened(self) -> None:
-        """As a server opens it, with every event proven."""
+        """Open the database as a server does, and prove every event."""
 
         async def look() -> None:
             journal = await Journal.open(
@@ -106,7 +106,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> Place:
 
 
 def stored(connection: Connection) -> dict[str, Any]:
-    """All rows of all tables, but what the program says of itself."""
+    """Return all rows of all tables except those that the program writes about itself."""
     own = {"alembic_version", "written_by"}
     return contents(connection, sorted(set(inspect(connection).get_table_names()) - own))
 

@@ -1,4 +1,4 @@
-"""Which program this is: said by the command line and both processes, and never guessed."""
+"""The command line and both processes say which version and commit they are, and never guess."""
 
 import subprocess
 import tomllib
@@ -48,7 +48,7 @@ def test_a_wheel_says_what_it_was_built_from(
 
 
 def test_where_nobody_knows_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also where sources lie in the repository of something else."""
+    """The sources may also lie in the repository of another project."""
     subprocess.run(["git", "init", "--quiet", str(tmp_path)], check=True)
     (tmp_path / "inner" / ".git").mkdir(parents=True)
     for folder in (None, tmp_path, tmp_path / "inner"):

@@ -19,7 +19,7 @@ IMAGE = ROOT / "scripts" / "image"
 
 
 def healthy(part: str, port: int) -> bool:
-    """What the health check of an image would say of a server on this port and the next."""
+    """Return the result of an image's health check for a server on this port and the next."""
     environment = os.environ | {"ACTION_ASSISTANT_PORT": str(port)}
     asked = subprocess.run(
         [IMAGE, "healthy", part], env=environment, capture_output=True, check=False
@@ -28,7 +28,7 @@ def healthy(part: str, port: int) -> bool:
 
 
 def tools_in(environment: Path) -> set[str]:
-    """What builds, installs or tests packages, of all that an environment can import."""
+    """Return the tools for building, installing or testing that an environment can import."""
     (packages,) = environment.glob("lib/python3*/site-packages")
     tools = {"pip", "setuptools", "wheel", "hatchling", "editables", "pytest", "hypothesis", "mypy"}
     return tools & {each.name for each in packages.iterdir()}
@@ -59,7 +59,7 @@ def test_the_wheel_carries_page_help_and_migrations_and_nothing_foreign(wheel: P
 
 
 def test_the_wheel_says_which_commit_it_was_built_from(wheel: Path) -> None:
-    """With a plus where files had been changed since."""
+    """The commit ends with a plus where files were changed since."""
     carried = zipfile.ZipFile(wheel).read("action_assistant/commit.txt").decode().strip()
     asked = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
     head = subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip()
@@ -88,7 +88,8 @@ def test_the_wheel_carries_neither_tests_nor_what_builds(wheel: Path) -> None:
 
 
 def _bare_environment(folder: Path) -> dict[str, str]:
-    """Without any tool, and with modules of another workspace, as a sourced ROS 2 brings them."""
+    """Return an environment without tools, and with modules of another workspace, as a sourced
+    ROS 2 brings them."""
     tools, harmful = folder / "bin", folder / "sourced"
     tools.mkdir()
     harmful.mkdir()

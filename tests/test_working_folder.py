@@ -46,7 +46,7 @@ def traps(tmp_path: Path) -> Path:
 
 
 def ran(traps: Path) -> list[str]:
-    """Which of them were run."""
+    """Return the traps that were run."""
     told = traps.parent / "ran"
     return told.read_text().split() if told.exists() else []
 

@@ -1,5 +1,5 @@
-"""What colcon said of packages is shown at the actions of the library. The logs are colcon's own words
-(colcon-core 0.20, g++ 12.2, CMake 3.25), recorded."""
+"""Errors that colcon printed are shown at the actions of the library. The logs are colcon's own
+words (colcon-core 0.20, g++ 12.2, CMake 3.25), recorded."""
 
 from collections.abc import Iterator
 from pathlib import Path

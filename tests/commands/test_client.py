@@ -18,7 +18,8 @@ from web.auth.test_access import KEYS, served
 
 
 class Stranger:
-    """Something else that listens. Passes challenges on to `to`, if it knows a server of ours."""
+    """A foreign program that listens, and passes challenges on to the server `to`, if one is
+    given."""
 
     def __init__(self, to: str | None = None) -> None:
         self.heard: list[dict[str, str]] = []
@@ -43,7 +44,7 @@ class Stranger:
 
     @property
     def learned(self) -> bool:
-        """Whether anything of ours was shown to it."""
+        """Return whether the foreign program saw the token or a key."""
         return any(KEYS.token in str(each) or TOKEN in str(each) for each in self.heard)
 
 

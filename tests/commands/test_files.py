@@ -25,7 +25,7 @@ def run(*arguments: str) -> subprocess.CompletedProcess[str]:
 
 @pytest.fixture
 def example() -> Path:
-    """One of the graphs that greet a new user."""
+    """Return one of the graphs that greet a new user."""
     return EXAMPLES[0]
 
 

@@ -92,7 +92,7 @@ def data(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def key(tmp_path: Path) -> Path:
-    """As the documents say."""
+    """Make a signing key with the command of the documents."""
     path = tmp_path / "heads.pem"
     command = ["openssl", "genpkey", "-algorithm", "ed25519", "-out", str(path)]
     subprocess.run(command, check=True, capture_output=True)
@@ -128,7 +128,7 @@ def test_a_forgery_that_makes_the_chain_anew_is_sound_in_itself_and_found_by_the
 
 
 def output_of(words: list[str], code: int = 0) -> str:
-    """What a command prints, without its last line feed."""
+    """Return the output of a command, without its last line feed."""
     out = io.StringIO()
     with contextlib.redirect_stdout(out):
         assert main(words) == code

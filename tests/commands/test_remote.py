@@ -136,7 +136,7 @@ def _ended(run: dict[str, Any], action: str) -> bool:
 
 
 async def cut(product: Product, graph: str) -> None:
-    """Somebody deletes the arrow from A to B."""
+    """Delete the arrow from A to B, as another client."""
     doc: Doc[Any] = Doc()
     relations = doc.get("relations", type=Map)
     address = f"{product.url}/api/graphs/{graph}/room"

@@ -45,7 +45,7 @@ def _configured() -> tuple[Path, Path]:
 
 
 def environment() -> dict[str, str]:
-    """With which every podman here works on our folder."""
+    """Return the environment in which every podman here works on our folder."""
     configuration, storage = _configured()
     kept = {
         name: value
@@ -86,11 +86,11 @@ def run(
 
 
 def podman(*words: str | Path, **more: Any) -> str:
-    """What it prints."""
+    """Run podman, and return its standard output."""
     return run("podman", *words, **more).stdout
 
 
 def inspect(name: str, kind: str = "image") -> dict[str, Any]:
-    """All that is known of one thing."""
+    """Return all that podman knows of one image or container."""
     (found,) = json.loads(podman("inspect", "--type", kind, name))
     return dict(found)

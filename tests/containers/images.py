@@ -45,7 +45,7 @@ def say(text: str) -> None:
 
 
 def pip_settings() -> dict[str, str]:
-    """How this machine reaches PyPI. What the environment says wins, as it does for pip."""
+    """Return pip's settings for reaching PyPI; the environment wins, as it does for pip."""
     said = subprocess.run(
         [sys.executable, "-m", "pip", "config", "list"], capture_output=True, text=True, check=True
     )
@@ -58,7 +58,8 @@ def pip_settings() -> dict[str, str]:
 
 
 def folders() -> Iterator[Path]:
-    """On this machine's disk, with wheels. An index (…/simple) leads to files beside it."""
+    """Return the folders with wheels on this machine's disk, also those beside an index
+    (…/simple)."""
     for name in ("find-links", "extra-index-url", "index-url"):
         for text in _FOLDER_IN.findall(pip_settings().get(name, "")):
             folder = Path(text.removesuffix("/").removesuffix("/simple"))
@@ -112,12 +113,12 @@ def compose_build(*services: str) -> float:
 
 
 def size(name: str) -> int:
-    """Of an image, in MB."""
+    """Return the size of an image in MB."""
     return round(int(inspect(name)["Size"]) / 1e6)
 
 
 def make() -> None:
-    """Everything."""
+    """Build the base images and, without `--bases-only`, ours."""
     make_bases()
     if "--bases-only" in sys.argv:
         return

@@ -63,7 +63,7 @@ class Stack:
                     self.wait(service)
 
     def wait(self, service: str) -> None:
-        """Until the health check of a service says yes."""
+        """Wait until the health check of a service succeeds."""
         deadline = time.monotonic() + _PATIENCE_S
         while not self.is_healthy(service):
             if time.monotonic() > deadline:
@@ -71,7 +71,7 @@ class Stack:
             time.sleep(0.5)
 
     def is_healthy(self, service: str) -> bool:
-        """What its health check says now."""
+        """Run the health check of a service, and return whether it succeeds."""
         name = self.container(service)
         return run("podman", "healthcheck", "run", name, check=False).returncode == 0
 
@@ -84,7 +84,7 @@ class Stack:
         return run("podman", "exec", self.container(service), *words, check=False)
 
     def said(self, service: str, *words: str) -> str:
-        """What a command of ours prints in a container."""
+        """Return the output of one of our commands in a container, which has to succeed."""
         answer = self.execute(service, "action-assistant", *words)
         assert answer.returncode == 0, (
             f"{words}: {answer.returncode} {answer.stdout}{answer.stderr}"
@@ -92,7 +92,7 @@ class Stack:
         return answer.stdout
 
     def token(self, service: str = "editor") -> str:
-        """By which the owner signs in, as the printed link has it."""
+        """Return the owner's token from the printed link."""
         return self.said(service, "link").split()[0].partition("#t=")[2]
 
     def log(self, service: str) -> str:
@@ -101,7 +101,8 @@ class Stack:
         return answer.stdout + answer.stderr
 
     def processes(self, service: str) -> list[tuple[int, str]]:
-        """Of a container, as the machine numbers them, with their arguments."""
+        """Return the processes of a container, by the machine's process ids, with their
+        arguments."""
         top = podman("top", self.container(service), "hpid", "args").splitlines()[1:]
         return [(int(line.split(None, 1)[0]), line.split(None, 1)[1]) for line in top]
 
@@ -124,7 +125,7 @@ class Stack:
 
 @contextmanager
 def health_checks() -> Iterator[None]:
-    """What systemd's timers do elsewhere: ask every container for its health, again and again."""
+    """Ask every container for its health each second, as systemd's timers do elsewhere."""
     done = threading.Event()
 
     def ask() -> None:
@@ -158,7 +159,7 @@ def running(
 
 
 def state(name: str) -> dict[str, Any]:
-    """Of a container."""
+    """Return the state of a container."""
     return dict(inspect(name, "container"))
 
 
@@ -184,7 +185,7 @@ def command(
 
 
 def findings(text: str) -> dict[str, str]:
-    """Of `doctor --json`: what is wrong, by its code."""
+    """Return the errors of `doctor --json`, by code."""
     return {
         each["code"]: each["message"] for each in json.loads(text) if each["severity"] == "error"
     }

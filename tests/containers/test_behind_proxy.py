@@ -1,4 +1,4 @@
-"""Everything at once: editor, Postgres, runner, an emulated robot, and the proxy, by which others come.
+"""The whole installation runs together: editor, Postgres, runner, an emulated robot, and the proxy.
 
 What people and programs do goes through the proxy, by https at one origin; its address is that of a
 LAN on which nobody else is.
@@ -81,7 +81,7 @@ class Proxied:
             yield found
 
     def cli(self, *words: str) -> str:
-        """What our command line says there, from the machine."""
+        """Return the output of our command line, run on this machine against the proxy."""
         answer = command([*words], ORIGIN, self.token, SSL_CERT_FILE=str(self.authority))
         assert answer.returncode == 0, answer.stdout + answer.stderr
         return answer.stdout
@@ -117,12 +117,12 @@ def proxied(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Proxied]:
 
 
 def sorted_by_id(things: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    """In an order that no change of a moment makes another one."""
+    """Sort by id, an order that no later change alters."""
     return sorted(things, key=lambda each: str(each["id"]))
 
 
 def until(true: Callable[[], Any], seconds: float = 60) -> Any:
-    """What becomes true in other processes."""
+    """Wait until a condition of other processes is true, and return its value."""
     deadline = time.monotonic() + seconds
     while not (found := true()):
         assert time.monotonic() < deadline

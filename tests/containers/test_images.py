@@ -12,7 +12,7 @@ _LINE = ROOT / "server" / "action_assistant" / "version.py"
 
 
 def inside(image: str, script: str) -> str:
-    """What a shell in the image prints."""
+    """Return the output of a shell in the image."""
     return podman("run", "--rm", "--network=none", "--entrypoint=/bin/sh", image, "-c", script)
 
 

@@ -1,4 +1,5 @@
-"""Without a proxy: others on the LAN come in by --tls, on other ports, with a token from a file."""
+"""Others on the LAN reach the server without a proxy: by --tls, on other ports, with a token
+from a file."""
 
 import ssl
 from collections.abc import Iterator

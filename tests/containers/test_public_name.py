@@ -81,7 +81,7 @@ def test_the_page_comes_with_a_certificate_of_the_authority(stack: Stack, tmp_pa
 
 
 def _until(ask: Callable[[], str], seconds: float = 60) -> str:
-    """What something answers in the end."""
+    """Return the answer of `ask`, once it no longer fails."""
     deadline = time.monotonic() + seconds
     while True:
         try:

@@ -15,7 +15,7 @@ PAGE = "http://127.0.0.1:8000"
 
 @pytest.fixture(scope="module")
 def stack() -> Iterator[Stack]:
-    """Without a line in .env: there is none."""
+    """Start the simulator's container without an `.env` file."""
     begun = time.monotonic()
     with running("simulator", "simulator") as found:
         assert found.token("simulator")

@@ -34,22 +34,22 @@ class Command(NamedTuple):
 
     @property
     def program(self) -> str:
-        """Without the folder that it is in."""
+        """The command's program, without its folder."""
         return Path(self.words[0]).name
 
     def text_begins(self, start: str) -> bool:
-        """Whether its first words are these."""
+        """Return whether the command begins with these words."""
         words = tuple(start.split())
         return self.words[: len(words)] == words
 
     @property
     def place(self) -> str:
-        """Where it stands, for people."""
+        """The document, line and text of the command, for people."""
         return f"{self.document}:{self.line}: {self.text}"
 
     @property
     def is_placeholder(self) -> bool:
-        """Whether somebody has to fill something in first."""
+        """Return whether the reader has to fill something in first."""
         return bool(_PLACEHOLDER.search(self.text.replace("--data DIR", "")))
 
 
@@ -68,7 +68,7 @@ def _words(text: str) -> list[list[str]]:
 
 
 def without_comment(line: str) -> str:
-    """What a shell sees of it; no command here has such a sign in quotes."""
+    """Return a line without its comment; no command here has a `#` in quotes."""
     return re.sub(r"(?:^|\s+)#\s.*$", "", line).strip()
 
 

@@ -35,7 +35,7 @@ def chain(name: str, *actions: str) -> dict[str, Any]:
 
 
 def fill(folder: Path, home: Path) -> None:
-    """What somebody would have in the folder that they work in, and in their home."""
+    """Fill the working folder and the home as a reader of the documents would have them."""
     patrol = chain("patrol", "Drive", "Look")
     graphs = {
         **dict.fromkeys(

@@ -89,7 +89,7 @@ def _below(of: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
 
 
 def unknown(words: Sequence[str]) -> list[str]:
-    """What the command line has no such word or option for."""
+    """Return the words and options that the command line does not have."""
     at = parser()
     missing: list[str] = []
     for word in words:
@@ -118,7 +118,7 @@ def unknown_to_make(words: Sequence[str]) -> list[str]:
 
 
 def reason(command: Command) -> str:
-    """Why a command is not run here; "" when it is."""
+    """Return why a command is not run here; "" when it is run."""
     if "postgresql://" in command.text:
         return "needs a Postgres of the reader's: tests/commands has one"
     if command.is_placeholder and command.program == PROGRAM:
@@ -142,7 +142,7 @@ def test_words_and_options_that_a_document_names_exist(document: Path) -> None:
 
 
 def lasts(command: Command) -> bool:
-    """Whether it goes on until somebody ends it."""
+    """Return whether a command goes on until it is interrupted."""
     return command.words[1] in LASTING and (
         command.words[1] != "sync" or "--watch" in command.words
     )
@@ -168,7 +168,7 @@ class Computer:
             self._goes = wanted
 
     def filled_in(self, text: str, folder: Path) -> str:
-        """With folders of this computer for those that a document speaks of."""
+        """Replace the folders of the document by folders of this test."""
         data, backups = (shlex.quote(str(each)) for each in (self.product.data, folder / "backups"))
         return text.replace("--data DIR", f"--data {data}").replace(" /backups", f" {backups}")
 
@@ -228,7 +228,7 @@ class Computer:
 
 @pytest.fixture(scope="module")
 def computer(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Computer]:
-    """With the tutorial's graph drawn."""
+    """A computer on whose server the tutorial's graph is drawn."""
     made = Computer(tmp_path_factory.mktemp("computer"))
     made.serve(True)
     with made.product.editor() as editor:

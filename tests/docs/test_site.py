@@ -26,7 +26,7 @@ pytestmark = pytest.mark.skipif(
 
 
 class _Read(HTMLParser):
-    """What a page links to, what it loads, its anchors, and what of it is inline."""
+    """Reads a page's links, loaded files, anchors, and inline scripts and styles."""
 
     def __init__(self, page: Path) -> None:
         super().__init__()
@@ -67,7 +67,7 @@ def pages() -> dict[Path, _Read]:
 
 
 def dead(page: Path, address: str) -> bool:
-    """Whether an address within the site leads to no file or no heading."""
+    """Return whether an address within the site leads to no file or no heading."""
     parts = urlsplit(address)
     target = (page.parent / unquote(parts.path)).resolve() if parts.path else page
     if target == SITE.parent:  # the way back to the product

@@ -1,7 +1,7 @@
-"""What the scanner lets pass, fed to the CRDT library in a process of its own that may die of it.
+"""Feeds updates that the scanner accepts to the CRDT library, in a process that may die of them.
 
-`python -m editor.devour` reads lines of hexadecimal updates; for each it prints `ready N` first and
-then what became of it: `taken`, `refused`, `panicked`, and the milliseconds and megabytes it cost.
+`python -m editor.apply_updates` reads lines of hexadecimal updates; for each it prints `ready N` first and
+then the result: `taken`, `refused`, `panicked`, and the milliseconds and megabytes it cost.
 """
 
 import resource
@@ -17,7 +17,7 @@ from action_assistant.editor.documents import document
 
 
 def fate(base: bytes, update: bytes) -> str:
-    """What becomes of an update in a document like the room's, and of everything done with it."""
+    """Apply an update to a document like the room's, use the document, and return the result."""
     replica = Replica()
     replica.take(base, "ada")
     try:

@@ -106,7 +106,7 @@ class Client:
 
     @property
     def things(self) -> dict[str, Any]:
-        """What the document shows."""
+        """Return the document's contents."""
         shown: dict[str, Any] = self.map.to_py() or {}
         return shown
 

@@ -117,7 +117,7 @@ class Pipe:
 
 
 async def serve(folder: Path, stream: str, trap: Trap, at_once: bool) -> None:
-    """Until killed."""
+    """Serve one room until the process is killed."""
     url = f"sqlite:///{folder / 'editor.db'}"
     journal = await Journal.open(url, branch="editor", fold=nothing, at_once=at_once)
     rooms = Rooms(journal)

@@ -71,7 +71,7 @@ class Editor:
         return code
 
     def client(self) -> httpx.Client:
-        """With the token."""
+        """Return an HTTP client with the token."""
         return httpx.Client(base_url=self.url, headers=BEARER, trust_env=False, timeout=20)
 
     def room(self, graph: str, query: str = "") -> str:

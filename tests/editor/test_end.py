@@ -1,4 +1,4 @@
-"""How the editor ends: at once, whoever is listening."""
+"""The editor ends at once, whoever is connected."""
 
 import contextlib
 import threading

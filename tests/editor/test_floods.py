@@ -63,7 +63,8 @@ def memory(editor: Editor) -> int:
 
 @contextlib.asynccontextmanager
 async def healthy(editor: Editor, graph: str) -> AsyncIterator[list[float]]:
-    """Somebody who edits all the while and measures how long it takes until it is durable."""
+    """Edit all the while as one person, and measure how long each edit takes until it is
+    durable."""
     taken: list[float] = []
     doc: Doc[Any] = Doc()
     things = doc.get("things", type=Map)

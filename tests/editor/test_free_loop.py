@@ -1,4 +1,4 @@
-"""No route and no background task handles on the editor's event loop what grows with a graph.
+"""No route and no background task does work on the editor's event loop that grows with a graph.
 
 Counted, not timed: the calls of Python functions on the loop's thread, the values in what workers are sent and send
 back, and the rows that this process reads, while the same thing is done with a small graph and with one twelve times
@@ -49,9 +49,9 @@ VALUES: Final = 5 * (LARGE - SMALL)
 
 
 class Work(msgspec.Struct):
-    """What was done. `calls`: on the loop's thread; `values`: in what workers were sent and sent back; `rows`: read
-    or written by this process in one statement, at most; `applied`: bytes that the CRDT library was given in one
-    call, at most."""
+    """The amount of work. `calls`: on the loop's thread; `values`: in what workers were sent and
+    sent back; `rows`: read or written by this process in one statement, at most; `applied`:
+    bytes that the CRDT library was given in one call, at most."""
 
     calls: int = 0
     values: int = 0
@@ -218,7 +218,7 @@ def counted(editor: Served, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 def values_in(pickled: bytes) -> int:
-    """How many values a pickle holds; a long text or many bytes are one."""
+    """Return how many values a pickle holds; a long text or many bytes count as one."""
     counting = sys.getprofile()
     sys.setprofile(None)  # this work is the test's own
     try:

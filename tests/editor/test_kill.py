@@ -45,7 +45,7 @@ class Writer:
         self._subscription = self.doc.observe(lambda event: self._made.append(event.update))
 
     async def write(self, editor: Editor, graph: str) -> None:
-        """Until the server dies."""
+        """Write until the server dies."""
         try:
             async with editor.socket(graph, "?acks=1") as session:
                 await session.send_bytes(messages.question(self.doc.get_state()))
@@ -54,7 +54,7 @@ class Writer:
             pass
 
     async def write_to(self, pipe: Pipe) -> None:
-        """Until the small process dies."""
+        """Write until the small process dies."""
         try:
             await pipe.send_bytes(self.name.encode())
             await pipe.send_bytes(messages.question(self.doc.get_state()))
@@ -89,7 +89,7 @@ class Writer:
 
 
 async def stored(data: Path, graph: str) -> set[str]:
-    """What the log of a dead editor holds."""
+    """Return the things in the log of a dead editor."""
     journal = await Journal.open(f"sqlite:///{data / 'editor.db'}", branch="editor", fold=nothing)
     loaded = await load(journal, f"graph/{graph}")
     things = set(loaded.replica.doc.get("things", type=Map).keys())
@@ -200,7 +200,7 @@ async def test_wherever_it_dies_nothing_acknowledged_or_seen_is_lost(tmp_path: P
 
 
 def at_rest(database: Path, graph: str) -> set[str]:
-    """What the log says when nobody has it open."""
+    """Return the things in a log that no process has open."""
     doc: Doc[Any] = Doc()
     with contextlib.closing(sqlite3.connect(database)) as connection:
         rows = connection.execute(

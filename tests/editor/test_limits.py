@@ -1,4 +1,4 @@
-"""How large a graph may become, and how fast a person may make it so."""
+"""Graphs have a largest size, and people a largest rate of edits."""
 
 import asyncio
 from typing import Any

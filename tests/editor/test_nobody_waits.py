@@ -23,7 +23,7 @@ Body = dict[str, Any]
 
 
 def arrows(count: int, *, parents: bool = False, name: str = "B") -> Body:
-    """So many arrows from one action to another, all alike."""
+    """Return a graph with `count` equal arrows from one action to another."""
     one, other = ({"name": n, "instance_id": 0} for n in ("A", name))
     actions = [
         {"name": "A", "instance_id": 0, "type": "sync", "children": [other] * count},
@@ -47,8 +47,8 @@ def star(count: int) -> Body:
 
 
 async def longest_silence(editor: Editor, step: Callable[[], Any]) -> tuple[float, float]:
-    """How long the editor once took to say that it is there while it did something, and how long
-    that took."""
+    """Return the editor's longest silence during a step, and the duration of the step, in
+    seconds."""
     longest = 0.0
     begun = time.perf_counter()
     task = asyncio.ensure_future(step())
@@ -182,8 +182,8 @@ async def test_what_nobody_waits_for_is_not_read_to_its_end(editor: Editor) -> N
 
 
 def at_once(count: int, client: int = 7, clock: int = 0, *, needs: int | None = None) -> bytes:
-    """So many values for one key, none of which knows of another; perhaps after something that is
-    not there."""
+    """Return an update with `count` values of one key that know nothing of each other, perhaps
+    after a missing update."""
     number, text = messages.number, messages.text
     items = count + (needs is not None)
     made = b"\x01" + number(items) + number(client) + number(clock)
@@ -194,7 +194,7 @@ def at_once(count: int, client: int = 7, clock: int = 0, *, needs: int | None = 
 
 @pytest.fixture
 def strict(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Nothing may take long."""
+    """Lower the limit of a trial to 0.05 s."""
     monkeypatch.setattr(trial, "SECONDS", 0.05)
 
 
@@ -262,7 +262,7 @@ def two_edits() -> tuple[bytes, bytes]:
 
 @pytest.mark.usefixtures("strict")
 async def test_what_waits_is_looked_at_before_it_is_let_in(rooms: Rooms) -> None:
-    """It would be applied with the small update that it waits for."""
+    """The waiting update would be applied together with the small update that it waits for."""
     ada, eve = Client("ada"), Client("eve")
     first, _ = two_edits()
     async with rooms.enter("graph/g") as room:
@@ -298,7 +298,8 @@ async def test_what_waits_and_is_harmless_is_let_in(rooms: Rooms) -> None:
 async def test_many_small_updates_make_no_graph_that_takes_long_to_open(
     rooms: Rooms, journal: Journal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Each of them is as quick as others. All of them together hold everybody up, again and again."""
+    """Each update alone is as quick as others; together they would delay everybody again and
+    again."""
     monkeypatch.setattr(opening_time, "SECONDS", 0.02)
     ada, eve = Client("ada"), Client("eve")
     async with rooms.enter("graph/g") as room:
@@ -345,8 +346,8 @@ async def test_who_opens_it_often_does_not_get_further(
 
 
 def page_edit(n: int, own: int = 200) -> bytes:
-    """What the n-th page writes, each a client of its own: over what the one before it wrote, and over
-    what an earlier one did."""
+    """Return the update of the n-th page, a client of its own, which overwrites the page before
+    it and an earlier one."""
     number, text = messages.number, messages.text
 
     def value(key: bytes, after: int, clock: int) -> bytes:

@@ -26,7 +26,7 @@ def mortal() -> Iterator[Server]:
 
 
 class Hand:
-    """Someone who writes things into a graph, and comes again until they are durable."""
+    """A client who writes things into a graph, and reconnects until they are durable."""
 
     def __init__(self, editor: Editor, graph: str) -> None:
         self.doc: Doc[Any] = Doc()
@@ -36,7 +36,7 @@ class Hand:
         self._graph = graph
 
     async def write(self, name: str) -> None:
-        """Until it is acknowledged."""
+        """Write a thing, and wait until it is acknowledged."""
         self.things[name] = name
         async with asyncio.timeout(40):
             while not await self._acknowledged():
@@ -44,7 +44,7 @@ class Hand:
                 await asyncio.sleep(0.1)
 
     async def _acknowledged(self) -> bool:
-        """Whether one connection was enough."""
+        """Return whether the edit was acknowledged over one connection."""
         with contextlib.suppress(ConnectionError):
             try:
                 async with self._editor.socket(self._graph, "?acks=1") as session:
@@ -68,7 +68,7 @@ class Hand:
 
 
 async def seen(editor: Editor, graph: str) -> set[str]:
-    """What somebody finds who comes anew."""
+    """Return the things that a new client receives."""
     doc: Doc[Any] = Doc()
     things = doc.get("things", type=Map)
     async with editor.joined(graph, doc):

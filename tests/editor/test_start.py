@@ -1,4 +1,4 @@
-"""How the editor starts, and what it says when it cannot."""
+"""The editor starts, or says why it cannot."""
 
 import sqlite3
 import subprocess

@@ -1,4 +1,4 @@
-"""What must hold for any bytes that somebody calls a UMRF file."""
+"""Properties that hold for any bytes that are given as a UMRF file."""
 
 import json
 import resource
@@ -28,7 +28,8 @@ MEGABYTES = 1_500  # of the whole process: the interpreter, the fuzzer, ten time
 
 
 def examine(data: bytes) -> bool:
-    """Whether the bytes are a graph. Raises AssertionError, or whatever must not be raised."""
+    """Return whether the bytes are a graph. Raises AssertionError, or any error that must not be
+    raised."""
     examine_action(data)
     started = time.process_time()
     try:
@@ -43,7 +44,7 @@ def examine(data: bytes) -> bool:
 
 
 def examine_action(data: bytes) -> bool:
-    """Whether the bytes are the file of an action; raises like `examine`."""
+    """Return whether the bytes are the file of an action; raises as `examine` does."""
     try:
         reading = read_action(data)
     except Unreadable:
@@ -89,7 +90,8 @@ def _examine_graph(data: bytes, reading: Reading, started: float) -> bool:
 
 
 def _slowness() -> float:
-    """How many times as long as where the bounds were set this machine needs just now; at least 1."""
+    """Return how many times slower this machine is now than the one that set the bounds; at
+    least 1."""
     started = time.process_time()
     for _ in range(4):
         json.loads(json.dumps([{"name": str(n), "at": [n, {}]} for n in range(20_000)]))
@@ -97,7 +99,8 @@ def _slowness() -> float:
 
 
 def _round_trip(data: bytes) -> None:
-    """What is written is read as the same; writing that again changes nothing."""
+    """Check that a written graph is read as the same graph, and that writing it again changes
+    nothing."""
     graph = read(data).graph
     text = write(graph)
     if len(text) > MAX_BYTES:

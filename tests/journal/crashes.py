@@ -19,7 +19,7 @@ _NUMBERS: Final = itertools.count()
 
 
 class Disk:
-    """What happened to the files, in order; and a say in what may happen next."""
+    """Records the steps of the files in order, and can make a step fail."""
 
     def __init__(self) -> None:
         self.name = f"recorder-{next(_NUMBERS)}"

@@ -24,7 +24,7 @@ _SETTINGS: Final = {
 
 
 def binaries() -> Path | None:
-    """Where Postgres is installed; None when it is not."""
+    """Return the folder of Postgres's programs; None when it is not installed."""
     found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"), key=_version)
     if found:
         return found[-1].parent
@@ -54,7 +54,7 @@ class Server:
             file.write(f"{lines}port = {self.port}\n")
 
     def url(self, database: str, port: int | None = None) -> str:
-        """How a journal is told of a database here."""
+        """Return the URL of a database of this server."""
         return f"postgresql://aa@127.0.0.1:{port or self.port}/{database}"
 
     def new_database(self) -> str:
@@ -72,7 +72,7 @@ class Server:
         self._ctl("stop", "-m", mode)
 
     def processes(self) -> list[psutil.Process]:
-        """All of this server, to be frozen or killed."""
+        """Return all processes of this server, to be frozen or killed."""
         number = (self._data / "postmaster.pid").read_text().splitlines()[0]
         first = psutil.Process(int(number))
         return [first, *first.children(recursive=True)]
@@ -84,7 +84,7 @@ class Server:
 
     @property
     def binaries(self) -> Path:
-        """Where this server's programs are."""
+        """The folder of this server's programs."""
         return self._bin
 
     @property

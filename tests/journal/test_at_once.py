@@ -78,7 +78,7 @@ async def until(happened: Callable[[], bool]) -> None:
 
 
 async def known(watched: Watched) -> None:
-    """Until commits count as quick."""
+    """Append until commits count as quick."""
     for _ in range(20):
         await watched.then(SMALL)
     watched.here.clear()

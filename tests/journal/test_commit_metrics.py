@@ -1,4 +1,4 @@
-"""What is told of commits, as a registry of Prometheus has it."""
+"""Metrics of commits are reported as a registry of Prometheus has them."""
 
 import pytest
 from prometheus_client import CollectorRegistry

@@ -1,4 +1,4 @@
-"""What every journal promises, whatever database keeps it."""
+"""Every journal keeps these promises, on either database."""
 
 import asyncio
 from collections.abc import Awaitable, Callable, Sequence

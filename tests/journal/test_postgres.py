@@ -1,4 +1,4 @@
-"""What is special about the journal on Postgres: servers that die, and connections that do."""
+"""Servers and connections of Postgres die, and the journal recovers."""
 
 import asyncio
 import os
@@ -77,7 +77,8 @@ class Writers:
         await asyncio.gather(*self._tasks)
 
     async def check(self) -> None:
-        """Nothing lost, nothing doubled, no gap, everything sound."""
+        """Check that nothing is lost or doubled, that there is no gap, and that the journal is
+        sound."""
         stored: list[Event] = []
         while page := await self._journal.read_all(after=stored[-1].position if stored else 0):
             stored += page
@@ -179,7 +180,7 @@ async def test_a_connection_that_dies_in_a_commit_stores_exactly_once(
 async def test_after_a_connection_that_was_aborted_another_one_writes(
     postgres: Server, closing: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As the driver aborts one that did not answer in time, now and then."""
+    """The driver sometimes aborts a connection that did not answer in time."""
     journal = await opened(postgres.new_database())
     await journal.append("a", [draft()])
     session = journal._writer._session

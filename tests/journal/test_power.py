@@ -66,7 +66,7 @@ def after_the_cut(folder: Path, files: dict[str, bytes]) -> int:
 
 
 async def losses(tmp_path: Path, synchronous: str, images: int) -> int:
-    """How many of the power cuts lost something that was acknowledged."""
+    """Return how many of the power cuts lost an acknowledged event."""
     disk = Disk()
     lived, image = tmp_path / "lived", tmp_path / "image"
     lived.mkdir()

@@ -1,4 +1,4 @@
-"""Whether a journal says honestly that it cannot store, and why: it is really broken here."""
+"""A journal that is really broken says that it cannot store, and why."""
 
 import asyncio
 import resource

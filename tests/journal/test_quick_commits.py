@@ -1,4 +1,4 @@
-"""When commits count as quick: by the last hundred of them."""
+"""Commits count as quick by the last hundred of them."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
 
 
 def after(clock: Clock, *seconds: float, every: float = 1.0) -> bool:
-    """Whether commits are quick when these were the last, one after the other."""
+    """Return whether commits are quick after these commits, one after the other."""
     commits = QuickCommits()
     for each in seconds:
         clock.now += every

@@ -1,4 +1,4 @@
-"""What is special about the journal on SQLite."""
+"""Properties of the journal on SQLite alone."""
 
 import asyncio
 import os

@@ -183,7 +183,7 @@ def in_memory(tmp_path: Path) -> Iterator[Path]:
 
 
 async def tells(path: Path) -> bool:
-    """Whether a file is refused or found damaged."""
+    """Return whether a file is refused or found damaged."""
     try:
         journal = await opened(path)
     except CannotStart:
@@ -195,7 +195,7 @@ async def tells(path: Path) -> bool:
 
 
 async def holds(path: Path, events: list[Event]) -> bool:
-    """Whether a file has all events as they were, read at once and stream by stream."""
+    """Return whether a file has all events unchanged, read at once and stream by stream."""
     journal = await opened(path)
     try:
         by_stream = [await journal.read(name) for name in ("a", "b", "c")]

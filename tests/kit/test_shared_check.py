@@ -1,4 +1,4 @@
-"""What was answered last is known at once, with its age; a question that goes on is not asked twice."""
+"""The last answer is known at once, with its age; a check that is running is not started twice."""
 
 import asyncio
 

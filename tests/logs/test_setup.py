@@ -30,7 +30,7 @@ SECRETS = {
 
 @contextmanager
 def clean() -> Iterator[None]:
-    """Nothing is said of what a line is about."""
+    """Begin each test with log lines that have no subject."""
     begin({})
     yield
     begin({})

@@ -21,7 +21,7 @@ os.environ.pop("ROS_DOMAIN_ID", None)
 
 @pytest.fixture(autouse=True)
 def soon_settled(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On loopback a second is enough to see who was there before, and a test knows who will come."""
+    """Shorten discovery: on loopback a second is enough, and a test knows which nodes will come."""
     if importlib.util.find_spec("rclpy"):
         from action_assistant.runner.links.ros2 import domain as ros2_domain
 
@@ -53,5 +53,5 @@ def domains() -> Iterator[list[int]]:
 
 @pytest.fixture
 def domain(domains: list[int]) -> int:
-    """One of them."""
+    """Return one of the domains."""
     return domains[0]

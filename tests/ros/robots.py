@@ -25,7 +25,8 @@ _FOREIGN_START = Path(__file__).parents[2] / "frontend" / "e2e" / "foreign_start
 
 @contextmanager
 def started_by_others(domain: int, graph: dict[str, Any], robot: str = "David") -> Iterator[None]:
-    """Somebody else on that domain starts a graph on a robot, which listens as the runner does."""
+    """Start a graph on a robot from another process of that domain, which listens as the runner
+    does."""
     other = subprocess.Popen(
         [sys.executable, str(_FOREIGN_START), robot, "2"],
         stdin=subprocess.PIPE,

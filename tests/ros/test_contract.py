@@ -1,4 +1,4 @@
-"""What every link promises, over real rclpy: with a stand-in robot, and with a real engine.
+"""Every link keeps its promises over real rclpy: with an emulated robot, and with a real engine.
 
     make contract DOMAIN=7 NAME=David [RMW=rmw_cyclonedds_cpp] [ACTION=OxWork]
 

@@ -1,4 +1,4 @@
-"""On the real engine, what the code of every action did lies inside of the bounds of its visits.
+"""On the real engine the code of every action ran within the bounds of its visits.
 
 Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the program that starts it
 and test actions that write down when their code begins and ends. `TEST_BOUNDS_RUNS` is how many runs
@@ -167,7 +167,7 @@ class Driven:
         await anyio.sleep(self.chance.uniform(0, 0.5))
 
     def real(self) -> dict[str, list[Real]]:
-        """What the code of every action did, by full name."""
+        """Return the begins and ends of each action's code, by full name."""
         found: dict[str, list[Real]] = {}
         for line in self.truth.read_text().splitlines():
             second, _, what, name, _ = line.split()
@@ -180,7 +180,7 @@ class Driven:
 
 
 def widths(visits: list[Visit]) -> str:
-    """How wide bounds are, for people."""
+    """Return a line with the widths of bounds, for people."""
     spans = sorted(
         (visit.most - visit.least) / 1e6 for visit in visits if visit.most is not None
     ) or [0.0]

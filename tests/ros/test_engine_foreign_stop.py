@@ -39,13 +39,13 @@ pytestmark = [needs_engine, pytest.mark.timeout(240)]
 
 
 def held(runner: httpx.Client) -> list[dict[str, Any]]:
-    """What David holds."""
+    """Return the graphs that David holds."""
     found: list[dict[str, Any]] = runner.get("/api/robots/David").json()["holds"]
     return found
 
 
 def told(runner: httpx.Client) -> list[str]:
-    """What David's log says of stops, oldest first."""
+    """Return the stop events in David's log, oldest first."""
     lines = runner.get("/api/robots/David/events").json()
     return [each["kind"] for each in reversed(lines) if each["kind"].startswith("stop_")]
 
@@ -54,7 +54,8 @@ def told(runner: httpx.Client) -> list[str]:
 def moving(
     domain: int, tmp_path: Path
 ) -> Iterator[tuple[Callable[[], list[str]], Product, httpx.Client]]:
-    """What the code of others has written down, the product beside it, and somebody at a browser."""
+    """Start a graph of others on a real engine, with the product and a signed-in browser beside
+    it."""
     with (
         real_engine(tmp_path, domain) as events,
         running(tmp_path / "data") as product,

@@ -1,5 +1,5 @@
-"""On the real engine, no Stop is called proven before an action that was loading has run its course; and how
-often a Stop stays unconfirmed although nothing came.
+"""On the real engine no Stop is called proven before an action that was loading has run its course;
+the test also counts Stops that stay unconfirmed although nothing came.
 
 Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the program that starts it and
 test actions that take 1.5, 3 and 8 s in `onInit` and write down when their code begins and ends.
@@ -172,7 +172,7 @@ class Driven:
             self.ended[n] = told.ended_at / 1e6, graph.name
 
     def _lines(self, n: int) -> list[tuple[float, str]]:
-        """What the code of the actions of one graph did."""
+        """Return the begins and ends of the code of one graph's actions."""
         found: list[tuple[float, str]] = []
         text = self.truth.read_text() if self.truth.exists() else ""
         for line in text.splitlines():
@@ -186,7 +186,8 @@ class Driven:
         return count["init"] > count["begin"] or count["begin"] > count["end"]
 
     def judge(self) -> None:
-        """Nothing began or ended after it was called over; by now what came late has come."""
+        """Check that no code began or ended after its graph was called ended; late lines have
+        come by now."""
         for n, (ended, graph) in self.ended.items():
             late = [f"{what} {at - ended:.3f} s later" for at, what in self._lines(n) if at > ended]
             self.false += [f"{graph}: {each}" for each in late]

@@ -35,7 +35,7 @@ pytestmark = [needs_engine, pytest.mark.timeout(240)]
 
 
 def order_of(product: Product) -> dict[str, Any]:
-    """What a start of a new graph's version carries."""
+    """Return the body of a start of a new graph's version."""
     with product.editor() as editor:
         graph = editor.post("/api/graphs", json=GRAPH).json()["id"]
         version = editor.post(f"/api/graphs/{graph}/versions", json={}).json()

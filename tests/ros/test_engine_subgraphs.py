@@ -33,7 +33,7 @@ pytestmark = [needs_engine, pytest.mark.timeout(240)]
 
 
 def order_of(product: Product, graph: str) -> dict[str, Any]:
-    """What a start of a new version of the graph carries."""
+    """Return the body of a start of a new version of the graph."""
     with product.editor() as editor:
         version = editor.post(f"/api/graphs/{graph}/versions", json={}).json()
     keys = ("digest", "umrf", "subgraphs", "tree_digest")
@@ -45,7 +45,7 @@ def order_of(product: Product, graph: str) -> dict[str, Any]:
 
 
 def item_of(runner: httpx.Client, order: dict[str, Any]) -> dict[str, Any]:
-    """What the look before a start says of the graphs inside."""
+    """Return the pre-flight item about the graphs inside."""
     asked = {key: value for key, value in order.items() if key != "engine"}
     answer = runner.post("/api/preflight", json=asked | {"engines": ["David"]})
     assert answer.is_success, answer.text

@@ -1,4 +1,4 @@
-"""Nothing is called stopped or finished that moves, over real rclpy.
+"""No graph that moves is called stopped or finished, over real rclpy.
 
 The same kind of histories as in virtual time, in real seconds and therefore shorter: the real runner,
 the real link and stand-in robots on threads, with a second engine on the same path, reboots, freezes,
@@ -68,7 +68,7 @@ def clock_us() -> int:
 
 
 class Stranger:
-    """Somebody else on the domain, who publishes what he likes."""
+    """A stranger on the domain, who publishes any message."""
 
     def __init__(self, domain: int) -> None:
         self._context = Context()
@@ -134,7 +134,7 @@ class Story:
         await anyio.to_thread.run_sync(self.robot, self.chance.choice([0.0, 0.0, 1.0, 2.5]))
 
     async def live(self) -> None:
-        """All steps; then somebody stops everything."""
+        """Play all steps, then stop everything."""
         await anyio.to_thread.run_sync(self.robot)
         reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(self.domain)})
         assert not isinstance(reach, str), reach
@@ -165,7 +165,7 @@ class Story:
                 await anyio.to_thread.run_sync(stranger.leave)
 
     async def step(self, control: ExecutionService, stranger: Stranger) -> None:
-        """Something happens."""
+        """Play one random step."""
         name = self.chance.choice(list(GRAPHS))
         what = self.chance.choices(
             ["start", "stop", "wait", "stranger", "made up", "look", "second", "reboot", "quit"],
@@ -212,7 +212,7 @@ class Story:
         return found - {""}
 
     def judge(self, opened: OpenRun) -> None:
-        """What is called still must not move."""
+        """Remember a run that is called ended; its graph must not move any more."""
         run = opened.run
         if run.state in STILL and run.incarnation is not None and run.id not in self.judged:
             self.judged.add(run.id)

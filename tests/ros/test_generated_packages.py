@@ -71,7 +71,7 @@ pytestmark = [
 
 
 class Told:
-    """What the engine printed, and what developers' code wrote down."""
+    """The engine's output, and the notes that developers' code wrote."""
 
     def __init__(self, folder: Path, workspace: Workspace) -> None:
         self.workspace = workspace

@@ -41,7 +41,7 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def older(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where the older generation is installed; built as ours is."""
+    """Install the older generation of the messages, built as ours is, and return its prefix."""
     source, prefix = tmp_path_factory.mktemp("temoto_msgs"), tmp_path_factory.mktemp("older")
     package = ROOT / "ros" / "temoto_msgs"
     (source / "package.xml").write_bytes((package / "package.xml").read_bytes())

@@ -41,7 +41,7 @@ def looked(runner: httpx.Client, order: dict[str, Any]) -> dict[str, Any]:
 
 
 def state(runner: httpx.Client, order: dict[str, Any]) -> str:
-    """Whether the robot has just these graphs; "" while it does not answer."""
+    """Return the verdict on the robot's inner graphs; "" while the robot does not answer."""
     verdict: str = looked(runner, order).get("subgraphs", {}).get("verdict", "")
     return verdict
 
@@ -59,7 +59,8 @@ def ran(runner: httpx.Client, order: dict[str, Any], request: str) -> dict[str, 
 def gives_it_back(
     ada: httpx.Client, order: dict[str, Any], wish: dict[str, Any], path: Path
 ) -> None:
-    """Somebody gives the robot another one of that name; the version's takes its place again."""
+    """Give the robot another graph of that name, then write the version's graph in its place
+    again."""
     path.write_text(OTHER)
     until("David has indexed that", lambda: state(ada, order) == "blocked")
     assert looked(ada, order)["subgraphs"]["codes"] == ["subgraph-differs"]

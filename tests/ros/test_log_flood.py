@@ -29,7 +29,7 @@ def flood(node: EchoEngine, other: EchoEngine) -> None:
 
 
 def places(heard: list[Report], kind: type[Report]) -> list[int]:
-    """Where reports of a kind stand among all."""
+    """Return the positions of the reports of one kind."""
     return [at for at, each in enumerate(heard) if isinstance(each, kind)]
 
 

@@ -93,7 +93,7 @@ def values(parameters: dict[str, Any]) -> dict[str, Any]:
 
 
 def behaviours(graphs: list[dict[str, Any]]) -> dict[str, list[dict[str, Any]]]:
-    """What the recorded actions do, by the graph and the action."""
+    """Return the behaviours of the recorded actions, by graph and action."""
     return {
         f"{graph}/{full_name(action)}": calls_of(
             "engine", action["name"], values(action.get("input_parameters", {}))
@@ -224,7 +224,7 @@ def states(runner: httpx.Client, path: str) -> dict[str, str]:
 
 
 def settled(runner: httpx.Client, path: str) -> Callable[[], bool]:
-    """Whether the states were the same for some looks."""
+    """Return a function that tells whether the states were the same in the last looks."""
     seen: list[dict[str, str]] = []
 
     def looks_alike() -> bool:
@@ -235,7 +235,7 @@ def settled(runner: httpx.Client, path: str) -> Callable[[], bool]:
 
 
 def course(run: dict[str, Any], ways: dict[str, Way]) -> dict[Way, tuple[int, str]]:
-    """How often each of these actions ran, and how it stands in the end."""
+    """Return how often each of these actions ran, and its last state."""
     return {
         way: (len(run["actions"][name]["visits"]), run["actions"][name]["state"])
         for name, way in ways.items()

@@ -51,7 +51,8 @@ pytestmark = [
 
 @pytest.fixture(scope="module")
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Distribution:
-    """As on Ubuntu, where numpy is the system's; in the prefix where the system has none for us."""
+    """Lay out a workspace as on Ubuntu, where numpy is the system's; the prefix has numpy where
+    the system has none."""
     if LAID_OUT:
         return Distribution(prefix=Path(os.environ["TEST_PREFIX"]), workspace=Path(LAID_OUT))
     folder = tmp_path_factory.mktemp("ubuntu")
@@ -107,7 +108,7 @@ def wait_for(told: Callable[[], bool], seconds: float = 60) -> None:
 
 
 def uses(pid: int, workspace: Distribution) -> bool:
-    """Whether a process has the workspace's messages in its memory, and no other ones."""
+    """Return whether a process has loaded the workspace's messages, and no others."""
     maps = Path(f"/proc/{pid}/maps").read_text()
     assert str(WHEELS) not in maps
     assert (str(NUMPY) if OF_THE_SYSTEM else f"{workspace.prefix}/lib/python") in maps

@@ -24,7 +24,7 @@ from ros.test_ros2_link import answering, engine, eventually, placed, reach
 
 @asynccontextmanager
 async def links(domain: int) -> AsyncIterator[tuple[Link, Link]]:
-    """To David and to Eve, each of a namespace of its own."""
+    """Links to David and Eve, each in a namespace of its own."""
     async with reach() as ros2, anyio.create_task_group() as tasks:
         made = [
             ros2.link(

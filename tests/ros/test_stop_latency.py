@@ -1,4 +1,4 @@
-"""From the click on Stop to the robot that hears it, over real rclpy and real processes.
+"""A Stop reaches the robot soon after the click, over real rclpy and real processes.
 
 `TEST_STOP_CLICKS` is how many for each way and condition; by default each condition is
 tried once, by one way. With `-s` the figures are printed. Each takes some seconds: a start, a stop,
@@ -47,7 +47,7 @@ class Robot:
         self.heard: list[int] = []
 
     def told(self, said: Said) -> None:
-        """Something that he says."""
+        """Note the time at which the robot logs a stop."""
         if isinstance(said, LogMessage) and said.text.startswith("Received request to stop"):
             self.heard.append(time.time_ns())
 

@@ -91,7 +91,7 @@ async def live_through(
     judge: Callable[[OpenRun], None],
     do: Callable[[ExecutionService, Any, str, Any], Awaitable[None]],
 ) -> None:
-    """All steps in their order; at a "crash" the process dies and another one takes up what it left."""
+    """Play all steps in their order; at a "crash" the process dies and another one continues."""
     rest = list(steps)
     while rest:
         async with harness.runner() as control, anyio.create_task_group() as people:

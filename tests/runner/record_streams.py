@@ -153,7 +153,7 @@ async def paused(place: Place) -> None:
 
 
 async def simulated(place: Place) -> None:
-    """In the simulator, with a message and a result of each kind."""
+    """Run in the simulator, with a message and a result of each kind."""
     script = {
         "Work_0": [{"after_s": 1, "result": "on_false", "message": "no way through"}],
         "Work_1": [{"after_s": 1, "result": "on_error", "message": "gripper jammed"}],

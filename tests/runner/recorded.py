@@ -133,7 +133,7 @@ class Recording:
         return not self._again or self.now_ms() < self._again[0]
 
     def now_ms(self) -> float:
-        """In the recording's own time."""
+        """Return the present time of the recording, in ms."""
         return (clock_us() - EPOCH) / 1_000
 
     @property

@@ -52,7 +52,7 @@ class Open(Robot):
         )
 
     async def get(self) -> Answer:
-        """With the index and the texts."""
+        """Return an answer with the index and the texts."""
         answer = await super().get()
         return msgspec.structs.replace(
             answer,

@@ -19,14 +19,14 @@ _PLUGIN = "[pytest11]\nworkspace = pytest_of_the_workspace\n"
 
 @dataclass(frozen=True)
 class Distribution:
-    """Where things lie. `workspace` is what colcon calls the install base."""
+    """The folders of a laid-out ROS 2. `workspace` is what colcon calls the install base."""
 
     prefix: Path
     workspace: Path
 
     @property
     def setup(self) -> Path:
-        """What to source."""
+        """The file that a shell sources."""
         return self.workspace / "setup.bash"
 
     def sourced(self, environ: dict[str, str]) -> dict[str, str]:
@@ -94,7 +94,8 @@ def _all(wheels: Path) -> set[str]:
 
 
 def _exports(prefix: Path, python: str, bundled: list[str]) -> str:
-    """What sourcing one prefix adds, each before what was there."""
+    """Return the lines that sourcing one prefix runs; each puts its part before the present
+    value."""
     libraries = ":".join([f"{prefix}/lib", *(f"{prefix}/lib/{name}" for name in bundled)])
     added = {
         "AMENT_PREFIX_PATH": f"{prefix}",

@@ -34,7 +34,8 @@ def asked(
 
 
 def faults(data: Path, **more: Any) -> list[Diagnostic]:
-    """What is wrong, robots apart, on ports where nothing runs unless one is named."""
+    """Return the faults that `doctor` finds, without robots, on ports where nothing runs unless
+    one is named."""
     place = Installation(data=data, **{"port": free_ports(), **more})
     # Time for a busy machine; how long it may take is not what is asked here.
     found = [each for each in examine(place, seconds=60) if each.severity != "fine"]

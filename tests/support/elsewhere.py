@@ -57,7 +57,7 @@ class Refusing(importlib.abc.MetaPathFinder):
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> None:
-        """As importlib asks."""
+        """Refuse the named modules when importlib asks for them."""
         if fullname in self._names:
             raise ImportError(f"no module named {fullname!r} on this system", name=fullname)
 
@@ -70,12 +70,12 @@ def ours() -> list[str]:
 
 
 def of_ros(name: str) -> bool:
-    """Whether a module needs rclpy."""
+    """Return whether a module needs rclpy."""
     return any(name.startswith(f"{PACKAGE}.{each}") for each in OF_ROS)
 
 
 def move_to(system: str) -> None:
-    """From now on this process is on that system, as far as modules of ours can see."""
+    """Make this process look like one on that system to our modules."""
     for name in ours():
         try:
             importlib.import_module(name)

@@ -1,4 +1,4 @@
-"""That work grows with what it is given, not with its square: measured against itself, on any machine."""
+"""Checks that work grows with its input and not with the square of it, on any machine."""
 
 import gc
 import time
@@ -31,7 +31,7 @@ def grows_with_its_size(work: Callable[[int], Callable[[], object]], size: int) 
 
 
 def _seconds(work: Callable[[], object]) -> float:
-    """Of the processor."""
+    """Return the processor time of some work, in seconds."""
     begun = time.process_time()
     work()
     return time.process_time() - begun

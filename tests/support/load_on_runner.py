@@ -127,7 +127,7 @@ def requests() -> list[tuple[str, str, bytes]]:
 
 
 def _asked_for() -> list[str]:
-    """Everything that is read and may be long."""
+    """Return the paths of all answers that may be long."""
     return [
         "/api/runs?limit=1000&text=a",
         f"/api/runs/{LONG}",
@@ -180,7 +180,7 @@ async def hold(port: int, said: bytes) -> None:
 
 
 async def main(port: int, silent: int, clients: int) -> None:
-    """Everybody."""
+    """Run all clients at once."""
     keys, page = Keys(_token()), port - 1
     requests_ = requests()
     said = [b"", b"GET / HTTP/1.1\r\n", b"POST /api/stop HTTP/1.1\r\nhost: localhost\r\nx: "]

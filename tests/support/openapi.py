@@ -12,8 +12,8 @@ from action_assistant.settings import EditorSettings, RunnerSettings
 
 
 def documents(data: Path) -> dict[str, dict[str, Any]]:
-    """What the editor and the runner say of their routes, without starting either; `data` is an
-    empty folder."""
+    """Return the OpenAPI documents of the editor and the runner, without starting either; `data`
+    is an empty folder."""
     database = f"sqlite:///{data / 'editor.db'}"
     apps: dict[str, Any] = {
         "editor": editor.create_app(EditorSettings(data=data, database=database)),
@@ -23,7 +23,7 @@ def documents(data: Path) -> dict[str, dict[str, Any]]:
 
 
 def texts(data: Path) -> dict[str, str]:
-    """The same as the texts that are kept, by the names of their files: without the version, which
+    """Return the documents as the texts that are kept, by file name, without the version, which
     releases change."""
     found = documents(data)
     for document in found.values():

@@ -57,17 +57,17 @@ class Product:
 
     @property
     def url(self) -> str:
-        """Of the editor."""
+        """The URL of the editor."""
         return f"{self._scheme}://127.0.0.1:{self.port}"
 
     @property
     def runner_url(self) -> str:
-        """Of the runner."""
+        """The URL of the runner."""
         return f"{self._scheme}://127.0.0.1:{self.port + 1}"
 
     @property
     def environment(self) -> dict[str, str]:
-        """With which commands find this server."""
+        """The environment in which commands find this server."""
         return {
             **os.environ,
             "ACTION_ASSISTANT_TOKEN": TOKEN,
@@ -169,7 +169,7 @@ def _client(url: str) -> httpx.Client:
 
 
 def _is_alive(process: psutil.Process) -> bool:
-    """Whether it still holds anything; one that nobody has reaped holds nothing."""
+    """Return whether a process still holds anything; a zombie holds nothing."""
     try:
         return process.status() != psutil.STATUS_ZOMBIE
     except psutil.NoSuchProcess:

@@ -22,8 +22,9 @@ def nginx(
     mistake: tuple[str, str] = ("", ""),
     identity: tuple[Path, Path] | None = None,
 ) -> Iterator[Path]:
-    """It runs inside the block; the file with the certificate that it shows. `mistake`: what is
-    documented, and what stands there instead. `identity`: key and chain, else new ones for the name."""
+    """Run nginx inside the block, and yield the file with the certificate that it shows.
+    `mistake`: the documented text, and its replacement. `identity`: key and chain, else new ones
+    for the name."""
     folder.mkdir()
     key, chain = identity or _identity(folder, name)
     whole = _configured(folder, (key, chain), (name, port, editor), mistake)

@@ -32,7 +32,7 @@ def until(what: str, true: Callable[[], Any], seconds: float = 40) -> None:
 
 
 def browser(product: Product, name: str) -> httpx.Client:
-    """Somebody's session, at the runner."""
+    """Return an HTTP client of the runner with the session of a person."""
     body = {"token": TOKEN, "name": name}
     answer = httpx.post(
         f"{product.url}/api/session", json=body, headers={"origin": product.url}, trust_env=False
@@ -65,6 +65,6 @@ def real_engine(
 
 
 def answers(runner: httpx.Client, name: str) -> bool:
-    """Whether the robot of that name answers the runner."""
+    """Return whether the robot of that name answers the runner."""
     robots = {each["name"]: each for each in runner.get("/api/robots").json()}
     return robots.get(name, {}).get("state") == "answering"

@@ -55,14 +55,15 @@ def unpacked(folder: Path) -> Path:
 
 @cache
 def facts(name: str) -> dict[str, Any]:
-    """What a folder says of its recordings, and the actions in them."""
+    """Return the facts of a folder about its recordings, and their actions."""
     path = family(name) / "facts.json"
     found: dict[str, Any] = json.loads(path.read_text()) if path.exists() else {}
     return found
 
 
 def calls_of(name: str, action: str, inputs: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What an action does in each of its calls, as the folder's facts tell it from its inputs."""
+    """Return the behaviour of an action in each of its calls, from the folder's facts and its
+    inputs."""
     known = facts(name)["actions"]
     does = {field: _given(value, inputs) for field, value in known.get(action, known["*"]).items()}
     if times := does.pop("times", 0):
@@ -108,7 +109,8 @@ def engine_runs() -> dict[str, Path]:
 
 
 def runs_of(folder: Path, name: str) -> list[list[dict[str, Any]]]:
-    """What happened in each run; in an engine with the bypass repaired where there are such."""
+    """Return the events of each recorded run; of an engine with the bypass repaired where there
+    are such."""
     repaired = sorted((folder / "bypass_fixed").glob(f"{name}.trace*.jsonl"))
     paths = repaired or sorted(folder.glob(f"{name}.trace*.jsonl"))
     return [lines(path) for path in paths]
@@ -121,7 +123,7 @@ def lines(path: Path) -> list[dict[str, Any]]:
 
 
 def pack(archive: Path, files: list[Path]) -> None:
-    """The same files make the same bytes, whoever packs them and when."""
+    """Pack files so that the same files always make the same bytes."""
     contents: dict[str, bytes] = {}
     if archive.exists():
         with tarfile.open(archive) as tar:

@@ -25,7 +25,7 @@ def fill(
 
 
 def value(column: Column[Any], n: int) -> Any:
-    """Something that fits a column, and that no other row has."""
+    """Return a value that fits a column, and that no other row has."""
     kind = column.type.as_generic().python_type
     values = {int: n, str: f"{column.name} {n}", bytes: bytes([n, 0, 255]), bool: n == 1}
     return {"n": n} if isinstance(column.type.as_generic(), JSON) else values.get(kind, float(n))

@@ -1,4 +1,4 @@
-"""Which tests were skipped and why, and which of those CI accepts: `tests/skips.toml`."""
+"""Lists skipped tests with their reasons, and those that CI accepts: `tests/skips.toml`."""
 
 import tomllib
 from collections import Counter
@@ -11,12 +11,12 @@ LIST = Path(__file__).parents[1] / "skips.toml"
 
 
 def accepted() -> dict[str, str]:
-    """How an accepted reason begins, and why it is accepted."""
+    """Return the accepted beginnings of reasons, and why they are accepted."""
     return {each["reason"]: each["why"] for each in tomllib.loads(LIST.read_text())["skip"]}
 
 
 def reasons(reports: Iterable[pytest.TestReport | pytest.CollectReport]) -> Counter[str]:
-    """How often each reason was given; a file that was skipped as a whole counts once."""
+    """Return how often each reason was given; a file that was skipped as a whole counts once."""
     found: Counter[str] = Counter()
     for report in reports:
         told = report.longrepr
@@ -26,7 +26,7 @@ def reasons(reports: Iterable[pytest.TestReport | pytest.CollectReport]) -> Coun
 
 
 def closing_line(found: Mapping[str, int]) -> str:
-    """All in one line, the most frequent first."""
+    """Return all reasons in one line, the most frequent first."""
     each = sorted(found.items(), key=lambda pair: (-pair[1], pair[0]))
     number = sum(found.values())
     tests = "1 test was skipped" if number == 1 else f"{number} tests were skipped"

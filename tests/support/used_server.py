@@ -64,7 +64,7 @@ class Guest:
 
     @property
     def headers(self) -> dict[str, str]:
-        """What its requests carry."""
+        """The headers of the person's requests."""
         cookies = "; ".join(f"{name}={value}" for name, value in self.http.cookies.items())
         return {"cookie": cookies, "origin": self.product.url}
 
@@ -83,8 +83,7 @@ class Guest:
 
 
 async def live(product: Product, token: str) -> list[str]:
-    """Everything that people do, in a server that has just been started; links that stay open, as
-    `ID.SECRET`."""
+    """Use a new server as people do, and return the links that stay open, as `ID.SECRET`."""
     with _owner(product.url, token) as editor, _owner(product.runner_url, token) as runner:
         links = {
             label: editor.post("/api/invitations", json={"role": role, "label": label}).json()
@@ -176,7 +175,7 @@ def says(runner: httpx.Client, run: str, what: str) -> bool:
 
 
 def answers(product: Product, token: str) -> dict[str, Any]:
-    """What the server says about all that it holds, by the path that was asked."""
+    """Return the server's answers about all that it holds, by path."""
     with _owner(product.url, token) as editor, _owner(product.runner_url, token) as runner:
         return {path: _plain(path, body) for path, body in _asked(editor, runner)}
 
@@ -206,7 +205,8 @@ def _asked(editor: httpx.Client, runner: httpx.Client) -> Iterator[tuple[str, An
 
 
 def _plain(path: str, body: Any) -> Any:
-    """Without what depends on where the server is, and on who has been there since it started."""
+    """Return a body without the parts that depend on the server's address and on who has been
+    there."""
     if path == "/api/invitations":
         return body["invitations"]
     if path == "/api/people":
@@ -215,7 +215,8 @@ def _plain(path: str, body: Any) -> Any:
 
 
 def differences(old: Any, new: Any, where: str = "") -> Iterator[str]:
-    """Where an answer lacks what it had, or says otherwise; what was added since is no difference."""
+    """Return the places where the new answer lacks or changes a value; additions are no
+    difference."""
     if isinstance(old, dict) and isinstance(new, dict):
         for key in old:
             if key not in new:

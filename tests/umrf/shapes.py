@@ -53,7 +53,7 @@ def dead_chain(count: int) -> dict[str, Any]:
 
 
 def loop(count: int) -> dict[str, Any]:
-    """All in one circle, every way back required."""
+    """Return a graph in one circle, in which every way back is required."""
     names = _names(count)
     actions = [_action(n, [names[i - 1]], [names[(i + 1) % count]]) for i, n in enumerate(names)]
     return _file(actions, names[:1], names[-1:])

@@ -1,4 +1,4 @@
-"""What `check` blocks of real graphs and of recorded ones, and what the engine does with just those.
+"""`check` blocks some real and recorded graphs, and the engine fails at exactly those.
 
 `blocked.json` names every blocked graph with its codes, the engine's behaviour and the evidence.
 """

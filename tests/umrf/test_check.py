@@ -369,7 +369,8 @@ def accepted() -> list[Path]:
 
 @pytest.mark.skipif(not accepted(), reason=NO_CORPUS)
 def test_real_graphs_that_the_engine_reads_are_blocked_for_what_it_does_then() -> None:
-    """Only for hazards that its source or a recording shows, never for what it would refuse."""
+    """Errors are only hazards that the engine's source or a recording shows, never refusals of
+    its parser."""
     certain = {"H1", "H2", "H2b", "H7", "H8", "H12", "actors"}
     for path in accepted():
         reading = read(path.read_bytes())

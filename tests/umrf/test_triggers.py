@@ -1,5 +1,5 @@
-"""No action begins in a graph that has left RUNNING, and in which nothing moved, unless it was said that
-it may be loading."""
+"""No action begins in a graph that has left RUNNING and does not move, unless it was named as
+possibly loading."""
 
 import itertools
 from collections.abc import Mapping

@@ -28,14 +28,14 @@ class Keyed(Product):
 
     @property
     def environment(self) -> dict[str, str]:
-        """Without the token."""
+        """Return the environment of commands, without the token."""
         found = {**super().environment}
         del found["ACTION_ASSISTANT_TOKEN"]
         return found
 
     @property
     def token(self) -> str:
-        """What the folder has."""
+        """Return the token that the data folder holds."""
         return (self.data / "token").read_text().strip()
 
 
@@ -62,7 +62,7 @@ def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
 
 
 async def events(url: str, data: Path) -> tuple[list[Event], list[Event]]:
-    """Everything in both journals, which have to be sound."""
+    """Return all events of both journals, which have to be sound."""
     found = []
     for branch, place, fold in (
         ("editor", url, h.fold),

@@ -1,4 +1,4 @@
-"""What a database has in its schema that this program has not made is dropped or refused, in words."""
+"""Foreign parts of a database's schema are dropped or refused, and named."""
 
 import hashlib
 import itertools

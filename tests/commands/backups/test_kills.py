@@ -50,7 +50,7 @@ def killed(after: float, *arguments: "str | Path") -> None:
 
 
 def sound(folder: Path) -> dict[str, int]:
-    """How many events each journal holds, all of which are sound."""
+    """Return how many events each journal holds; each of them has to be sound."""
     found = {}
     for branch in ("editor", "runner"):
         path = folder / f"{branch}.db"

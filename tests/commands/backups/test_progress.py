@@ -1,4 +1,4 @@
-"""What takes longer than a second says how far it has come, and what is quick says nothing."""
+"""Work of more than a second reports its progress; quick work reports nothing."""
 
 import pytest
 

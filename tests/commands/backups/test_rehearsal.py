@@ -33,7 +33,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def changed(file: Path, target: Path, *commands: str) -> Path:
-    """The same backup with another editor's journal, whose sums are right."""
+    """Return the same backup with a changed journal of the editor, whose sums are right."""
     with zipfile.ZipFile(file) as packed:
         parts = {name: packed.read(name) for name in packed.namelist()}
     journal = target.with_suffix(".db")

@@ -262,7 +262,7 @@ def contents(data: Path) -> dict[str, bytes]:
 
 
 def put(staged: Path, data: Path, file: Path, url: str, dies_at: int) -> None:
-    """In a process of its own: put into its place what was unpacked and proven, and die at a step."""
+    """Put the unpacked and proven parts into place, in a process that dies at step `dies_at`."""
     steps = iter(range(1, sys.maxsize))
 
     def dies(before: Callable[..., Any]) -> Callable[..., Any]:
@@ -334,7 +334,7 @@ BOTH: Final = ("editor", "runner")
 
 
 def unpacked(file: Path, folder: Path) -> Path:
-    """What `restore` has beside its place before it puts anything there."""
+    """Return the folder that `restore` prepares before it puts anything into place."""
     folder.mkdir()
     package = Package(file)
     package.unpack(folder, Progress())

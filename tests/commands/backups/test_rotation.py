@@ -1,4 +1,4 @@
-"""Which backups stay: the newest of each of so many days, weeks and months."""
+"""The rotation keeps the newest backup of each of so many days, weeks and months."""
 
 from datetime import UTC, datetime, timedelta
 from pathlib import Path

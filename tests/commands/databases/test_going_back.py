@@ -68,7 +68,7 @@ class Upgraded(NamedTuple):
 
 
 def stored(connection: Connection) -> dict[str, Any]:
-    """All rows of all tables, but who wrote."""
+    """Return all rows of all tables except `written_by`."""
     names = set(inspect(connection).get_table_names()) - {"written_by"}
     return contents(connection, sorted(names))
 
@@ -97,7 +97,8 @@ def goes_on(data: Path, url: str) -> None:
 
 
 def with_a_log(there: Upgraded, data: Path) -> Upgraded:
-    """As a server leaves it that was killed: its last commits are in the log beside the file."""
+    """Copy the data folder as a killed server leaves it: its last commits are in the write-ahead
+    log."""
     shutil.copytree(there.data, data)
     there = there._replace(data=data, copy=data / there.copy.relative_to(there.data))
     path = data / "editor.db"
@@ -127,7 +128,7 @@ class Child:
         assert self.process.stdout.readline() == b"ready\n"
 
     def go(self, kill_after: float | None = None) -> int:
-        """How many steps it took; 0 when it was killed."""
+        """Return how many steps the command took; 0 when it was killed."""
         pipe = self.process.stdin
         assert pipe is not None
         pipe.write(b"\n")
@@ -200,7 +201,7 @@ def test_killed_anywhere_a_server_has_what_was_or_what_shall_be(
 
 
 def refused(there: Upgraded, *more: "str | Path") -> str:
-    """What it says when it changes nothing."""
+    """Return the message of `migrate --back`, which has to change nothing."""
     before = set(there.data.glob("*[!ml]"))  # without -shm and -wal of what was only read
     done = subprocess.run(
         [*COMMAND, "migrate", "--back", there.copy, "--data", there.data, *more],
@@ -218,7 +219,7 @@ def refused(there: Upgraded, *more: "str | Path") -> str:
 def test_while_somebody_else_has_the_file_open_nothing_is_put_back(
     tmp_path: Path, begin: str
 ) -> None:
-    """What waits in the log beside it would be lost to a file from which the log is taken."""
+    """Rows in the write-ahead log would be lost if the file were replaced."""
     there = upgraded(tmp_path / "data")
     path, late = there.data / "editor.db", "INSERT INTO person VALUES (?, 'Late', 1)"
     with closing(sqlite3.connect(path, isolation_level=None)) as writer:
@@ -269,7 +270,7 @@ def test_a_file_that_is_elsewhere_is_put_back_too(tmp_path: Path, scheme: str) -
 
 
 def test_an_older_version_puts_nothing_back_on_a_server(tmp_path: Path, postgres: Server) -> None:
-    """It does not know all tables that it would have to take away."""
+    """The older version does not know all tables that it would have to remove."""
     there = upgraded(tmp_path / "data", postgres.new_database())
     newer = text("UPDATE alembic_version SET version_num = 'editor_9999'")
     database_of(there.url).migrate(lambda c: c.execute(newer))

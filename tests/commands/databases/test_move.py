@@ -40,7 +40,7 @@ def move(data: Path, to: str) -> "subprocess.CompletedProcess[str]":
 
 
 def events(url: str) -> list[tuple[Any, ...]]:
-    """All of them, with their chain."""
+    """Return all events with their chain."""
     chosen = select(editor_event).order_by(editor_event.c.position)
     return ask_once(url, lambda c: [tuple(row) for row in c.execute(chosen)])
 
@@ -66,7 +66,7 @@ def made(data: Path, graphs: int = 40) -> Path:
 
 
 class Writers:
-    """So many people who make graphs and rename them, and what was confirmed to them."""
+    """Several people who make and rename graphs, and the names that were confirmed to them."""
 
     def __init__(self, product: Product) -> None:
         self.confirmed: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""What `doctor` can name: each code is explained to people, planted by a test, and told with a remedy."""
+"""Each code of `doctor` is documented, caused by a test, and reported with a remedy."""
 
 import re
 from pathlib import Path

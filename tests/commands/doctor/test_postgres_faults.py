@@ -54,7 +54,7 @@ def test_one_that_loses_what_it_confirms_is_named(data: Path, server: Server) ->
 
 
 def until(data: Path, code: str):  # type: ignore[no-untyped-def]
-    """What is wrong, once the server has read its settings."""
+    """Return the one fault that `doctor` finds once Postgres has read its settings."""
     deadline = time.monotonic() + 10
     while not (found := faults(data)) and time.monotonic() < deadline:
         time.sleep(0.1)

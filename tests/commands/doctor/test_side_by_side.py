@@ -35,5 +35,5 @@ def test_robots_are_asked_while_disks_are_looked_at(
 def _with_checks(
     checks: list[Check], place: Installation, others: Iterable[Check] = (), seconds: float = 10.0
 ) -> Iterator[Diagnostic]:
-    """As `examine`, with these checks instead of those of a machine."""
+    """Run `examine` with these checks instead of those of a machine."""
     return examine(place, others or checks, seconds)

@@ -62,7 +62,7 @@ def changed(draw: st.DrawFn, before: tuple[str, dict[Any, str]]) -> tuple[str, d
 
 
 def fields(action: tuple[str, dict[Any, str]]) -> dict[str, Any]:
-    """As a file has them."""
+    """Return an action's fields as a file has them."""
     found: dict[str, Any] = {"description": action[0]} if action[0] else {}
     for (side, group, key), kind in action[1].items():
         at = found.setdefault(side, {})
@@ -71,7 +71,7 @@ def fields(action: tuple[str, dict[Any, str]]) -> dict[str, Any]:
 
 
 class Developer:
-    """Somebody who writes marks into files, and knows which must be there."""
+    """A developer who writes marks into files, and knows which must still be there."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -97,7 +97,7 @@ class Developer:
         self.marks[path] = {each for each in known if each in lines}
 
     def prove_nothing_is_lost(self) -> None:
-        """All marks are there, and what was deleted is not."""
+        """Check that all marks are there, and that deleted files are not."""
         for path, marks in self.marks.items():
             assert marks <= set((self.folder / path).read_text().split("\n")), path
         assert not any((self.folder / path).exists() for path in self.deleted)

@@ -32,12 +32,12 @@ def service(tmp_path: Path) -> Service:
 
 @pytest.fixture
 def unit(tmp_path: Path) -> Path:
-    """Where the unit is in it."""
+    """Return the path of the unit below the root `tmp_path`."""
     return tmp_path / "etc" / "systemd" / "system" / "action-assistant.service"
 
 
 def wanted(unit: Path) -> bool:
-    """Whether it starts with the computer."""
+    """Return whether the unit starts with the computer."""
     return (unit.parent / "multi-user.target.wants" / unit.name).is_symlink()
 
 

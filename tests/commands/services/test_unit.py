@@ -29,7 +29,7 @@ PROGRAM = (shutil.which("true") or "/bin/true",)
 
 
 def plan(scope: Scope = "system", **more: object) -> ServicePlan:
-    """What a service is to run."""
+    """Return a plan of a service, with these values changed."""
     user = "daemon" if scope == "system" else ""
     settings = Path("/etc/action-assistant/environment")
     known = {"scope": scope, "program": PROGRAM, "user": user, "settings": settings, **more}
@@ -37,7 +37,7 @@ def plan(scope: Scope = "system", **more: object) -> ServicePlan:
 
 
 def read_by_systemd(text: str, scope: Scope, folder: Path, *words: str) -> str:
-    """What systemd complains about, or says."""
+    """Return the complaints of systemd about this unit, or its output."""
     (folder / NAME).write_text(text)
     manager = ["--user"] if scope == "user" else []
     # Units of others have sockets there, whose paths must be short.

@@ -103,7 +103,8 @@ def _child(steps: Steps, folder: Path, url: Any, headers: Any, *, links: bool) -
 
 
 def no_link(*_: Any, **__: Any) -> None:
-    """What hard links are where there are none, as on FAT and in folders that a virtual machine shares."""
+    """Fail as `os.link` does without hard links: on FAT, and in folders that a virtual machine
+    shares."""
     raise PermissionError(errno.EPERM, os.strerror(errno.EPERM))
 
 

@@ -66,7 +66,7 @@ class Place:
         return found
 
     def server_text(self) -> bytes:
-        """What the graph is now."""
+        """Return the present text of the graph on the server."""
         return self.http.get(f"/api/graphs/{self.graph}/umrf").content
 
 
@@ -179,7 +179,7 @@ def test_a_file_that_cannot_be_read_is_named_with_its_place_and_left(place: Plac
 def test_nothing_that_anybody_wrote_is_lost(
     place: Place, seed: int, links: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Somebody writes into the file between any two steps of a round."""
+    """A person writes into the file between any two steps of a round."""
     file = place.folder / f"pair{ENDING}"
     file.write_bytes(_text())
     place.round()
@@ -230,7 +230,7 @@ def test_nothing_that_anybody_wrote_is_lost(
 
 
 def _watch(monkeypatch: pytest.MonkeyPatch, meanwhile: Callable[[], None], links: bool) -> None:
-    """Something happens before each step that a round does to files."""
+    """Call `meanwhile` before each step in which a round moves files."""
     if not links:
         monkeypatch.setattr(os, "link", no_link)
     for move in _MOVES:
@@ -257,7 +257,7 @@ def _unwatched(
 
 
 def _all_texts(place: Place) -> str:
-    """Everything that was ever stored, there and here."""
+    """Return all texts that were ever stored, on the server and in the folder."""
     graph = place.graph
     newest = place.http.get(f"/api/graphs/{graph}").json()["seq"]
     moments = [
@@ -347,7 +347,7 @@ def test_a_round_that_ends_at_any_step_loses_nothing_and_the_next_ones_finish_it
 def _judge(
     place: Place, change: Callable[[Place, Path], None], left: list[str], theirs: dict[str, bytes]
 ) -> None:
-    """Everything is in step, once; what cannot be is a conflict."""
+    """Check that both sides are in step after one round, and that each conflict is reported."""
     graphs = {each["name"]: each["id"] for each in place.http.get("/api/graphs").json()}
     names = sorted(path.name for path in place.folder.iterdir() if path.name[0] != ".")
     is_conflict = change is _changed_on_both_sides_alike

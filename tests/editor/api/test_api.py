@@ -326,7 +326,7 @@ def test_a_preview_says_what_a_file_would_become_and_stores_nothing(http: httpx.
 
 
 def direction_of(http: httpx.Client, graph: dict[str, Any]) -> str | None:
-    """Which direction the file of a graph says."""
+    """Return the direction that the file of a graph has."""
     umrf = http.get(f"/api/graphs/{graph['id']}/umrf").json()
     found: str | None = umrf.get("gui_attributes", {}).get("action_assistant", {}).get("direction")
     return found

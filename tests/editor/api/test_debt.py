@@ -1,4 +1,4 @@
-"""Who is far beyond the rate limits is not heard by a new socket either."""
+"""A person who is far beyond the rate limits is not read on a new socket either."""
 
 import asyncio
 from typing import Any
@@ -20,14 +20,14 @@ SECOND = PER_MINUTE // 60  # bytes
 
 
 def talk_of(room: Room, owed: float) -> RoomConnection:
-    """Of somebody who would have to wait for so many seconds."""
+    """Return the connection of a person who has to wait `owed` seconds."""
     limits = ByteRateLimits(limits=True, clock=lambda: 0.0)
     limits.spend("eve", AT_ONCE + int(owed * SECOND))
     return RoomConnection(room, Member(Person("eve", "Eve"), edits=False, acks=False), limits)
 
 
 class Socket:
-    """In the place of one that can be taken over: notes when it was heard."""
+    """Stands for a socket that can be taken over, and notes when it was held."""
 
     is_writable = True
 
@@ -51,11 +51,12 @@ class Socket:
         return True
 
     def let_go(self) -> None:
-        """Nothing to let go of."""
+        """Do nothing: there is nothing to release."""
 
 
 async def held_for(rooms: Rooms, owed: float, seconds: float) -> tuple[bool | None, bool]:
-    """Whether a socket is held when it is taken over, and whether it still is after these seconds."""
+    """Return whether a socket is held when it is taken over, and whether it still is after
+    `seconds`."""
     socket: Any = Socket()
     async with rooms.enter(STREAM) as room:
         talk = talk_of(room, owed)
@@ -74,7 +75,7 @@ async def test_a_socket_that_is_taken_over_is_held_from_the_beginning(rooms: Roo
 
 
 async def heard(rooms: Rooms, owed: float, seconds: float) -> int:
-    """How often a server was asked for what the client says."""
+    """Return how often the connection asked the server for a message."""
     asked = 0
 
     async def receive() -> Any:

@@ -141,7 +141,7 @@ def close_code(raw: socket.socket) -> int:
 
 
 def frames(answer: bytes) -> bytes | None:
-    """What the frame that closes says, if it has come."""
+    """Return the payload of the close frame; None when no close frame has come."""
     at = 0
     while len(answer) >= at + 2 and (size := answer[at + 1]) < 126:
         if answer[at] == 0x88:

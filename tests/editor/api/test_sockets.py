@@ -25,7 +25,7 @@ async def eventually(holds: Any) -> None:
 
 
 async def got(http: httpx.Client, path: str, **query: int) -> httpx.Response:
-    """What the editor answers."""
+    """Return the editor's answer to a GET."""
     return await asyncio.to_thread(http.get, path, params=query)
 
 
@@ -193,7 +193,8 @@ async def test_nobody_stays_in_a_graph_that_is_deleted_while_they_come(
     editor: Editor, http: httpx.Client, graph: str
 ) -> None:
     async def come(after: float) -> int:
-        """How it ended: the status of the refusal, or the code of the close."""
+        """Connect after `after` seconds, and return the refusal's status or the code of the
+        close."""
         await asyncio.sleep(after)
         try:
             async with editor.socket(graph) as session:

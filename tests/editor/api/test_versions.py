@@ -1,4 +1,4 @@
-"""What people say of a version is kept with it."""
+"""Notes on a version are kept with it."""
 
 import json
 from typing import Any
@@ -49,7 +49,7 @@ def described(characters: int, actions: int = 40) -> bytes:
 
 
 def admitted_by_runner(version: dict[str, Any]) -> Admitted:
-    """What the runner says of a version as the page sends it."""
+    """Return the runner's verdict on a version as the page sends it."""
     inside = tuple(
         SentSubgraph(
             name=each["name"],

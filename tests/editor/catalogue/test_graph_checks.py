@@ -62,7 +62,7 @@ async def made(services: EditorServices, *file: Any, **more: Any) -> str:
 
 
 async def rewritten(services: EditorServices, graph: str, graph_file: bytes) -> None:
-    """Somebody draws something else there."""
+    """Draw something else in the graph, as a person would."""
     async with services.rooms.enter(graph_stream(graph)) as room:
         state = await room.read(lambda replica, _: replica.doc.get_update())
         then = document_edits.first(codec.read(graph_file).graph)
@@ -185,7 +185,7 @@ async def test_there_is_a_bound_on_what_is_looked_at_inside(
 
 
 def pinned(version: VersionView) -> Any:
-    """What never changes of a version, proven by its own digests."""
+    """Return the parts of a version that never change, proven by its own digests."""
     inside = version.subgraphs or ()
     for each in inside:
         assert digest(codec.read(bytes(each.umrf)).graph) == each.digest
@@ -250,7 +250,7 @@ class Steps:
         await self.services.catalogue.recover(graph, "ada")
 
     async def compare(self) -> None:
-        """What is remembered is what somebody finds who has seen nothing yet."""
+        """Check that cached results equal those of a service that has cached nothing."""
         journal, rooms = self.services.journal, self.services.rooms
         fresh = GraphChecks(journal, rooms, GraphReader(journal, rooms))
         await fresh.names.refresh()

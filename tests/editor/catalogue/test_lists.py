@@ -1,4 +1,4 @@
-"""What the list of graphs says of each: robots, labels, and who is in it now."""
+"""The list of graphs shows robots, labels and present people of each graph."""
 
 import asyncio
 import json

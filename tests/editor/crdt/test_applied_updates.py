@@ -1,4 +1,5 @@
-"""What the CRDT library does with an update beyond what it says: refused, or its document given up."""
+"""An update that the CRDT library applies otherwise than it reports is refused, or its document
+is given up."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""How long a document takes to be opened: what is assumed until it is measured is never too little."""
+"""The assumed opening time of a document is never too small until the time is measured."""
 
 from hypothesis import given
 from hypothesis import strategies as st

@@ -113,7 +113,7 @@ BYTES: Final = {
 
 
 def faults(cases: Sequence[Case]) -> list[str | None]:
-    """What is wrong with each, for Yjs. Skips where there is none."""
+    """Return the error of Yjs for each case, or None. Skips the test where there is no Yjs."""
     fetched = FRONTEND.parent / ".node" / "bin" / "node"  # by scripts/with-node
     node = str(fetched) if fetched.exists() else shutil.which("node")
     if node is None or not (FRONTEND / "node_modules" / "yjs").is_dir():
@@ -141,7 +141,7 @@ def faults(cases: Sequence[Case]) -> list[str | None]:
 
 
 def known_of(replica: Replica) -> dict[int, int]:
-    """How many clocks it has of each client."""
+    """Return the clock of each client that a replica has seen."""
     return clocks(replica.doc.get_state())
 
 
@@ -169,7 +169,7 @@ def test_text_that_is_no_utf_8_is_refused(name: str) -> None:
 
 
 def test_a_page_does_fail_at_what_is_refused() -> None:
-    """At the update itself, or at what the library makes of it."""
+    """Yjs fails at the update itself, or at the state that the library makes of it."""
     cases: list[Case] = []
     for update in POISONS.values():
         doc: Doc[Any] = Doc()
@@ -195,8 +195,8 @@ def test_a_page_applies_what_clients_write_and_what_is_made_of_it() -> None:
 
 
 def sessions(chance: random.Random, count: int) -> list[Case]:
-    """What pages hear of rooms in which somebody says anything that might be taken; each is a page that
-    is there, and one that comes later."""
+    """Return the updates that pages receive from rooms with random senders, for pages that are
+    there and for pages that come later."""
     whole, updates = base()
     cases: list[Case] = []
     while len(cases) < 2 * count:

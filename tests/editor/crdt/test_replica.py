@@ -1,4 +1,4 @@
-"""What a replica says of updates that bring nothing but deletions, and that it is freed."""
+"""A replica reports updates that only delete, and is freed afterwards."""
 
 import weakref
 from typing import Any

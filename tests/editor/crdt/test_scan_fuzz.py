@@ -44,7 +44,8 @@ def base() -> tuple[bytes, list[bytes]]:
 
 
 def devoured(start: bytes, updates: list[bytes]) -> list[tuple[str, float, float]]:
-    """What becomes of updates in a process of its own. Fails where the process dies."""
+    """Return the results of updates that a separate process applied. Fails where that process
+    dies."""
     run = subprocess.run(
         [sys.executable, "-m", "editor.apply_updates"],
         input="\n".join(update.hex() for update in (start, *updates)),
@@ -65,7 +66,7 @@ def devoured(start: bytes, updates: list[bytes]) -> list[tuple[str, float, float
 
 
 def mutated(chance: random.Random, update: bytes, other: bytes) -> bytes:
-    """Something like an update."""
+    """Return a random mutation of an update."""
     forged = bytearray(update)
     for _ in range(chance.randint(1, 4)):
         place = chance.randrange(len(forged))

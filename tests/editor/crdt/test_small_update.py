@@ -23,7 +23,7 @@ keys = st.text(max_size=140) | st.sampled_from(["a", "a|b", "ü|"])
 
 
 def said(update: bytes) -> UpdateOutline | None:
-    """What the scanner says; None for what it refuses."""
+    """Return the scanner's outline; None for an update that it refuses."""
     try:
         return scanned(update)
     except Malformed:
@@ -31,7 +31,7 @@ def said(update: bytes) -> UpdateOutline | None:
 
 
 def agree(update: bytes) -> bool:
-    """Whether the short cut had something to say. Fails where the scanner says something else."""
+    """Return whether the short cut read this update. Fails where the scanner reads it otherwise."""
     read = small_outline(update)
     assert read is None or read == said(update), update.hex()
     return read is not None
@@ -85,7 +85,8 @@ def test_every_byte_of_a_small_update_matters_to_both() -> None:
 
 
 def drags() -> list[bytes]:
-    """What a page sends most: a key for the first time, again, several at once, and its end."""
+    """Return updates as pages send them most: a first value, a new value, several at once, a
+    deletion."""
     doc: Doc[Any] = Doc(client_id=2**30 + 7)
     things = doc.get("positions", type=Map)
 

@@ -25,7 +25,7 @@ Change = Callable[[sqlite3.Connection], Any]
 
 
 def proof(database: sqlite3.Connection, seq: int, state: bytes) -> bytes:
-    """What ties a state to the event it claims to be made at; also for a wrong state."""
+    """Return the proof that ties a state to the event of its moment; also for a wrong state."""
     (body,) = database.execute("SELECT body FROM event WHERE seq = ?", (seq,)).fetchone()
     return hashlib.sha256(hashlib.sha256(body).digest() + state).digest()
 
@@ -80,7 +80,7 @@ async def written(path: Path) -> None:
 
 
 def held(loaded: Loaded) -> tuple[Any, ...]:
-    """Everything that a document knows."""
+    """Return all that a loaded document knows."""
     replica = loaded.replica
     things = replica.doc.get("things", type=Map).to_py()
     state = replica.doc.get_state()
@@ -113,7 +113,7 @@ async def test_whatever_became_of_the_snapshot_the_document_is_the_same(
 
 
 def later_edits(count: int) -> list[bytes]:
-    """So many updates of one client, each of which waits for the one before it."""
+    """Return `count` updates of one client, each of which waits for the one before it."""
     doc, made = Doc[Any](), list[bytes]()
     subscription = doc.observe(lambda event: made.append(event.update))
     for n in range(count):

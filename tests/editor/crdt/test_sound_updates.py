@@ -1,4 +1,4 @@
-"""What is read of sound updates only in part makes the same document as what is read as a whole."""
+"""A partial reading of sound updates makes the same document as a complete one."""
 
 import random
 import sqlite3
@@ -46,7 +46,7 @@ class History:
             doc.observe(lambda event: self.made.append(event.update))
 
     def step(self) -> None:
-        """Somebody edits, after hearing of what the others did, or without."""
+        """Edit as a random person, who has received the others' updates or has not."""
         who = self.chance.randrange(3)
         if self.chance.random() < 0.5:
             for kind, _, body in self.rows[self.heard[who] :]:
@@ -96,7 +96,7 @@ class History:
                 self.take(author, merge_updates(*bodies))
 
     def take(self, author: str, update: bytes) -> None:
-        """As rooms do: what lacks something earlier is told as such."""
+        """Store an update as rooms do: one that lacks an earlier one is stored as deferred."""
         waits = self.room.take(update, author) is UpdateEffect.WAITS
         self.rows.append((DEFERRED if waits else UPDATED, author, update))
 
@@ -107,7 +107,7 @@ def columns(rows: list[tuple[str, str, bytes]], first: int = 1) -> EventColumns:
 
 
 def known(folded: Folded | None) -> Any:
-    """All that a document knows, in comparable form."""
+    """Return all that a folded document knows, in comparable form."""
     if folded is None:
         return None
     if not folded.document:
@@ -185,7 +185,7 @@ def url(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 
 async def aside(work: Callable[..., Any], /, *args: Any) -> Any:
-    """As a worker would."""
+    """Run the work here, in place of a worker."""
     return work(*args)
 
 

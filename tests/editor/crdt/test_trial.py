@@ -40,7 +40,7 @@ class Troubled:
 async def edited(
     journal: Journal, run_in_worker: Troubled | Lane, update: bytes
 ) -> AsyncIterator[Member]:
-    """Somebody's socket after such an update, and somebody else who goes on."""
+    """Let one person send the update and another one go on, and return the sender's member."""
     rooms = Rooms(journal, linger=60, window=0, tried=run_in_worker)
     ada, eve = Client("ada"), Client("eve")
     async with rooms.enter("graph/g") as room:

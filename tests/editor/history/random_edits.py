@@ -20,7 +20,7 @@ _RESPONSES: Final = ("run", "stop", "ignore")
 
 
 class Person:
-    """Somebody with a document of their own."""
+    """A person with a document of their own."""
 
     def __init__(self, name: str, dice: random.Random) -> None:
         self.name = name
@@ -52,7 +52,7 @@ class Person:
         return sorted(key for key in self.map("actions") if "|" not in key)
 
     def some_action(self) -> str | None:
-        """One of them."""
+        """Return one of the actions at random, or None."""
         return self._dice.choice(actions) if (actions := self.actions()) else None
 
     def number(self) -> int:
@@ -68,7 +68,7 @@ class Person:
         return self._dice.randrange(10**9)
 
     def one_of(self, values: tuple[str, ...]) -> str:
-        """One of them."""
+        """Return one of the values at random."""
         return self._dice.choice(values)
 
 
@@ -133,7 +133,7 @@ def _describe(me: Person) -> None:
 
 
 def _again(me: Person) -> None:
-    """What changes nothing to see."""
+    """Write the present description again."""
     me.map("meta")["description"] = me.map("meta").get("description", "")
 
 

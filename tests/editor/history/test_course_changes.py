@@ -72,7 +72,7 @@ class Past:
                 self.map("meta")["name"] = str(self.dice.random())
 
     def answer(self, response: str, n: int | None = None) -> None:
-        """What follows from the end of the action that runs as the third, or as another."""
+        """Change the response to the end of the third action, or of another one."""
         arrows = sorted(k for k in self.map("relations") if k.endswith("|on_true"))
         inner = [k for k in arrows if not k.startswith("entry") and ">exit" not in k]
         self.map("relations")[inner[self.dice.randrange(5) if n is None else n]] = response

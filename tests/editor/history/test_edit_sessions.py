@@ -1,4 +1,4 @@
-"""Who did something in one go is told once; others beside them do not break it up."""
+"""Edits of one person in one go are listed once; edits of others do not split them."""
 
 from datetime import UTC, datetime, timedelta
 

@@ -166,8 +166,8 @@ def test_whoever_edits_while_away_each_value_stood_or_is_told_as_overwritten(
 async def test_values_that_people_lose_while_they_edit_a_graph_are_found(
     journal: Journal, rooms: Rooms, seed: int
 ) -> None:
-    """Also where updates overtake each other, and many keys are set at once: a value that is told as
-    overwritten is not what the graph showed before or after it."""
+    """A value listed as overwritten is not the one that the graph showed before or after, also
+    where updates overtake each other and set many keys."""
     held = await edited(rooms, seed, 60)
     events = await journal.read(graph_stream(GRAPH))
     found = _overwritten(events, 1 + random.Random(seed).randrange(9))

@@ -20,7 +20,7 @@ from support.doses import examples
 
 @pytest.fixture
 async def going_back(journal: Journal, rooms: Rooms) -> Restoring:
-    """On a real journal."""
+    """A service for going back, on a real journal."""
     return Restoring(journal, rooms, GraphReader(journal, rooms), ChangeIndex(journal))
 
 

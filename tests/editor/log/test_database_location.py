@@ -18,7 +18,7 @@ from support.product import COMMAND, Product
 
 
 def refused(data: Path, *flags: str) -> str:
-    """What an editor says that does not start."""
+    """Return the message of an editor that refuses to start."""
     product = Product(data, *flags)
     ended = subprocess.run(
         [*COMMAND, "serve", "--data", data, "--port", str(product.port), "--no-open", *flags],

@@ -18,7 +18,7 @@ async def told(session: httpx_ws.AsyncWebSocketSession) -> str:
 
 
 async def entered(editor: Editor, graph: str, query: str) -> tuple[str, int | None]:
-    """Which epoch a socket is told, and with which code it ends if it does."""
+    """Return the epoch that a socket is sent, and the code with which it is closed, if it is."""
     async with editor.socket(graph, f"?{query}") as session:
         epoch = await told(session) if "acks" in query else ""
         if "lives" in query:

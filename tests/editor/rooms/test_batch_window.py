@@ -1,4 +1,4 @@
-"""When rooms act: what people do at the same time goes together, and windows follow how busy the loop is."""
+"""Edits made at the same time go together, and windows follow the load of the loop."""
 
 import asyncio
 import time

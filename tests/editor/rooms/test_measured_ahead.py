@@ -1,4 +1,4 @@
-"""How long a document takes to be opened is measured while there is time for that."""
+"""The opening time of a document is measured while edits go on."""
 
 import asyncio
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""What a socket is sent at once, and what has to wait its turn."""
+"""Some messages are sent to a socket at once; others wait their turn."""
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.member import Member

@@ -130,7 +130,8 @@ async def test_a_silent_socket_hears_something(
 async def test_a_room_that_fails_closes_alone(
     journal: Journal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also over a panic of the library, in the window and the transaction of the others."""
+    """The room fails by a panic of the library too, in the same window and transaction as the
+    others."""
     rooms = Rooms(journal, linger=60, window=0.01)
     ada, bob = Client("ada"), Client("bob")
     async with rooms.enter("graph/bad") as bad, rooms.enter("graph/good") as good:
@@ -166,7 +167,7 @@ async def test_a_room_that_fails_closes_alone(
 
 
 class Panic(BaseException):
-    """As the library's: no Exception."""
+    """An error that is no Exception, like the library's panic."""
 
 
 async def test_a_room_whose_only_visitor_gave_up_while_it_was_loaded_is_let_go(

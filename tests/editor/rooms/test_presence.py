@@ -1,4 +1,4 @@
-"""Who is in a room: the server vouches for names, and for nobody speaking for others."""
+"""The server vouches for the names in a room, and nobody can speak for others."""
 
 import json
 from typing import Any
@@ -154,7 +154,7 @@ async def test_of_many_words_of_one_person_only_the_last_waits(rooms: Rooms) -> 
 async def test_of_several_who_speak_at_once_each_hears_all_and_one_alone_hears_nothing(
     rooms: Rooms,
 ) -> None:
-    """As stock servers have it: to a client its own word is no news."""
+    """Stock servers send a client's own message back to it only together with others' messages."""
     ada, bob, eve = Client("ada"), Client("bob"), Client("eve")
     async with rooms.enter("graph/g") as room:
         for client in (ada, bob, eve):

@@ -1,4 +1,4 @@
-"""What a room refuses, and whom that ends: its sender, and nobody else."""
+"""A refused update closes its sender's socket, and no other one."""
 
 from typing import Any
 

@@ -225,7 +225,7 @@ async def test_a_snapshot_is_made_every_thousand_events_and_changes_nothing(
 async def test_edits_go_on_while_a_snapshot_is_stored(
     journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It is of the moment at which it was begun."""
+    """The snapshot has the state of the moment at which it was begun."""
     monkeypatch.setattr("action_assistant.editor.rooms.housekeeping.SNAPSHOT_EVENTS", 10)
     may_be_stored, stored = asyncio.Event(), asyncio.Event()
     keep = journal.keep_snapshot

@@ -1,4 +1,4 @@
-"""What rooms count for those who watch the editor."""
+"""Rooms count events for the metrics of the editor."""
 
 from prometheus_client import CollectorRegistry
 

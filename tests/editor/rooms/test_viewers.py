@@ -1,4 +1,4 @@
-"""Those who may only look: reading what they send holds nobody up."""
+"""Viewers only read, and their messages delay nobody."""
 
 import asyncio
 from collections.abc import Callable

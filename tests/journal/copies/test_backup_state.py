@@ -1,4 +1,4 @@
-"""What is known of backups: written by several, read by all, and never a reason to fail."""
+"""Several processes write the state of backups, all read it, and no fault in it stops them."""
 
 import threading
 from pathlib import Path

@@ -22,7 +22,7 @@ from journal.servers import Server
 
 @pytest.fixture(params=["from SQLite", "from Postgres"])
 def ways(request: pytest.FixtureRequest, tmp_path: Path, postgres: Server) -> tuple[str, str]:
-    """From where, and to where."""
+    """Return the source and the target of a copy."""
     file = f"sqlite:///{tmp_path / 'one.db'}"
     server = postgres.new_database()
     return (file, server) if request.param == "from SQLite" else (server, file)
@@ -53,7 +53,7 @@ async def filled(url: str, events: int = 300) -> None:
 
 
 async def everything(url: str) -> tuple[list[Event], dict[str, list[Any]]]:
-    """All events and all rows of all tables; the journal has to be sound."""
+    """Return all events and all rows of all tables; the journal has to be sound."""
     journal = await opened(url)
     try:
         assert await journal.verify() == []

@@ -1,4 +1,4 @@
-"""No cause contradicts an event of its run, and what a person did comes first. Random histories."""
+"""No cause contradicts an event of its run, and a person's action comes first. Random histories."""
 
 import re
 from collections.abc import Callable, Sequence

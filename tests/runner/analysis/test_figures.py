@@ -1,4 +1,4 @@
-"""No figure is narrower than what was observed, and what really happened lies inside of each."""
+"""No figure is narrower than the observations, and the truth lies inside each figure."""
 
 import csv
 import io

@@ -176,7 +176,7 @@ def test_a_kill_at_any_step_leaves_every_event_in_the_log_or_in_a_whole_archive(
 
 
 async def told(data: Path) -> dict[str, list[Event]]:
-    """All runs as they are told."""
+    """Return the events of all runs."""
     journal = await opened(data)
     try:
         return await everything(journal, data)
@@ -185,7 +185,7 @@ async def told(data: Path) -> dict[str, list[Event]]:
 
 
 async def told_and_finished(data: Path) -> tuple[dict[str, list[Event]], dict[str, list[Event]]]:
-    """All runs as they are told now, and after the next process has put everything away."""
+    """Return the events of all runs now, and after the next process has archived all old runs."""
     journal = await opened(data)
     try:
         now = await everything(journal, data)

@@ -1,4 +1,4 @@
-"""What a stand-in robot sends, held against what a real engine node sent for the same messages.
+"""An emulated robot sends what a real engine node sent for the same messages.
 
 The recordings (`node/`, see `support/recordings.py`) hold commands, gets and signals with their times;
 the same are given to the stand-in in virtual time. Held against each other is what does not depend on
@@ -53,7 +53,7 @@ def recordings() -> Path:
 
 @pytest.fixture(scope="module")
 def index(recordings: Path) -> EmulatedIndex:
-    """What the recorded engine had indexed; only some recordings have the texts."""
+    """Return the index of the recorded engine; only some recordings have the texts."""
     for told in lines(recordings / FACTS["index"]):
         if told["kind"] == "ready":
             texts = [json.dumps(each) for each in told["graph_jsons_indexed"]]
@@ -62,7 +62,7 @@ def index(recordings: Path) -> EmulatedIndex:
 
 
 def behaviours(graph: dict[str, Any]) -> Iterator[tuple[str, list[dict[str, Any]]]]:
-    """What the recorded actions do follows from their parameters."""
+    """Return the behaviours of the recorded actions, which follow from their parameters."""
     for action in graph["actions"]:
         inputs = {
             name: leaf.get("pvf_value") for name, leaf in action.get("input_parameters", {}).items()
@@ -104,8 +104,8 @@ class Replay:
         return robot
 
     def races(self, at: float) -> bool:
-        """Whether a command or a signal came at the same moment, so that nobody knows what was
-        first."""
+        """Return whether a command or signal came at the same moment, so that their order is not
+        known."""
         others = (each for each in self.lines if each["kind"] in {"sent", "engine"})
         return any(abs(each["t_ms"] - at) < RACE_MS for each in others)
 
@@ -202,8 +202,8 @@ def bare(graph: dict[str, Any]) -> str:
 
 
 def log_lines(lines: Iterator[tuple[float, str]]) -> list[tuple[str, float]]:
-    """What the log said and when, from the first command on, by text: two threads may write at one
-    moment. The words of the JSON library are its own."""
+    """Return the log lines with their times, from the first command on, sorted by text: two
+    threads may write at one moment. The words of the JSON library are left out."""
     return sorted((text.partition("syntax errors: ")[0], at) for at, text in lines if at > -100)
 
 

@@ -1,4 +1,5 @@
-"""In which way a graph as an engine shows it differs from the one that was sent."""
+"""The runner finds the differences between the graph that was sent and the one that an engine
+shows."""
 
 from msgspec.structs import replace
 

@@ -111,7 +111,7 @@ def test_a_link_that_breaks_while_a_graph_of_somebody_else_is_stopped_ends_nothi
 async def test_a_fault_in_what_watches_a_run_is_told_once_and_the_run_still_stops(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Also where it comes again and again, for a while."""
+    """The fault may come again several times."""
     david = Faulty(NEVER)
     left, take = [5], Monitor._take
 
@@ -144,7 +144,7 @@ def test_a_pause_that_cannot_be_sent_is_told_and_the_run_is_stopped_all_the_same
             raise NotSent("nobody listens")
 
         async def resume(self, graph_name: str, continue_from: str = "") -> None:
-            """The same."""
+            """Fail, since nobody listens."""
             raise NotSent("nobody listens")
 
     @virtual

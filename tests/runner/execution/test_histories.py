@@ -85,7 +85,7 @@ class Story:
         self.robot.blind = 0.05
 
     async def live(self, steps: list[tuple[str, Any]]) -> None:
-        """All steps, then everything is well again and has to come to rest."""
+        """Play all steps, then repair everything and wait for rest."""
         async with anyio.create_task_group() as engines:
             self.engines = engines
             self.robot.tasks = engines
@@ -136,7 +136,7 @@ class Story:
                     await self.robot.engine.start(Order(run="theirs", graph=GRAPHS[value], umrf=""))
 
     def make_well(self) -> None:
-        """Nothing is lost any more."""
+        """Stop all losses and delays."""
         self.robot.start_delay, self.robot.old = 0.0, 0.01
         self.robot.loss = self.robot.start_loss = self.harness.journal.slow = 0.0
         self.robot.silent = self.harness.journal.down = False
@@ -176,7 +176,7 @@ class Story:
                 self.false.append(f"{run.state} at {anyio.current_time()}: {now.nodes}")
 
     async def come_to_rest(self) -> None:
-        """Everything works again, and somebody stops everything."""
+        """Repair everything, and stop all runs."""
         self.make_well()
         async with self.harness.runner() as control:
             control.watch(self.judge)
@@ -195,7 +195,7 @@ class Story:
                 self.defiant.add(run.id)
 
     def hold(self) -> None:
-        """What must be true of the whole history."""
+        """Check the properties of the whole history."""
         assert self.false == []
         runs = [each.run for each in self.robot.starts]
         assert len(runs) == len(set(runs))

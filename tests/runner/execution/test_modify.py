@@ -49,7 +49,7 @@ def test_a_change_that_was_not_made_leaves_the_version_that_runs(why: Exception)
         pauses = True
 
         async def modify(self, order: Order, continue_from: str = "") -> None:
-            """Not this one."""
+            """Fail with the given error."""
             raise why
 
     @virtual
@@ -123,13 +123,13 @@ class Changes(Open):
     fault: Exception | None = None
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """It shows the new graph from now on."""
+        """Show the new graph from now on."""
         if self.fault is not None:
             raise self.fault
         self.texts = {order.graph.name: order.umrf}
 
     async def get(self) -> Answer:
-        """As it was when that was asked."""
+        """Return the answer of the moment of the question, after `late_s`."""
         answer = await super().get()
         self.is_asked = True
         await anyio.sleep(self.late_s)

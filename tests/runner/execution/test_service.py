@@ -191,7 +191,7 @@ async def test_a_robot_nobody_knows_and_one_without_a_link_are_refused() -> None
 async def test_what_the_engine_refuses_is_told_as_refused() -> None:
     class Contested(Robot):
         async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-            """Somebody else's start is quicker."""
+            """Start after a stranger's graph has started."""
             await self.engine.start(Order(run="theirs", graph=sequence("busy"), umrf=""))
             await super().start(order, leaves)
 

@@ -1,4 +1,5 @@
-"""What is shown of a run on a robot was seen, live and afterwards alike, however much gets lost."""
+"""The page shows only observed states of a run on a robot, live and afterwards alike, whatever
+gets lost."""
 
 from typing import Any
 
@@ -31,7 +32,7 @@ CALLS = st.fixed_dictionaries(
 
 
 class Witness:
-    """Everything that a link has told, and everything that people were shown."""
+    """Records all that a link has reported, and all that people were shown."""
 
     def __init__(self, place: Place) -> None:
         self.active: set[str] = set()

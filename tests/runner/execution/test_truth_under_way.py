@@ -1,5 +1,5 @@
-"""What is said of a run is not what an older answer told, and what others start is heard by every run
-that it concerns. In virtual time."""
+"""An older answer changes nothing, and each run hears the starts of others that concern it. In
+virtual time."""
 
 import anyio
 import msgspec
@@ -23,7 +23,7 @@ class Overtaken(Open):
         self.slow = True
 
     async def get(self) -> Answer:
-        """As of when it was asked."""
+        """Return the answer of the moment of the question, once 0.8 s late."""
         answer = await super().get()
         if self.slow:
             self.slow = False

@@ -185,7 +185,7 @@ def test_a_file_written_at_the_same_time_is_never_lost(tmp_path: Path) -> None:
 
 @contextmanager
 def little_space() -> Iterator[None]:
-    """No file of this process may grow beyond 1,000 bytes: as on a full disk, nothing more is taken."""
+    """Limit this process's files to 1,000 bytes, as on a full disk."""
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
     try:
@@ -286,7 +286,7 @@ paths = st.builds(
 
 
 def shown(folder: Path) -> dict[str, bytes | str]:
-    """By the paths that people are told."""
+    """Return the files by the paths that people are told."""
     return {shown_path(path): text for path, text in held(folder).items()}
 
 

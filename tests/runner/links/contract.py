@@ -1,4 +1,4 @@
-"""What every link promises, whatever is behind it: a simulator, a stand-in robot or a real engine.
+"""Every link keeps these promises: a simulator, an emulated robot or a real engine.
 
 A promise is a coroutine function over a `Bench`. It works in virtual and in real time, so it waits
 for what must happen and never for a number of seconds to pass.

@@ -1,4 +1,4 @@
-"""What `doctor` says of memory that nodes cannot share, and of robots that are not there."""
+"""`doctor` reports memory that nodes cannot share, and absent robots."""
 
 import os
 import subprocess
@@ -45,7 +45,7 @@ def test_a_container_with_memory_of_its_own_is_told_from_one_that_shares_the_hos
     )
 
     def inside(source: str) -> str:
-        """What is said where engines of containers have mounted memory from this source."""
+        """Return the finding where engines of containers have mounted memory from this source."""
         mount = f'mount -t tmpfs -o size=64m {source} /dev/shm && exec "$0" -c "$1"'
         command = ["unshare", "--mount", "sh", "-c", mount, sys.executable, look]
         answer = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -87,15 +87,15 @@ class Gone:
     standing = Standing(state="gone", why="Nobody answers.")
 
     async def run(self) -> None:
-        """Nothing comes."""
+        """Run without any message."""
 
     def listen(self, hear: object) -> AbstractContextManager[None]:
-        """Nothing is heard."""
+        """Listen without hearing anything."""
         return nullcontext()
 
 
 def looked(monkeypatch: pytest.MonkeyPatch, robots: int, *seen: Candidate) -> list[Diagnostic]:
-    """What is said of so many robots that are not there."""
+    """Return the findings about `robots` absent robots."""
     registered = [Registration(name=f"R{n}", domain=10 + n) for n in range(robots)]
     monkeypatch.setattr(checkup, "ros2_reach", lambda *_: Seen(*seen))
     monkeypatch.setattr(checkup, "_origin", lambda _: "here")

@@ -1,4 +1,4 @@
-"""What every link promises, whatever is behind it."""
+"""Every link keeps the promises of the contract."""
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager

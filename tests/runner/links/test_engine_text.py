@@ -1,4 +1,4 @@
-"""What an engine writes is read; what somebody else writes in its place is refused, with the reason."""
+"""Texts of an engine are read; foreign texts in their place are refused, with the reason."""
 
 import json
 from typing import Any

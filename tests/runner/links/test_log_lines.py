@@ -1,4 +1,4 @@
-"""Which graph a line of an engine's log is about, also where its name has blanks and quotes."""
+"""A line of an engine's log names its graph, also where the name has blanks and quotes."""
 
 import pytest
 

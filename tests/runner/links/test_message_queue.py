@@ -1,4 +1,5 @@
-"""What waits for the event loop: in order, bounded, and commands are not pushed out by anything else."""
+"""The queue of messages for the event loop is ordered and bounded, and no other message pushes
+commands out."""
 
 from action_assistant.runner.links.ros2.message_queue import MessageQueue
 from action_assistant.runner.links.ros2.ros_values import LogLine, OverheardCommand, RosValue

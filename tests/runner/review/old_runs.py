@@ -87,7 +87,7 @@ def archive_store(journal: Journal, data: Path) -> ArchiveStore:
 
 
 async def everything(journal: Journal, data: Path) -> dict[str, list[Event]]:
-    """All runs, wherever they are kept; the journal has to be sound."""
+    """Return the events of all runs, wherever they are kept; the journal has to be sound."""
     assert await journal.verify() == []
     read = archive_store(journal, data).read
     return {run: await read(stream_of(run)) for run in LENGTHS}
@@ -101,7 +101,7 @@ def raw_messages(data: Path) -> set[str]:
 
 
 def put_away(data: Path, dies_at: int) -> None:
-    """In a process of its own: put everything away, and die at the step number `dies_at`."""
+    """Archive all old runs, in a process that dies at step `dies_at`."""
     steps = iter(range(1, sys.maxsize))
 
     def dies(before: Callable[..., Any]) -> Callable[..., Any]:

@@ -359,7 +359,7 @@ def test_any_history_folds_and_so_does_every_beginning_of_it(events: list[RunEve
 
 
 def states_of(path: str, events: list[RunEvent]) -> set[str]:
-    """All that was told of an action; its path names the sub-graph that it is in."""
+    """Return all states that were reported of an action; its path names its sub-graph."""
     graph, _, action = path.rpartition("/")
     seen = [
         fact

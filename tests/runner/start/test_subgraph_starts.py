@@ -130,7 +130,7 @@ async def test_a_stop_reaches_what_is_inside() -> None:
 
 
 def index_of(robot: Open, *graphs: Graph) -> None:
-    """From now on the robot has indexed these."""
+    """Make the robot index these graphs."""
     robot.known_graphs = tuple(codec.write(each) for each in graphs)
 
 

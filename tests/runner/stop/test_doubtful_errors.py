@@ -1,4 +1,4 @@
-"""Which errors of an engine leave it open whether an action's code goes on."""
+"""Some errors of an engine leave open whether an action's code goes on."""
 
 import msgspec
 import pytest

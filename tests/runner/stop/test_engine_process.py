@@ -76,5 +76,5 @@ class WithProcess(Robot):
 
     @property
     def standing(self) -> Any:
-        """As ever, with the process."""
+        """Return the standing, with the process."""
         return msgspec.structs.replace(super().standing, process=self.known)

@@ -221,7 +221,7 @@ def test_a_program_that_is_not_the_engines_own_node_tells_nothing(
 async def test_a_stop_is_proven_by_the_threads_where_an_action_may_still_be_loading(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """All feedback is lost, so that the answers leave open whether the second action was triggered."""
+    """All feedback is lost, so the answers leave open whether the second action was triggered."""
     kernel = Kernel()
     monkeypatch.setattr(monitor, "EngineThreads", lambda: EngineThreads(kernel))
     here = RobotsInNetwork(5, quirks=EngineTraits(loading_ms=1.0), script={"*": [{"never": True}]})

@@ -1,4 +1,4 @@
-"""Nothing is called stopped or finished that moves, whatever happens between runner and engine.
+"""No graph that moves is called stopped or finished, whatever happens between runner and engine.
 
 Random histories of the real runner with stand-in robots in virtual time: two engines on one path,
 reboots, freezes, starts by others, feedback that somebody made up, actions that begin after the stop
@@ -93,7 +93,7 @@ class Story:
         return self.network.join(robot, lag_s=self.chance.choice([0.0, 0.005, 0.08]), gap_s=gap_s)
 
     async def live(self) -> None:
-        """All steps, then everything is well again and has to come to rest."""
+        """Play all steps, then repair everything and wait for rest."""
         async with self.network.running() as tasks:
             self.tasks = tasks
             tasks.start_soon(self.watch_the_truth)
@@ -129,7 +129,8 @@ class Story:
                 self.befall(step, value, len(alive), node)
 
     def befall(self, step: str, value: Any, alive: int, node: Node | None) -> None:
-        """What nobody at the page does: to the network, to engines, by strangers, to the disk."""
+        """Play a step that nobody at the page causes: of the network, engines, strangers or the
+        disk."""
         match step:
             case "loss":
                 self.network.loss[value[0]] = value[1]
@@ -174,7 +175,7 @@ class Story:
             self.network.stir(node)
 
     def look_at_robots(self, control: ExecutionService) -> None:
-        """Somebody goes there, and says so of what is at rest where the engine's word is none."""
+        """Confirm rest as a person who looks at the robot, for runs that do not move."""
         moving = self.moving()
         for run, opened in tuple(control.open.items()):
             if run not in moving and opened.run.graph_name not in self.names():
@@ -183,7 +184,7 @@ class Story:
                     confirm_rest(opened, RestRequest("I stand beside it."), BEN)
 
     def stranger(self, what: str) -> None:
-        """Somebody at a terminal."""
+        """Send a command as a person at a terminal."""
         self.network.strangers = 1
         name = self.chance.choice(list(GRAPHS))
         ours = [each for _, each in self.network.sent if isinstance(each, Start)]
@@ -211,7 +212,7 @@ class Story:
             self.network.show(NAME, [json.dumps(graph)])
 
     def make_well(self) -> None:
-        """Nothing is lost any more."""
+        """Stop all losses and delays."""
         self.network.loss.clear()
         self.network.late_s = self.network.old_s = 0.0
         self.harness.journal.down = False
@@ -258,7 +259,7 @@ class Story:
                 self.still[run.id] = now()
 
     def compare(self) -> None:
-        """What was called still must not move later on either."""
+        """Check that no run that was called ended moves later."""
         for run, where in self.moving().items():
             if run in self.still and run not in self.replayed:
                 told = self.still.pop(run)
@@ -270,7 +271,7 @@ class Story:
             self.compare()
 
     async def come_to_rest(self) -> None:
-        """Everything works again, one engine is left, and somebody stops everything."""
+        """Repair everything, leave one engine, and stop all runs."""
         self.make_well()
         async with self.harness.runner() as control:
             control.watch(self.judge)
@@ -296,7 +297,7 @@ class Story:
                     self.stuck.append(f"{opened.run.state}: {opened.run.alarms}")
 
     def blocked(self) -> bool:
-        """Whether an engine will never answer again."""
+        """Return whether an engine will never answer again."""
         return any(each.robot._engine.locked for each in self.network.nodes if not each.robot.gone)
 
 

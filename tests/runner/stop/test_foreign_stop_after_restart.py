@@ -23,7 +23,7 @@ from runner.registered_robots import NEVER, Open, fleet
 
 
 async def _cleaning(robot: Open) -> None:
-    """Somebody else starts a graph there."""
+    """Start a graph there as a stranger."""
     await robot.engine.start(Order(run="theirs", graph=sequence("cleaning"), umrf=""))
 
 
@@ -42,7 +42,7 @@ async def _left(harness: Harness, david: Open, *, crash: bool = True) -> int:
 
 
 async def _told(control: ExecutionService) -> list[RobotEvent]:
-    """What is recorded of stops on David."""
+    """Return the recorded stop events of David."""
     await until(lambda: not control.robots.robot_log.waiting)
     told = [event for _, event in await control.robots.robot_log.newest("David", 50)]
     return [each for each in told if isinstance(each, StopAsked | StopUnproven | StopWasProven)]

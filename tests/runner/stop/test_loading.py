@@ -288,7 +288,7 @@ async def test_an_action_of_a_sub_graph_may_be_loading_too() -> None:
 async def test_an_end_of_a_sub_graph_counts_only_once_the_graph_around_it_has_left_running() -> (
     None
 ):
-    """Until then the sub-graph may be begun anew: what was seen of it is of another lap."""
+    """The sub-graph may begin again until then, so earlier observations belong to another lap."""
     graphs = {"g__Part__0": sequence("Part", 2)}
     first = _look("g__Part__0", "STOPPING", Work_0="STOPPING", Work_1="UNINITIALIZED")
     last = _look("g__Part__0", "STOPPED", Work_0="FINISHED", Work_1="UNINITIALIZED")
@@ -321,8 +321,8 @@ async def test_feedback_that_says_how_a_graph_ended_takes_nothing_away() -> None
 
 @virtual
 async def test_what_an_engine_showed_that_stood_beside_it_for_a_moment_proves_nothing() -> None:
-    """Both were told to start. Discovery shows the second one late: what it said until then looked like
-    the word of the only engine."""
+    """Both engines were told to start. Discovery shows the second one late, so its words looked
+    like those of the only engine."""
     here = scene(12.0, {"*": [{"after_s": 1.0}]})
     first = here.nodes["David"].robot
     async with here.played() as control:
@@ -351,7 +351,8 @@ async def test_what_an_engine_showed_that_stood_beside_it_for_a_moment_proves_no
 async def test_no_stop_is_proven_while_a_second_engine_hears_starts_and_is_not_seen_to_serve() -> (
     None
 ):
-    """Both take up the start. Discovery shows one server, whose answers say nothing of the other."""
+    """Both engines take up the start. Discovery shows one server, whose answers prove nothing of
+    the other."""
     here = scene(0.001, {"*": [{"never": True}]}, loss=0.0)
     async with here.played() as control:
         here.script = {"*": [{"never": True, "ignores_stop": True}]}

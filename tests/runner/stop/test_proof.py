@@ -1,4 +1,4 @@
-"""What proves that nothing moves: a look that lasts, and graphs of others that are not overlooked."""
+"""Rest is proven by answers over some time, and graphs of others are not overlooked."""
 
 from typing import Any, cast
 

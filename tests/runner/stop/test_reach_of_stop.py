@@ -22,7 +22,7 @@ from runner.robots_in_network import PATROL, RobotsInNetwork, asked, shown
 
 
 async def _cleaning(robot: Open, run: str) -> None:
-    """Somebody starts a graph there that carries the mark of a run."""
+    """Start a graph there, as a stranger, that carries the mark of a run."""
     await robot.engine.start(Order(run=run, graph=sequence("cleaning"), umrf=""))
 
 
@@ -298,7 +298,7 @@ class Waiting(Open):
     turn_s = 2.0
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """It leaves when its turn has come."""
+        """Send the start after a wait."""
         await anyio.sleep(self.turn_s)
         await super().start(order, leaves)
 
@@ -333,7 +333,7 @@ class InTurn(Open):
         self.turn = anyio.Event()
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """It waits for its turn, and leaves without a further wait."""
+        """Send the start when its turn comes, without a further wait."""
         await self.turn.wait()
         await super().start(order, leaves)
 

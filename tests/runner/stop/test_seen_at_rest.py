@@ -1,4 +1,4 @@
-"""What the word of a person who saw a robot at rest covers, and what it does not."""
+"""A person's word that a robot rests covers some runs, and not others."""
 
 from contextlib import suppress
 from typing import Any

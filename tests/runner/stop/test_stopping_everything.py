@@ -1,4 +1,4 @@
-"""What is answered to a stop of everything: what it concerns, and of which robots nothing is known. In
+"""The answer to a stop of everything names runs, graphs and robots of which nothing is known. In
 virtual time."""
 
 import json
@@ -15,7 +15,7 @@ _SILENT = "It is there, but does not answer a get within a second."
 
 
 async def _cleaning(robot: Open) -> None:
-    """Somebody else starts a graph there."""
+    """Start a graph there as a stranger."""
     await robot.engine.start(Order(run="theirs", graph=sequence("cleaning"), umrf=""))
     await anyio.sleep(15)
 

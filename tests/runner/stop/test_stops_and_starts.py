@@ -65,7 +65,7 @@ async def stopped(seed: int) -> tuple[float, float]:
 
 
 def _talk_over(scene: RobotsInNetwork) -> None:
-    """Somebody else stops another graph on the same robot, often at the very moment when we do."""
+    """Stop another graph on the same robot as a stranger, often at the moment of our Stop."""
     carry = scene.network.carry
 
     def both(message: Message, stranger: str = "") -> None:
@@ -237,8 +237,8 @@ async def test_an_engine_of_another_generation_is_refused_in_a_sentence_and_sent
 
 
 async def replayed_after(wait_s: float) -> list[float]:
-    """Somebody plays a start of ours again so long after our Stop, while answers are on their way
-    for up to half a second. When it was called stopped although it moves."""
+    """Replay our start after our Stop, with answers up to half a second late, and return the
+    moments of false confirmations."""
     scene = RobotsInNetwork(8)
     false: list[float] = []
     async with scene.played() as control:

@@ -1,4 +1,4 @@
-"""What ends a graph: the exit waits for parents and for outputs, as the real engine does.
+"""The exit ends a graph when its parents and outputs are there, as on the real engine.
 
 See docs/umrf-and-the-engine.md 2.3.
 

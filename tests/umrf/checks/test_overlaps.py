@@ -310,7 +310,7 @@ def test_an_action_that_outlasts_the_graph_on_another_course_is_reported_with_it
 
 
 def test_a_spontaneous_action_that_throws_begins_again_as_on_the_real_node() -> None:
-    """On the real node 39 begins and ends in 2 s, 77 two seconds after a stop."""
+    """The real node showed 39 begins and ends in 2 s, and 77 two seconds after a stop."""
     value = lively(
         graph(action("A"), exits=[{"name": "A", "conditions": ["on_error -> run"]}]), "A"
     )

@@ -44,7 +44,8 @@ def told(outcome: Outcome) -> Outcome:
 def test_a_deviation_ends_as_when_the_engine_goes_through_all_of_it(
     graph: Graph, slower_first: bool, backwards: bool
 ) -> None:
-    """In either order of trials: outcomes that one trial finds are remembered for the others."""
+    """The result does not depend on the order of trials, although outcomes of one trial are kept
+    for the others."""
     net = Network(graph, slower_first=slower_first)
     course = BaselineCourse(net)
     assume(not course.tied)

@@ -72,7 +72,8 @@ def played(graph: Graph, ends: tuple[tuple[int, str], ...]) -> tuple[list[Trace]
 
 
 def every_arrow(graph: Graph, depth: int) -> set[OutcomeArrow]:
-    """All arrows that any results in any order take, up to so many ends: by trying all of them."""
+    """Return all arrows that any results in any order take, up to `depth` ends, by trying all of
+    them."""
     found: set[OutcomeArrow] = set()
     border: list[tuple[tuple[int, str], ...]] = [()]
     for _ in range(depth + 1):

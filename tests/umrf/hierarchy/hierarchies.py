@@ -210,7 +210,8 @@ class Drawn:
             self.arrow(keys[-1], EXIT, TRUE)
 
     def _fork(self, keys: list[Key]) -> None:
-        """All begin, or all but one after that; the last waits for the others, or the exit does."""
+        """Make a fork: all keys begin at once, or all but the first after it; the last key or
+        the exit waits for the others."""
         first, *others = keys
         if self.draw(st.booleans()):
             others = keys

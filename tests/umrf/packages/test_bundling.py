@@ -37,7 +37,7 @@ def test_the_sources_of_all_compile_side_by_side_and_are_laid_out(tmp_path: Path
 
 
 def test_cmake_builds_and_installs_all_libraries_and_descriptions(tmp_path: Path) -> None:
-    """With stubs for ROS 2 and the engine, which CI does not have."""
+    """The build has stubs for ROS 2 and the engine, which CI does not have."""
     if shutil.which("g++") is None:
         pytest.skip("g++ is not here")
     package = laid_out(bundle_files("kitchen", (DRIVE, LOOK)), tmp_path / "package")

@@ -106,7 +106,7 @@ def test_package_xml_has_the_description_as_text(text: str) -> None:
 
 
 def test_cmake_builds_and_installs_the_library_and_the_description(tmp_path: Path) -> None:
-    """With stubs for ROS 2 and the engine, which CI does not have."""
+    """The build has stubs for ROS 2 and the engine, which CI does not have."""
     if shutil.which("g++") is None:
         pytest.skip("g++ is not here")
     text = "".join(HOSTILE)

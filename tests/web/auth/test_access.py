@@ -40,19 +40,19 @@ async def me(request: Request[Any, Any, Any]) -> str:
 
 @post("/api/stop", status_code=200, guards=[Needs("stop")])
 async def stop() -> str:
-    """Something that an expired session may do."""
+    """Serve a route that an expired session may use."""
     return "stopping"
 
 
 @post("/api/runs", status_code=200, guards=[Needs("simulate")])
 async def start(data: JSONBody[dict[str, int]]) -> str:
-    """Something that an expired session may not do."""
+    """Serve a route that an expired session may not use."""
     return f"starting {data['n']}"
 
 
 @post("/api/novelty", status_code=200)
 async def novelty() -> str:
-    """Something that nobody decided about."""
+    """Serve a route without a declared right."""
     return "done"
 
 

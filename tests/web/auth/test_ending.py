@@ -29,7 +29,7 @@ KEYS = Keys("k" * 43)
 
 @contextlib.contextmanager
 def full(disk: Path) -> Iterator[None]:
-    """No room for another byte."""
+    """Fill the disk to the last byte."""
     ballast = disk / "ballast"
     with ballast.open("wb", buffering=0) as out, contextlib.suppress(OSError):
         while True:
@@ -44,7 +44,7 @@ def full(disk: Path) -> Iterator[None]:
 
 
 def full_for_the_log(product: Product) -> None:
-    """Until nothing is taken up any more."""
+    """Fill the disk until the editor stores nothing any more."""
     with product.editor() as editor:
         for number in itertools.count():
             made = editor.post("/api/graphs", json={"name": f"g{number}", "description": "x" * 900})
@@ -266,7 +266,7 @@ def test_what_cannot_be_noted_fails_nothing_and_what_is_over_is_forgotten(tmp_pa
 def test_a_cookie_of_an_older_version_goes_on_and_can_be_ended(
     product: Product, arrive: Arrive
 ) -> None:
-    """They were sealed as they are now, each with an id of its own."""
+    """Cookies of older versions were sealed in the same way, each with an id of its own."""
     keys = Keys(TOKEN)
     old = keys.new_session("Ada", role="operator")
     guest: Guest = arrive(product)

@@ -85,7 +85,7 @@ class Guest:
 
     @property
     def role(self) -> str:
-        """As the server says."""
+        """Return the role that the server reports."""
         found: str = self.http.get("/api/session").json()["person"]["role"]
         return found
 
@@ -110,7 +110,7 @@ class Guest:
 
 
 def proof(invitation: dict[str, Any]) -> str:
-    """What the fragment of a link holds."""
+    """Return the proof in the fragment of a link."""
     text: str = invitation["path"].removeprefix("/#i=")
     return text
 
@@ -149,7 +149,7 @@ def closed(socket: ClientConnection) -> int | None:
 
 
 def test_serve_makes_a_link_for_each_role_and_says_where_they_are(product: Product) -> None:
-    """At a terminal it shows them; what else it writes to is kept, and read by others."""
+    """The links are printed at a terminal only, because other output is kept and read by others."""
     eventually(lambda: "people list" in product.log.read_text())
     with product.editor() as editor:
         sharing = editor.get("/api/invitations").json()

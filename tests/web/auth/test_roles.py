@@ -1,4 +1,4 @@
-"""Who may call what: every route of both processes, asked for by every role."""
+"""Each role calls every route of both processes, and only permitted calls succeed."""
 
 import contextlib
 import json
@@ -57,7 +57,7 @@ def browser(product: Product, role: Role) -> dict[str, str]:
 
 
 def url_of(product: Product, process: str) -> str:
-    """Where a process answers."""
+    """Return the URL of a process."""
     return product.url if process == "editor" else product.runner_url
 
 

@@ -12,7 +12,7 @@ from action_assistant.web.server.proxy import Forwarded
 
 
 def asked(peer: str, name: bytes, path: str = "/api/me") -> tuple[dict[str, str], RequestCounts]:
-    """What lines are about while a request is answered that comes with an id of its own."""
+    """Return the subjects of log lines during a request that brings an id of its own."""
     seen: dict[str, str] = {}
     counts = RequestCounts()
 

@@ -1,4 +1,4 @@
-"""What a running product tells of itself: to Prometheus, to balancers, to owners, and to its log."""
+"""A running product reports its state to Prometheus, to balancers, to owners and to its log."""
 
 import json
 import re
@@ -54,7 +54,7 @@ def get(url: str, **headers: str) -> httpx.Response:
 
 
 def told(product: Product) -> dict[str, Any]:
-    """All metrics of both processes by the names of their samples' families."""
+    """Return all metrics of both processes by the names of their families' samples."""
     found = {}
     for url in (product.url, product.runner_url):
         answer = get(f"{url}/metrics", authorization=f"Bearer {SCRAPE}")
@@ -224,7 +224,7 @@ def mortal() -> Iterator[Server]:
 
 
 def parts(editor: Editor) -> dict[str, str | None]:
-    """What readyz says; it has to say it soon."""
+    """Return the parts that `/readyz` reports; it has to answer soon."""
     answer = httpx.get(f"{editor.url}/readyz", trust_env=False, timeout=8)
     found: dict[str, str | None] = answer.json()["parts"]
     assert answer.status_code == (503 if any(found.values()) else 200)

@@ -1,4 +1,4 @@
-"""Which hosts and origins are ours: exactly the listed ones."""
+"""The server accepts exactly the listed hosts and origins."""
 
 import pytest
 

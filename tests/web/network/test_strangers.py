@@ -1,4 +1,4 @@
-"""Who says nothing, or not who they are, takes no room from those who are signed in."""
+"""Strangers, silent or not signed in, take no connection from people who are signed in."""
 
 import contextlib
 import resource
@@ -33,7 +33,7 @@ def many() -> None:
 
 
 def strangers(stack: ExitStack, port: int, count: int, said: bytes = b"") -> list[socket.socket]:
-    """So many strangers who hold a connection each."""
+    """Open `count` connections of strangers."""
     found = []
     for _ in range(count):
         one = stack.enter_context(socket.create_connection(("127.0.0.1", port), timeout=5))
@@ -187,7 +187,7 @@ def slow(stack: ExitStack, port: int, source: str, asker: str) -> socket.socket:
 
 
 def is_answered(one: socket.socket) -> bool:
-    """Whether the request is answered, once it is complete."""
+    """Complete the request, and return whether it is answered."""
     with contextlib.suppress(OSError):
         one.send(b'"token":"wrong"}')
         return one.recv(100).startswith(b"HTTP/1.1 401")

@@ -41,14 +41,14 @@ class RecordingTaker:
         self._socket.resume_hearing()
 
     def may_write(self) -> None:
-        """Nothing waits."""
+        """Do nothing: no output waits."""
 
     def gone(self) -> None:
         self.is_gone = True
 
 
 def said(message: Any) -> bytes | None:
-    """What an event of ASGI brings."""
+    """Return the bytes of an ASGI event."""
     found: bytes | None = message.get("bytes")
     return found
 
@@ -65,7 +65,8 @@ async def turns(protocol: Any, most: int = 10_000) -> int:
 async def usually(
     pieces: list[bytes], kind: type[Any] = WebSocketsSansIOProtocol
 ) -> tuple[list[bytes | None], bytes, bool, bool]:
-    """What is heard by ASGI, what is answered, whether the client is gone, and the connection over."""
+    """Return the messages that ASGI receives, the answer, whether the client is gone, and
+    whether the connection is closed."""
     heard: list[bytes | None] = []
     gone: list[bool] = []
 
@@ -91,7 +92,8 @@ async def usually(
 async def directly(
     pieces: list[bytes], *, before: int = 0, stops: frozenset[int] = frozenset()
 ) -> tuple[list[bytes | None], bytes, bool, bool]:
-    """As `usually`, by a socket that is taken over after `before` pieces have come."""
+    """Return the same as `usually`, for a socket that is taken over after `before` pieces have
+    come."""
     taken: list[RecordingTaker] = []
     go = asyncio.Event()
 

@@ -46,7 +46,8 @@ class Place:
         self.upgrade = UPGRADE % (graph.encode(), TOKEN.encode())
 
     def connected(self) -> socket.socket:
-        """Somebody who has said nothing yet, and for whom the kernel keeps little."""
+        """Return a connection that has sent nothing yet, and for which the kernel buffers
+        little."""
         one = self._stack.enter_context(socket.socket())
         one.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 8192)
         one.settimeout(20)
@@ -56,14 +57,14 @@ class Place:
         return self._stack.enter_context(self._tls.wrap_socket(one))
 
     def in_room(self) -> socket.socket:
-        """Somebody whose socket is open."""
+        """Return a connection whose room socket is open."""
         one = self.connected()
         one.sendall(self.upgrade)
         assert one.recv(100).startswith(b"HTTP/1.1 101")
         return one
 
     def wait_for(self, count: int) -> None:
-        """Until the editor has so many sockets in rooms."""
+        """Wait until the editor has `count` sockets in rooms."""
         deadline = time.monotonic() + 20
         while f"\naction_assistant_sockets {count}\n" not in self._http.get("/metrics").text:
             assert time.monotonic() < deadline

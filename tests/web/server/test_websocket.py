@@ -26,10 +26,10 @@ class Ended:
         self.is_gone = False
 
     def heard(self, message: bytes | None) -> None:
-        """Nothing is said here."""
+        """Ignore the message."""
 
     def may_write(self) -> None:
-        """Nothing is written here."""
+        """Do nothing: no output waits."""
 
     def gone(self) -> None:
         self.is_gone = True

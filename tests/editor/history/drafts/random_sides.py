@@ -14,7 +14,7 @@ _ENDS: Final = {"entry", "exit"}
 
 
 class Sides(NamedTuple):
-    """What the document held before they parted, and what each made of it."""
+    """The document before both sides parted, and the document of each side."""
 
     base: dict[Place, Any]
     ours: dict[Place, Any]

@@ -42,7 +42,7 @@ DOCK, CHARGE = "Dock" * 3, "Char" * 3
 
 
 class Editor:
-    """Everything that drafts need, and one graph."""
+    """All services that drafts need, and one graph."""
 
     def __init__(self, journal: Journal, rooms: Rooms, people: People) -> None:
         self.journal = journal
@@ -64,7 +64,7 @@ class Editor:
             return await room.read(lambda replica, _: maps_of(replica.doc))
 
     async def edit(self, graph: str, who: str, dice: random.Random, edits: int = 1) -> None:
-        """Somebody edits at random; what they gave which key is remembered."""
+        """Edit at random as one person, and remember which values they gave to which keys."""
         for _ in range(edits):
             before = await self.now(graph)
             async with self.rooms.enter(h.graph_stream(graph)) as room:
@@ -75,7 +75,7 @@ class Editor:
             self._remember(who, before, await self.now(graph))
 
     async def set(self, graph: str, who: str, root: str, **values: object) -> int:
-        """Somebody gives keys these values; None takes them away."""
+        """Give keys these values as one person; None removes a key."""
 
         def edit(doc: Any) -> None:
             me = Person(who, random.Random(0))
@@ -92,7 +92,7 @@ class Editor:
             return await room.submit(difference(state, edit), who)
 
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
-        """What a merge would do, as whoever asks over HTTP reads it."""
+        """Return the preview of a merge, as a caller over HTTP reads it."""
         found = await self.merges.preview(draft, asked)
         return msgspec.json.decode(msgspec.json.encode(found), type=MergePreview)
 
@@ -107,7 +107,7 @@ class Editor:
     async def merge(
         self, draft: str, who: str, dice: random.Random, into: DraftSide = "origin"
     ) -> MergedDraft:
-        """Somebody merges, with choices at random."""
+        """Merge with random choices."""
         asked = AskedMerge(into)
         found = await self.preview(draft, asked)
         sides: tuple[DraftSide, ...] = ("origin", "draft")
@@ -132,7 +132,7 @@ _STREAMS = (h.graph_stream, h.about_stream)
 
 @pytest.fixture(params=["SQLite", pytest.param("Postgres", marks=pytest.mark.long)])
 async def editor(request: pytest.FixtureRequest, tmp_path: Path) -> AsyncIterator[Editor]:
-    """On each kind of database that there is."""
+    """An editor on each kind of database."""
     url = f"sqlite:///{tmp_path / 'editor.db'}"
     if request.param == "Postgres":
         url = request.getfixturevalue("postgres").new_database()

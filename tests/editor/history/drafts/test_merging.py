@@ -105,7 +105,8 @@ def test_both_ways_say_the_same_where_everything_is_chosen(seed: int) -> None:
 
 
 def _meant(places: Places) -> dict[Place, Any]:
-    """Without looks and orders, which are nobody's choice, and what ends nowhere."""
+    """Return the places without positions and orders, which nobody chooses, and without dangling
+    arrows."""
     lost = loose(dict(places))
     return {
         (root, key): value
@@ -133,7 +134,7 @@ def test_the_order_of_independent_edits_does_not_matter(seed: int, order: int) -
 
 
 def _with(base: Places, after: Places, owners: set[str]) -> dict[Place, Any]:
-    """What some owners have become, and the rest as it was."""
+    """Return the base in which some owners have become as in `after`."""
     kept = {place: value for place, value in base.items() if owner_of(*place) not in owners}
     return kept | {place: value for place, value in after.items() if owner_of(*place) in owners}
 

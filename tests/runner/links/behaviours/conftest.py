@@ -29,7 +29,7 @@ def shared(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunnerProcess]:
 
 @pytest.fixture
 def folder(shared: RunnerProcess) -> Iterator[Path]:
-    """Where the behaviours are: none yet."""
+    """The folder of the behaviours, empty at first."""
     found = shared.data.parent / "behaviours"
     yield found
     shutil.rmtree(found)

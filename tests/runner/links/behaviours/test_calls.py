@@ -32,7 +32,7 @@ class Bench:
         )
 
     def returned(self, count: int = 1, patience: float = 20.0) -> list[Returned]:
-        """What has ended, once so many have."""
+        """Wait for `count` ended calls, and return them."""
 
         def enough() -> bool:
             self._returned += self.performer.taken()
@@ -43,7 +43,7 @@ class Bench:
         return found
 
     def came_of(self, source: str) -> Returned:
-        """How a behaviour ends by itself."""
+        """Return how a behaviour ends by itself."""
         write(self.folder, acts=source)
         self.begin()
         (returned,) = self.returned()

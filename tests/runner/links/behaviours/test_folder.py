@@ -1,4 +1,4 @@
-"""Which file an action has: never another one than its name says, and never outside the folder."""
+"""An action has the file of its name, and never one outside the folder."""
 
 import os
 from pathlib import Path

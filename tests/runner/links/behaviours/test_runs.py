@@ -113,7 +113,7 @@ def test_what_a_behaviour_may_not_do_ends_its_action_with_an_error_that_says_so(
 
 
 def test_numbers_stay_numbers(client: httpx.Client, folder: Path) -> None:
-    """What is whole in a file is a double to the engine."""
+    """The engine takes a whole number in a file as a double."""
     write(
         folder,
         doubles="""

@@ -45,7 +45,7 @@ def write(folder: Path, **sources: str) -> Path:
 
 
 def parameter(name: str, kind: str, value: Any = None, **more: Any) -> Parameter:
-    """One of an action; without a value somebody has to give it."""
+    """Return a parameter of an action; without a value a person has to give it."""
     leaf = {"pvf_type": kind, **({} if value is None else {"pvf_value": value}), **more}
     return Parameter(path=name.replace("::", "/"), text=msgspec.json.encode(leaf).decode())
 
@@ -70,7 +70,8 @@ def chain(*actions: Action | str, name: str = "chain") -> Graph:
 
 
 def side_by_side(count: int, source: str, name: str = "wide") -> Graph:
-    """So many of one action at once, each of which leads to the end."""
+    """Return a graph with `count` copies of an action beside each other, each of which leads to
+    the exit."""
     nodes = tuple(Action(key=f"aid{i}", name=source, instance_id=i) for i in range(count))
     entries = [Relation(parent=ENTRY, child=n.key, conditions=ENTRY_CONDITIONS) for n in nodes]
     exits = [Relation(parent=each.key, child=EXIT, conditions=GO_ON) for each in nodes]
