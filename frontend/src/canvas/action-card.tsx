@@ -67,6 +67,15 @@ function Head({ action, oldName }: { action: Action; oldName: string | null }) {
   );
 }
 
+/** Shows whose the action is, at every zoom at which names are shown. */
+export function RobotTag({ name }: { name: string }) {
+  return (
+    <span className={style.robot} data-robot title={name}>
+      <bdi>{name}</bdi>
+    </span>
+  );
+}
+
 /** Shows everything that is read on a card: head, state and parameters. */
 function CardText({ data, selected }: Pick<NodeProps<CardNode>, "data" | "selected">) {
   const { action, progress, givers } = data;
@@ -101,7 +110,7 @@ export const ActionCard = memo(function ActionCard({
   selected,
   isConnectable,
 }: NodeProps<CardNode>) {
-  const { action, progress, mark, other, direction } = data;
+  const { action, progress, mark, other, direction, robot } = data;
   const right = direction === "right";
   const expanded = useExpandedCard(action.key);
   const { height, width } = expanded?.size ?? cardSize(action, direction);
@@ -142,8 +151,8 @@ export const ActionCard = memo(function ActionCard({
         role="img"
         aria-label={`Input of ${isolated(action.name)} ${action.instanceId}`}
       />
-      {action.actor !== "" && <span className={style.robot}>{action.actor}</span>}
-      {change && <ChangeTag mark={change} beside={action.actor !== ""} />}
+      {robot !== "" && <RobotTag name={robot} />}
+      {change && <ChangeTag mark={change} beside={robot !== ""} />}
       {never && <span className={style.never}>never run</span>}
       <SinceSpot of={action.key} on="card" />
       {mark && <ProblemBadge mark={mark} on="card" />}

@@ -1,7 +1,15 @@
 import { expect, test } from "vitest";
 import * as Y from "yjs";
 import { mapsOf } from "../graph/document-keys";
-import { addAction, connect, moveActions, setEntry, setExit, setResponse } from "../graph/edit";
+import {
+  addAction,
+  connect,
+  moveActions,
+  setEntry,
+  setExit,
+  setField,
+  setResponse,
+} from "../graph/edit";
 import { meaning } from "../graph/meaning";
 import { ENTRY, EXIT, type Graph } from "../graph/model";
 import { readGraph } from "../graph/read";
@@ -148,4 +156,31 @@ test("UMRF that is no graph is drawn as an empty graph", () => {
   for (const odd of [null, 5, [], { actions: [null, 7] }, { graph_entry: "x", actions: {} }]) {
     expect(() => fromUmrf(odd)).not.toThrow();
   }
+});
+
+test("robots are named on cards and arrows only where a graph has several", () => {
+  const doc = new Y.Doc();
+  const a = addAction(doc, { name: "DriveTo", actor: "Carrier" });
+  const b = addAction(doc, { name: "Inspect" });
+  connect(doc, a, b, "on_true");
+  const shown = () => {
+    const graph = readGraph(mapsOf(doc));
+    const cards = nodesOf(graph, options(graph)).filter((node) => node.type === "action");
+    const [arrow] = edgesOf(graph, options(graph), surroundingsOf(graph, null));
+    const [line] = sceneOf(graph, options(graph), null).lines;
+    return { cards, arrow, width: line?.pill?.width ?? 0 };
+  };
+  const alone = shown();
+  expect(alone.cards.map(({ data }) => data.robot)).toEqual(["", ""]);
+  expect(alone.arrow?.data?.hand).toBeNull();
+  setField(doc, b, "actor", "Scout");
+  const both = shown();
+  expect(new Set(both.cards.map(({ ariaLabel }) => ariaLabel))).toEqual(
+    new Set(["DriveTo 0, robot Carrier", "Inspect 0, robot Scout"]),
+  );
+  expect(both.arrow?.data?.hand).toEqual({ from: "Carrier", to: "Scout", waits: true });
+  expect(both.arrow?.ariaLabel).toBe(
+    "Arrow from DriveTo 0, when true: run Inspect 0; Scout waits for Carrier",
+  );
+  expect(both.width).toBeGreaterThan(alone.width);
 });

@@ -19,10 +19,17 @@ import {
   spokenOutcomes,
 } from "../graph/model";
 import { dataFlowOf, type InputGivers } from "../graph/parameters/data-flow";
+import {
+  type HandOver,
+  handOverLabel,
+  hasSeveralRobots,
+  type RobotOf,
+  robotOf,
+} from "../graph/robots";
 import { movedTogether, movesBetween, shifted } from "../graph/waypoints";
 import type { Progress } from "../status/progress";
 import { isolated } from "../words/isolated";
-import { type Bundle, bundlesOf, pillSizeOf } from "./arrows/bundles";
+import { type Bundle, bundlesOf, type HandOvers, handOversIn, pillSizeOf } from "./arrows/bundles";
 import { gridOffset, type Scene, type SceneCard } from "./arrows/scene";
 import { expectedCard, expectedEnd } from "./card-handles";
 import { cardSize, type Positions, pillSize, type Sizes } from "./geometry/arrange";
@@ -40,6 +47,8 @@ export type CardNode = Node<
     direction: Direction;
     /** The outputs that reach each of its inputs. */
     givers: InputGivers | undefined;
+    /** The name of its robot; "" for any robot, and where all actions are one robot's. */
+    robot: string;
   },
   "action"
 >;
@@ -80,6 +89,8 @@ export type Arrow = Edge<
     came: Precondition | null;
     /** The parent has ended with an outcome that is not in this bundle. */
     passed: boolean;
+    /** Its two robots, where it leads from an action of one to an action of another. */
+    hand: HandOver | null;
     /** True if it starts at a folded frame, which has no handles for single outcomes. */
     portless?: boolean;
   },
@@ -146,7 +157,7 @@ function place(
 /** Return the node of an action: the identical `before` if nothing that the card shows has changed. */
 function cardOf(
   action: Action,
-  { direction, givers }: Pick<CardNode["data"], "direction" | "givers">,
+  { direction, givers, robot }: Pick<CardNode["data"], "direction" | "givers" | "robot">,
   options: NodeOptions,
   before: CanvasNode | undefined,
 ): CardNode {
@@ -158,6 +169,7 @@ function cardOf(
     other: options.others?.get(action.key) ?? null,
     direction,
     givers,
+    robot,
   };
   const expected = expectedCard(action, direction, options.expanded?.get(action.key));
   const same =
@@ -168,13 +180,14 @@ function cardOf(
     before.data.other === data.other &&
     before.data.direction === direction &&
     before.data.givers === givers &&
+    before.data.robot === robot &&
     before.position.x === x &&
     before.position.y === y &&
     before.selected === options.selected.has(action.key) &&
     before.handles === expected.handles &&
     before.measured === (options.measured.get(action.key) ?? expected.measured);
   if (same) return before;
-  const ariaLabel = cardWords(action, options);
+  const ariaLabel = cardWords(action, robot, options);
   return { ...place(action.key, options, direction, expected), type: "action", ariaLabel, data };
 }
 
@@ -189,6 +202,7 @@ export function nodesOf(
 ): CanvasNode[] {
   const known = new Map(before.map((node) => [node.id, node]));
   const flow = dataFlowOf(graph);
+  const named = hasSeveralRobots(graph.actions);
   const ends = ([ENTRY, EXIT] as const).map(
     (end): EndNode => ({
       ...place(end, options, graph.direction, expectedEnd(end, graph.direction)),
@@ -201,7 +215,11 @@ export function nodesOf(
   const cards = graph.actions.map((action) =>
     cardOf(
       action,
-      { direction: graph.direction, givers: flow.get(action.key) },
+      {
+        direction: graph.direction,
+        givers: flow.get(action.key),
+        robot: named ? action.actor : "",
+      },
       options,
       known.get(action.key),
     ),
@@ -251,6 +269,7 @@ export function sceneOf(graph: Graph, options: SceneOptions, offset: number | nu
   put(ENTRY, pill);
   for (const action of graph.actions) put(action.key, cardSize(action, direction));
   put(EXIT, pill);
+  const handOf = handOversIn(graph.relations, robotOf(graph));
   const lines = graph.relations.flatMap((relation) =>
     bundlesOf(relation).map((bundle, i) => {
       const marked = i === 0 && options.marks.has(bundle.relation);
@@ -259,7 +278,7 @@ export function sceneOf(graph: Graph, options: SceneOptions, offset: number | nu
         id,
         source,
         target,
-        pill: pillSizeOf(bundle, marked),
+        pill: pillSizeOf(bundle, marked, handOf(bundle) !== null),
         waypoints: waypointsOf(bundle, moved),
       };
     }),
@@ -267,8 +286,8 @@ export function sceneOf(graph: Graph, options: SceneOptions, offset: number | nu
   return { direction, offset: gridOffset(cards, direction, offset), cards, lines };
 }
 
-function cardWords(action: Action, { progress, marks }: NodeOptions): string {
-  const robot = action.actor === "" ? "" : `, robot ${action.actor}`;
+function cardWords(action: Action, named: string, { progress, marks }: NodeOptions): string {
+  const robot = named === "" ? "" : `, robot ${isolated(named)}`;
   const state = progress.get(action.key)?.word;
   const now = state === undefined ? "" : `, ${state}`;
   return `${isolated(action.name)} ${action.instanceId}${robot}${now}${problemMarkWords(marks.get(action.key))}`;
@@ -286,21 +305,30 @@ function namesOf(graph: Graph): Names {
   return names;
 }
 
-function arrowWords(relation: Relation, outcome: Precondition, names: Names): string {
+function arrowWords(
+  relation: Relation,
+  outcome: Precondition,
+  names: Names,
+  hand: HandOver | null,
+): string {
   const [from, to] = [names.get(relation.parent) ?? "", names.get(relation.child) ?? ""];
   if (relation.parent === ENTRY) return `Arrow from entry to ${to}`;
-  return `Arrow from ${from}, when ${outcomeWord[outcome]}: ${relation.conditions[outcome]} ${to}`;
+  const robots = hand === null ? "" : `; ${handOverLabel(hand)}`;
+  return `Arrow from ${from}, when ${outcomeWord[outcome]}: ${relation.conditions[outcome]} ${to}${robots}`;
 }
 
-/** Names of the cards, which arrows need for their labels. Unchanged names keep the identical object. */
+/** Names and robots of the cards, which arrows show. Unchanged ones keep the identical object. */
 export interface CardSurroundings {
   readonly names: Names;
+  readonly robots: RobotOf;
 }
 
-/** Return the names of all cards; the identical `before` if none has changed. */
+/** Return the names and robots of all cards; the identical `before` if none has changed. */
 export function surroundingsOf(graph: Graph, before: CardSurroundings | null): CardSurroundings {
-  const names = namesOf(graph);
-  return before !== null && alikeMaps(before.names, names) ? before : { names };
+  const [names, robots] = [namesOf(graph), robotOf(graph)];
+  const same =
+    before !== null && alikeMaps(before.names, names) && alikeMaps(before.robots, robots);
+  return same ? before : { names, robots };
 }
 
 function alikeMaps<T>(a: ReadonlyMap<Key, T>, b: ReadonlyMap<Key, T>): boolean {
@@ -312,7 +340,12 @@ function alikeMaps<T>(a: ReadonlyMap<Key, T>, b: ReadonlyMap<Key, T>): boolean {
   return true;
 }
 
-function arrowsOf(relation: Relation, options: ArrowOptions, { names }: CardSurroundings): Arrow[] {
+function arrowsOf(
+  relation: Relation,
+  options: ArrowOptions,
+  names: Names,
+  handOf: HandOvers,
+): Arrow[] {
   const id = relationId(relation);
   const outcomes = spokenOutcomes(relation.conditions);
   const drawn: Precondition[] = outcomes.length > 0 ? outcomes : ["on_true"];
@@ -328,12 +361,14 @@ function arrowsOf(relation: Relation, options: ArrowOptions, { names }: CardSurr
     if (!bundle) return [];
     const lead = !drawnBundles.has(bundle.id);
     drawnBundles.add(bundle.id);
+    const hand = handOf(bundle);
     const came = entry ? null : (bundle.outcomes.find((each) => each === ended) ?? null);
     const over = !entry && OUTCOMES.some((each) => each === ended);
     return {
       id: `${id}|${outcome}`,
       type: "outcome" as const,
-      ariaLabel: arrowWords(relation, outcome, names) + problemMarkWords(i === 0 ? mark : null),
+      ariaLabel:
+        arrowWords(relation, outcome, names, hand) + problemMarkWords(i === 0 ? mark : null),
       source: relation.parent,
       target: relation.child,
       sourceHandle: entry ? "start" : outcome,
@@ -348,6 +383,7 @@ function arrowsOf(relation: Relation, options: ArrowOptions, { names }: CardSurr
         mark: i === 0 ? mark : null,
         lit: isLit(relation, outcome, options),
         passed: over && came === null,
+        hand,
       },
     };
   });
@@ -357,11 +393,12 @@ function arrowsOf(relation: Relation, options: ArrowOptions, { names }: CardSurr
 export function edgesOf(
   { relations }: Pick<Graph, "relations">,
   options: ArrowOptions,
-  around: CardSurroundings,
+  { names, robots }: CardSurroundings,
 ): Arrow[] {
+  const handOf = handOversIn(relations, robots);
   return relations
-    .filter(({ parent, child }) => around.names.has(parent) && around.names.has(child))
-    .flatMap((relation) => arrowsOf(relation, options, around));
+    .filter(({ parent, child }) => names.has(parent) && names.has(child))
+    .flatMap((relation) => arrowsOf(relation, options, names, handOf));
 }
 
 /**

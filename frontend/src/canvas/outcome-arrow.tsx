@@ -14,6 +14,7 @@ import type { RoutedLine } from "./arrows/simple-lines";
 import { SinceSpot, useUntakenOutcomes } from "./editor-store";
 import type { Arrow } from "./elements";
 import { ChangeSign, useChangeMark } from "./marks/change-marks";
+import { HandMark } from "./marks/hand-mark";
 import { ProblemBadge } from "./marks/problem-marks";
 import { type Outcome, OutcomeSign, outcomeColor } from "./outcome";
 import style from "./outcome-arrow.module.css";
@@ -186,6 +187,13 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
             </PartBoundary>
           ) : (
             glyphs
+          )}
+          {data.hand && (
+            // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
+            // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys
+            <span className={style.mark} onClick={() => store.getState().addSelectedEdges([id])}>
+              <HandMark hand={data.hand} />
+            </span>
           )}
           {never.length > 0 && (
             <span className={style.never}>

@@ -10,14 +10,14 @@ import { readGraph } from "../graph/read";
 import { positionsOf } from "./geometry/arrange";
 import { svgPictureOf } from "./svg-picture";
 
-function drawn(name: string, robot: string, text: string) {
+function drawn(name: string, robot: string, text: string, other = "") {
   const doc = new Y.Doc();
   const a = addAction(doc, {
     name,
     actor: robot,
     inputs: [{ path: "x", text: JSON.stringify({ pvf_type: "string", pvf_value: text }) }],
   });
-  const b = addAction(doc, { name: "Next" });
+  const b = addAction(doc, { name: "Next", actor: other });
   setEntry(doc, a);
   connect(doc, a, b, "on_error");
   setExit(doc, b);
@@ -44,10 +44,12 @@ test("for any texts the picture is well-formed and contains no script", () => {
   );
   fc.assert(
     fc.property(hostile, hostile, hostile, (name, robot, text) => {
-      const { svg } = drawn(name, robot, text);
+      const { svg } = drawn(name, robot, text, "Scout");
       const parsed = new DOMParser().parseFromString(svg, "image/svg+xml");
       expect(parsed.querySelector("parsererror")).toBeNull();
       const kinds = new Set([...parsed.querySelectorAll("*")].map(({ tagName }) => tagName));
+      // Those of the mark between two robots.
+      for (const kind of ["g", "title"]) kinds.delete(kind);
       expect([...kinds].sort()).toEqual(["circle", "path", "rect", "svg", "text", "tspan"]);
     }),
     { numRuns: 20 },
@@ -55,7 +57,7 @@ test("for any texts the picture is well-formed and contains no script", () => {
 });
 
 test("a picture has every card, end, arrow and note within its bounds", () => {
-  const { svg, width, height } = drawn("Look", "atlas", "mind the step");
+  const { svg, width, height } = drawn("Look", "atlas", "mind the step", "Scout");
   const parsed = new DOMParser().parseFromString(svg, "image/svg+xml");
   const words = [...parsed.querySelectorAll("text")].map((each) => each.textContent);
   for (const word of ["Look", "Next", "atlas", "Entry", "Exit", "mind the step"]) {
@@ -81,4 +83,12 @@ test("the picture has the waypoints of bent lines", () => {
   const before = picture();
   setWaypoints(doc, `${id}|run`, [[360, -300]]);
   expect(picture().height).toBeGreaterThan(before.height + 150);
+});
+
+test("the picture names the robots of a graph that has several, and says which one waits", () => {
+  const { svg } = drawn("DriveTo", "Carrier", "", "Scout");
+  expect(svg).toContain(">Carrier</text>");
+  expect(svg).toContain(">Scout</text>");
+  expect(svg).toContain("<title>Scout waits for Carrier</title>");
+  expect(drawn("DriveTo", "Carrier", "").svg).not.toContain("Carrier");
 });

@@ -4,8 +4,9 @@ import { type Note, notesOf } from "../graph/edit/notes";
 import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
 import { spokenNote } from "../graph/note-links";
 import { cardRows } from "../graph/parameters/card-rows";
-import { colorOfName } from "../ui/name-colors";
-import { type Bundle, bundlesOf, pillWord } from "./arrows/bundles";
+import { type HandOver, handOverLabel, robotOf } from "../graph/robots";
+import { colorOfName, firstLetter } from "../ui/name-colors";
+import { type Bundle, bundlesOf, type HandOvers, handOversIn, pillWord } from "./arrows/bundles";
 import { pathOf } from "./arrows/line-path";
 import { routed } from "./arrows/routes";
 import type { PillSize, Scene } from "./arrows/scene";
@@ -23,6 +24,7 @@ export interface SvgPicture {
 }
 
 const MARGIN = 36; // px
+const HAND_WIDTH = 37; // px of the mark of an arrow between two robots
 const FONT = "Inter, system-ui, sans-serif";
 const MONO = "ui-monospace, monospace";
 
@@ -61,6 +63,7 @@ class Painter {
   private readonly lines: LineMap;
   private readonly pills: ReadonlyMap<string, PillSize | null>;
   private readonly notes: readonly Note[];
+  private readonly handOf: HandOvers;
   private readonly sizes: Sizes;
   private readonly direction: Direction;
   private readonly color: (token: string) => string;
@@ -87,6 +90,7 @@ class Painter {
     this.lines = routed(this.scene).lines;
     this.pills = new Map(this.scene.lines.map(({ id, pill }) => [id, pill]));
     this.notes = notesOf(graph);
+    this.handOf = handOversIn(graph.relations, robotOf(graph));
   }
 
   picture(): SvgPicture {
@@ -164,7 +168,7 @@ class Painter {
           `fill="${this.paint("--ink2")}" font-family="${MONO}" font-size="11"`,
         ),
       );
-    const tag = fitted(action.actor, 75, 6.4);
+    const tag = fitted(data.robot, 75, 6.4);
     return [
       `<rect x="${x}" y="${y}" width="${width}" height="${height}" rx="12" fill="${this.paint("--raised")}" stroke="${this.paint("--line2")}"${dash}/>`,
       `<rect x="${x + 5}" y="${y + 12}" width="3" height="${height - 24}" rx="1.5" fill="${robot}"/>`,
@@ -184,7 +188,7 @@ class Painter {
               tag,
               x + 19,
               y + 3,
-              `fill="${this.paint("--raised")}" font-size="10.5" font-weight="600"`,
+              `fill="${this.paint("--on-accent")}" font-size="10.5" font-weight="600"`,
             ),
           ]),
       ...OUTCOMES.map((outcome, i) =>
@@ -257,11 +261,34 @@ class Painter {
       .join(" ");
     const word = pillWord(bundle);
     const said = word === "" ? "" : ` <tspan fill="${this.paint("--ink2")}">${word}</tspan>`;
+    const hand = this.handOf(bundle);
+    const room = hand === null ? 0 : HAND_WIDTH;
     return (
       `<rect x="${x - width / 2}" y="${y - height / 2}" width="${width}" height="${height}" rx="10" ` +
       `fill="${this.paint("--raised")}" stroke="${this.paint("--line2")}"/>` +
-      `<text x="${x}" y="${y + 4}" font-size="11" font-weight="600" text-anchor="middle">${glyphs}${said}</text>`
+      `<text x="${x - room / 2}" y="${y + 4}" font-size="11" font-weight="600" text-anchor="middle">${glyphs}${said}</text>` +
+      (hand === null ? "" : this.hand(hand, x + width / 2 - room - 5, y))
     );
+  }
+
+  /** Draws both robots of an arrow between two, each as a letter in its colour, right of x. */
+  private hand(hand: HandOver, x: number, y: number): string {
+    const letter = (robot: string, left: number) =>
+      `<rect x="${left}" y="${y - 7}" width="14" height="14" rx="4" fill="${this.paint(colorOfName(robot))}"/>` +
+      this.text(
+        robot === "" ? "·" : firstLetter(robot),
+        left + 7,
+        y + 4,
+        `fill="${this.paint("--on-accent")}" font-size="11" font-weight="600" text-anchor="middle"`,
+      );
+    const middle = this.text(
+      "›",
+      x + HAND_WIDTH / 2,
+      y + 4,
+      `fill="${this.paint("--ink2")}" font-size="11" font-weight="600" text-anchor="middle"`,
+    );
+    const words = `<title>${escaped(handOverLabel(hand))}</title>`;
+    return `<g>${words}${letter(hand.from, x)}${middle}${letter(hand.to, x + HAND_WIDTH - 14)}</g>`;
   }
 
   private frame({ at: [x, y], size: [width, height], text, color }: Note): string {

@@ -17,6 +17,7 @@ import {
   type Relation,
   type Response,
 } from "./model";
+import { handOverOf, robotOf, robotWord } from "./robots";
 
 /** Words for how an action ended, after its name: "Scan ends true". */
 const ENDINGS: Readonly<Record<Precondition, string>> = {
@@ -57,6 +58,37 @@ export function ignoredWords(graph: Graph, relation: Relation): string | null {
   if (ignored.length === 0 || ignored.length === PRECONDITIONS.length) return null;
   const endings = any(ignored.map((outcome) => ENDINGS[outcome]));
   return `Nothing happens when ${isolated(nameOf(graph, relation.parent))} ${endings}.`;
+}
+
+/**
+ * Return what an arrow between two robots means, one sentence for each response: "Scout starts
+ * Inspect when Carrier’s DriveTo ends true."; empty for other arrows.
+ */
+export function handOverWords(graph: Graph, relation: Relation): readonly string[] {
+  const hand = handOverOf(relation, robotOf(graph));
+  if (hand === null) return [];
+  const [parent, child] = [nameOf(graph, relation.parent), nameOf(graph, relation.child)];
+  return groups(relation).flatMap(({ response, outcomes }) => {
+    const verb = HANDED[response];
+    if (verb === undefined) return [];
+    const ends = any(outcomes.map((outcome) => ENDINGS[outcome]));
+    const who = hand.to === "" ? "Any robot" : isolated(hand.to);
+    return `${who} ${verb} ${isolated(child)} when ${robotWord(hand.from)}’s ${isolated(parent)} ${ends}.`;
+  });
+}
+
+const HANDED: Readonly<Partial<Record<Response, string>>> = {
+  run: "starts",
+  stop: "stops",
+  pause: "pauses",
+  bypass: "passes over",
+};
+
+/** Return an action of another robot in words, as one waits for it: "Carrier: DriveTo". */
+export function robotActionWords(graph: Graph, key: Key): string {
+  const robot = graph.actions.find((action) => action.key === key)?.actor ?? "";
+  const name = isolated(nameOf(graph, key));
+  return robot === "" ? name : `${isolated(robot)}: ${name}`;
 }
 
 /** Returns when an action runs, or the graph ends: by all its arrows, and how they wait for each other. */

@@ -3,7 +3,8 @@ import { Button, Group } from "@mantine/core";
 import { IconGhost2, IconPackage } from "@tabler/icons-react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, setField } from "../graph/edit";
-import type { Action, Graph } from "../graph/model";
+import type { Action } from "../graph/model";
+import { robotNames } from "../graph/robots";
 import { DraftChoice, DraftInput } from "../ui/draft-input";
 import { colorOfName } from "../ui/name-colors";
 import { ArrowList } from "./arrow-list";
@@ -12,10 +13,6 @@ import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
 import { ParameterList } from "./parameters/parameter-list";
 import { RunConditions } from "./run-conditions";
-
-function robots(graph: Graph): string[] {
-  return [...new Set(graph.actions.map((action) => action.actor))].filter(Boolean).sort();
-}
 
 function wholeNumber(draft: string): string | null {
   return /^\d{1,5}$/.test(draft) && Number(draft) < 65536
@@ -66,7 +63,7 @@ export function ActionForm({ action }: { action: Action }) {
         <DraftChoice
           label="Robot"
           placeholder="any robot"
-          data={robots(graph)}
+          data={robotNames(graph.actions)}
           value={action.actor}
           leftSection={
             <i

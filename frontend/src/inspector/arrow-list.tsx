@@ -9,6 +9,7 @@ import { relationId } from "../graph/document-keys";
 import { connect, removeRelation, setEntry, unsetEntry } from "../graph/edit";
 import { type Action, ENTRY, EXIT, type Precondition, type Relation } from "../graph/model";
 import { endName } from "../graph/relation-words";
+import { handOverOf, robotOf, robotWord } from "../graph/robots";
 import { Tooltip } from "../ui/tooltip";
 import { isolated } from "../words/isolated";
 import style from "./inspector.module.css";
@@ -16,6 +17,7 @@ import style from "./inspector.module.css";
 function Line({ relation, context }: { relation: Relation; context: EditorContext }) {
   const id = relationId(relation);
   const answers = responsesOf(relation);
+  const hand = handOverOf(relation, robotOf(context.graph));
   return (
     <li className={style.arrow}>
       <button type="button" className={style.arrowText} onClick={() => context.select([id])}>
@@ -35,6 +37,7 @@ function Line({ relation, context }: { relation: Relation; context: EditorContex
         ))}
         {answers.length === 0 && <span className={style.quiet}>ignored → </span>}
         <b>{endName(context.graph, relation.child)}</b>
+        {hand && <span className={style.quiet}> · {robotWord(hand.to)}</span>}
       </button>
       <Tooltip label="Delete this arrow">
         <ActionIcon

@@ -6,7 +6,8 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { relationId } from "../graph/document-keys";
 import { removeRelation, setRequired, setResponse } from "../graph/edit";
 import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../graph/model";
-import { endName, ignoredWords, relationWords } from "../graph/relation-words";
+import { endName, handOverWords, ignoredWords, relationWords } from "../graph/relation-words";
+import { handOverLabel, handOverOf, robotOf } from "../graph/robots";
 import { isolated } from "../words/isolated";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
@@ -30,6 +31,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
   const parent = endName(graph, relation.parent);
   const child = endName(graph, relation.child);
   const entry = relation.parent === ENTRY;
+  const hand = handOverOf(relation, robotOf(graph));
   const nothing = ignoredWords(graph, relation);
   return (
     <div className={style.form} data-form={id}>
@@ -76,6 +78,11 @@ export function RelationForm({ relation }: { relation: Relation }) {
           </section>
           <div className={style.say}>
             <div>
+              {hand !== null && (
+                <p>
+                  <b>{handOverLabel(hand)}.</b> {handOverWords(graph, relation).join(" ")}
+                </p>
+              )}
               {relationWords(graph, relation).map((sentence) => (
                 <p key={sentence}>{sentence}</p>
               ))}

@@ -7,13 +7,14 @@ import {
   IconStairsDown,
 } from "@tabler/icons-react";
 import { memo, useMemo } from "react";
-import { CardState } from "../canvas/action-card";
+import { CardState, RobotTag } from "../canvas/action-card";
 import card from "../canvas/action-card.module.css";
 import { pillWord } from "../canvas/arrows/bundles";
 import { pathOf } from "../canvas/arrows/line-path";
 import { CardLines } from "../canvas/card-lines";
 import { type LevelFrameProps, type LevelGraph, useEditorStore } from "../canvas/editor-store";
 import { CARD_LINES } from "../canvas/geometry/arrange";
+import { HandMark } from "../canvas/marks/hand-mark";
 import {
   ProblemBadge,
   type ProblemMark,
@@ -27,6 +28,7 @@ import { useEditorContext } from "../edit-actions/editor-context";
 import { type Action, type Direction, fullName, type Key, type Precondition } from "../graph/model";
 import { cardRows } from "../graph/parameters/card-rows";
 import type { ProblemGroup } from "../graph/problems/problem-groups";
+import { hasSeveralRobots } from "../graph/robots";
 import type { Progress } from "../status/progress";
 import { progressBelow, type RunOnCanvas } from "../status/progress-inside";
 import { StateLabel } from "../status/state-label";
@@ -129,13 +131,14 @@ function Line({ of, ended }: LevelLineProps) {
   );
 }
 
-function Pill({ of: { bundle, line } }: Pick<LevelLineProps, "of">) {
+function Pill({ of: { bundle, hand, line } }: Pick<LevelLineProps, "of">) {
   const word = pillWord(bundle);
   if (!line.pill || (word === "" && bundle.outcomes.length === 0)) return null;
   const [left, top] = line.pill;
   return (
     <div className={style.pill} style={{ left, top }}>
       {!bundle.entry && <Glyphs outcomes={bundle.outcomes} untaken={NO_OUTCOMES} />}
+      {hand && <HandMark hand={hand} />}
       {word}
     </div>
   );
@@ -199,6 +202,8 @@ interface InnerCardProps {
   path: string;
   direction: Direction;
   progress: Progress | null;
+  /** The name of its robot; "" for any robot, and where all actions beside it are one robot's. */
+  robot: string;
   box: { readonly x: number; readonly y: number; readonly width: number; readonly height: number };
 }
 
@@ -208,6 +213,7 @@ const InnerCard = memo(function InnerCard({
   path,
   direction,
   progress,
+  robot,
   box,
 }: InnerCardProps) {
   const { name, instanceId, actor, inputs } = action;
@@ -229,7 +235,7 @@ const InnerCard = memo(function InnerCard({
       data-state={progress?.word}
       data-letter={STATE_LETTER[progress?.tone ?? "idle"] || undefined}
     >
-      {actor !== "" && <span className={card.robot}>{actor}</span>}
+      {robot !== "" && <RobotTag name={robot} />}
       <MarkInside path={path} />
       <div className={card.head}>
         <b className={card.name} title={name}>
@@ -301,6 +307,7 @@ function LevelBody({ level }: { level: LevelGraph }) {
   if (graph === null) return <p className={style.said}>Loading…</p>;
   if (typeof graph === "string") return <p className={style.said}>{graph}</p>;
   if (cards.length === 0) return <p className={style.said}>Nothing is drawn in it yet.</p>;
+  const named = hasSeveralRobots(graph.actions);
   return (
     <>
       <LevelLines lines={lines} progress={progress} />
@@ -325,6 +332,7 @@ function LevelBody({ level }: { level: LevelGraph }) {
             path={`${level.path}/${action.key}`}
             direction={direction}
             progress={own}
+            robot={named ? action.actor : ""}
             box={box}
           />
         );

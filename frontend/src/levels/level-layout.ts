@@ -1,11 +1,12 @@
 /** Computes places and lines within an expanded graph, and the size of its card. Pure. */
-import { type Bundle, bundlesOf, pillSizeOf } from "../canvas/arrows/bundles";
+import { type Bundle, bundlesOf, handOversIn, pillSizeOf } from "../canvas/arrows/bundles";
 import { routed } from "../canvas/arrows/routes";
 import { gridOffset, type Scene, type SceneCard } from "../canvas/arrows/scene";
 import { type LineMap, type RoutedLine, simpleLines } from "../canvas/arrows/simple-lines";
 import type { LevelGraph } from "../canvas/editor-store";
 import { estimatedSizes, type Positions, positionsOf, type Size } from "../canvas/geometry/arrange";
 import { type Action, type Direction, ENTRY, EXIT, type Graph, type Key } from "../graph/model";
+import { type HandOver, robotOf } from "../graph/robots";
 import { placesIn, roomFor } from "./room";
 
 interface LevelCard extends Size {
@@ -16,6 +17,7 @@ interface LevelCard extends Size {
 
 interface LevelLine {
   readonly bundle: Bundle;
+  readonly hand: HandOver | null;
   readonly line: RoutedLine;
 }
 
@@ -104,6 +106,7 @@ function linesOf(
   const bundles = graph.relations
     .filter(({ parent, child }) => standing.has(parent) && standing.has(child))
     .flatMap(bundlesOf);
+  const handOf = handOversIn(graph.relations, robotOf(graph));
   const boxes: SceneCard[] = [
     ...endsOf(direction, size),
     ...cards.map(({ action: { key }, x, y, width, height }) => ({ key, x, y, width, height })),
@@ -115,13 +118,14 @@ function linesOf(
     lines: bundles.map((bundle) => {
       const { id, source, target } = bundle;
       const waypoints = bundle.waypoints.map(([x, y]) => [x + moved[0], y + moved[1]] as const);
-      return { id, source, target, pill: pillSizeOf(bundle, false), waypoints };
+      const pill = pillSizeOf(bundle, false, handOf(bundle) !== null);
+      return { id, source, target, pill, waypoints };
     }),
   };
   const lines: LineMap = bundles.length > MOST_ROUTED ? simpleLines(scene) : routed(scene).lines;
   return bundles.flatMap((bundle) => {
     const line = lines.get(bundle.id);
-    return line ? [{ bundle, line }] : [];
+    return line ? [{ bundle, hand: handOf(bundle), line }] : [];
   });
 }
 

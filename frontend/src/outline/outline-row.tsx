@@ -14,7 +14,9 @@ import { useEditorStore, useOpenThreadCount } from "../canvas/editor-store";
 import { noteColor } from "../canvas/notes/note-nodes";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import type { Note } from "../graph/edit/notes";
+import type { Relation } from "../graph/model";
 import { spokenNote } from "../graph/note-links";
+import { handOverLabel, handOverOf, type RobotOf, robotWord } from "../graph/robots";
 import { cardLines, lineText } from "../graph/value-text";
 import { durationLabel } from "../status/durations";
 import type { Progress } from "../status/progress";
@@ -36,6 +38,8 @@ interface Props {
   change: RowEditKind | null;
   /** The name of the action, or of the thing to which the arrow leads. */
   name: string;
+  /** The robots of the actions; empty unless the graph has several. */
+  robots: RobotOf;
   /** The other people who have it selected. */
   others: readonly PersonHere[] | undefined;
   mayEdit: boolean;
@@ -92,7 +96,24 @@ function PartWords({ row }: { row: InsideRow }) {
   );
 }
 
-export function Words({ row, progress, name }: Pick<Props, "row" | "progress" | "name">) {
+/** The robot to which an arrow hands over, with its colour; nothing for any other arrow. */
+export function HandedTo({ relation, robots }: { relation: Relation; robots: RobotOf }) {
+  const hand = handOverOf(relation, robots);
+  if (!hand) return null;
+  return (
+    <span className={style.handed} title={handOverLabel(hand)}>
+      <span className="visually-hidden">{handOverLabel(hand)}</span>
+      <span aria-hidden>
+        <i style={{ background: colorOfName(hand.to) }} />
+        <bdi>{hand.to || "any robot"}</bdi>
+      </span>
+    </span>
+  );
+}
+
+type WordsProps = Pick<Props, "row" | "progress" | "name" | "robots">;
+
+export function Words({ row, progress, name, robots }: WordsProps) {
   switch (row.kind) {
     case "entry":
       return (
@@ -103,6 +124,13 @@ export function Words({ row, progress, name }: Pick<Props, "row" | "progress" | 
     case "action": {
       const { action } = row;
       const [line] = cardLines(action.inputs, 1);
+      const more = [
+        action.missing
+          ? "named by an arrow, but not there"
+          : robots.size > 0 && robotWord(action.actor),
+        line && lineText(line),
+        row.follows === 0 && "nothing follows",
+      ].filter(Boolean);
       return (
         <>
           <span className={style.head}>
@@ -114,11 +142,7 @@ export function Words({ row, progress, name }: Pick<Props, "row" | "progress" | 
               <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
             )}
           </span>
-          <span className={style.sub}>
-            {action.missing ? "named by an arrow, but not there" : action.actor || "any robot"}
-            {line && ` · ${lineText(line)}`}
-            {row.follows === 0 && " · nothing follows"}
-          </span>
+          {more.length > 0 && <span className={style.sub}>{more.join(" · ")}</span>}
         </>
       );
     }
@@ -133,6 +157,7 @@ export function Words({ row, progress, name }: Pick<Props, "row" | "progress" | 
         <span className={style.target}>
           <span className={style.response}>{row.response}</span> <b>{name}</b>
           {!row.relation.required && <span className={style.sub}>optional</span>}
+          <HandedTo relation={row.relation} robots={robots} />
         </span>
       );
     case "inside":
@@ -234,7 +259,8 @@ export function labelOf(row: OutlineItem, name: string): string {
 }
 
 export const OutlineRow = memo(function OutlineRow(props: Props) {
-  const { row, active, selected, progress, change, name, others, mayEdit, handlers } = props;
+  const { row, active, selected, progress, change, name, robots, others, mayEdit, handlers } =
+    props;
   const label = labelOf(row, name);
   const words = useId();
   return (
@@ -271,7 +297,7 @@ export const OutlineRow = memo(function OutlineRow(props: Props) {
           </span>
         )}
         <button type="button" id={words} tabIndex={-1} onClick={() => handlers.choose(row)}>
-          <Words row={row} progress={progress} name={name} />
+          <Words row={row} progress={progress} name={name} robots={robots} />
         </button>
         {others && row.kind !== "outcome" && <Others people={others} />}
       </td>

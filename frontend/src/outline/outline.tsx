@@ -9,6 +9,7 @@ import { IconListTree, IconPlus } from "@tabler/icons-react";
 import { useCallback, useEffect, useMemo, useRef, useState } from "react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { ENTRY, type Graph, type Key } from "../graph/model";
+import { type RobotOf, robotOf } from "../graph/robots";
 import type { Progress } from "../status/progress";
 import { useSelectedByOthers } from "../sync/use-room";
 import { announcer } from "../ui/announcer";
@@ -93,6 +94,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     return all.filter((row) => row.kind === "entry" || lit.has(ownerOf(row)));
   }, [graph, isOpen, robot, phone, expanded, run]);
   const names = useMemo(() => namesOf(graph), [graph]);
+  const robots = useMemo(() => robotOf(graph), [graph]);
   const [only] = selection.size === 1 ? selection : [];
   const chosen = () => rows.find((row) => subjectOf(row) === only);
   const [active, setActive] = useState<string>(() => chosen()?.id ?? ENTRY);
@@ -204,7 +206,7 @@ export function Outline({ progress }: { progress: ReadonlyMap<Key, Progress> }) 
     if (!phone) return context.openAdd();
     context.openAdd({ screen: middle, at: [0, 140 * graph.actions.length], from: null });
   };
-  const shown = { rows, at, selection, progress, edited, names, others, mayEdit, handlers };
+  const shown = { rows, at, selection, progress, edited, names, robots, others, mayEdit, handlers };
   return (
     <div className={style.outline}>
       <div className={style.robots}>
@@ -253,6 +255,7 @@ interface ShownRows {
   progress: ReadonlyMap<Key, Progress>;
   edited: Edited | null;
   names: ReadonlyMap<Key, string>;
+  robots: RobotOf;
   others: ReturnType<typeof useSelectedByOthers>;
   mayEdit: boolean;
   handlers: RowHandlers;
@@ -262,7 +265,7 @@ const progressOf = (row: OutlineItem, progress: ShownRows["progress"]): Progress
   row.kind === "action" ? (progress.get(row.action.key) ?? null) : null;
 
 function Rows({ rows, at, selection, progress, edited, ...props }: ShownRows) {
-  const { names, others, mayEdit, handlers } = props;
+  const { names, robots, others, mayEdit, handlers } = props;
   return rows.map((row, i) => (
     <OutlineRow
       key={row.id}
@@ -272,6 +275,7 @@ function Rows({ rows, at, selection, progress, edited, ...props }: ShownRows) {
       progress={progressOf(row, progress)}
       change={edited?.row.id === row.id ? edited.change : null}
       name={names.get(nameKey(row)) ?? ""}
+      robots={robots}
       others={others.get(subjectOf(row))}
       mayEdit={mayEdit}
       handlers={handlers}
@@ -280,7 +284,7 @@ function Rows({ rows, at, selection, progress, edited, ...props }: ShownRows) {
 }
 
 function PhoneRows({ graph, rows, at, selection, ...props }: ShownRows & { graph: Graph }) {
-  const { progress, edited, names, others, mayEdit, handlers } = props;
+  const { progress, edited, names, robots, others, mayEdit, handlers } = props;
   const bundles = useMemo(() => bundlesOf(graph), [graph]);
   const order = useMemo(() => new Map(rows.map(({ id }, i) => [id, i])), [rows]);
   return rows.map((row, i) => {
@@ -295,6 +299,7 @@ function PhoneRows({ graph, rows, at, selection, ...props }: ShownRows & { graph
         progress={progressOf(row, progress)}
         edited={isOf(edited, row) ? edited : null}
         names={names}
+        robots={robots}
         order={order}
         others={others.get(subjectOf(row))}
         mayEdit={mayEdit}

@@ -3,13 +3,23 @@ import { IconArrowBackUp, IconArrowRight, IconFlag, IconPlus } from "@tabler/ico
 import { memo, useId } from "react";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
 import { EXIT, type Key, type Precondition } from "../graph/model";
+import type { RobotOf } from "../graph/robots";
 import { cardLines, lineText } from "../graph/value-text";
 import { durationLabel } from "../status/durations";
 import type { Progress } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import type { PersonHere } from "../sync/use-room";
 import { colorOfName } from "../ui/name-colors";
-import { colorOf, labelOf, Others, RowActions, type RowHandlers, Talk, Words } from "./outline-row";
+import {
+  colorOf,
+  HandedTo,
+  labelOf,
+  Others,
+  RowActions,
+  type RowHandlers,
+  Talk,
+  Words,
+} from "./outline-row";
 import style from "./phone-row.module.css";
 import type { RowEditKind } from "./row-actions";
 import { RowEdit } from "./row-edit";
@@ -24,6 +34,8 @@ interface Props {
   /** The edit that is open in this row, or in one of its bundles. */
   edited: { readonly row: OutlineItem; readonly change: RowEditKind } | null;
   names: ReadonlyMap<Key, string>;
+  /** The robots of the actions; empty unless the graph has several. */
+  robots: RobotOf;
   /** The index of each row in the list: arrows to rows above lead back. */
   order: ReadonlyMap<string, number>;
   /** The other people who have it selected. */
@@ -48,7 +60,14 @@ function sentence({ bundled = [], response, relation }: BundleRow, name: string)
   return `${when === "" ? "" : `When ${when}: `}${response} ${name}${optional}`;
 }
 
-function Bundle({ row, name, back }: { row: BundleRow; name: string; back: boolean }) {
+interface BundleProps {
+  row: BundleRow;
+  name: string;
+  back: boolean;
+  robots: RobotOf;
+}
+
+function Bundle({ row, name, back, robots }: BundleProps) {
   const Way = row.relation.child === EXIT ? IconFlag : back ? IconArrowBackUp : IconArrowRight;
   return (
     <>
@@ -59,22 +78,17 @@ function Bundle({ row, name, back }: { row: BundleRow; name: string; back: boole
         <Way size={14} />
         <bdi className={style.to}>{name}</bdi>
       </span>
+      <HandedTo relation={row.relation} robots={robots} />
     </>
   );
 }
 
-function About({
-  row,
-  name,
-  progress,
-}: {
-  row: OutlineItem;
-  name: string;
-  progress: Progress | null;
-}) {
-  if (row.kind !== "action") return <Words row={row} progress={progress} name={name} />;
+function About(props: Pick<Props, "row" | "progress" | "robots"> & { name: string }) {
+  const { row, name, progress, robots } = props;
+  if (row.kind !== "action") return <Words {...props} />;
   const { action } = row;
-  const lines = cardLines(action.inputs, VALUES).map(lineText);
+  const lines = cardLines(action.inputs, VALUES).map(lineText).join(" · ");
+  const named = action.missing || robots.size > 0;
   return (
     <>
       <span className={style.head}>
@@ -85,14 +99,14 @@ function About({
         )}
       </span>
       <span className={style.sub}>
-        {action.missing ? (
-          "named by an arrow, but not there"
-        ) : (
+        {action.missing && "named by an arrow, but not there"}
+        {!action.missing && robots.size > 0 && (
           <b style={{ color: action.actor === "" ? undefined : colorOfName(action.actor) }}>
-            {action.actor || "any robot"}
+            <bdi>{action.actor || "any robot"}</bdi>
           </b>
         )}
-        {lines.map((line) => ` · ${line}`).join("")}
+        {named && lines !== "" && " · "}
+        {lines}
       </span>
     </>
   );
@@ -107,6 +121,7 @@ export const PhoneRow = memo(function PhoneRow(props: Props) {
     progress,
     edited,
     names,
+    robots,
     order,
     others,
     mayEdit,
@@ -135,7 +150,7 @@ export const PhoneRow = memo(function PhoneRow(props: Props) {
     >
       <td className={style.words}>
         <button type="button" id={words} tabIndex={-1} onClick={() => handlers.choose(row)}>
-          <About row={row} name={name} progress={progress} />
+          <About row={row} name={name} progress={progress} robots={robots} />
         </button>
         {others && <Others people={others} />}
       </td>
@@ -163,7 +178,7 @@ export const PhoneRow = memo(function PhoneRow(props: Props) {
                 handlers={handlers}
                 chip={{
                   look: `${style.chip} ${bundle.relation.required ? "" : style.optional}`,
-                  words: <Bundle row={bundle} name={target} back={back} />,
+                  words: <Bundle row={bundle} name={target} back={back} robots={robots} />,
                 }}
               />
             );

@@ -23,6 +23,11 @@ export function initials(name: string): string {
   return found.join("").toUpperCase() || "?";
 }
 
+/** Return the first letter of a name as people count letters, in capitals. */
+export function firstLetter(name: string): string {
+  return (lettersOf(name.trim())[0] ?? "?").toUpperCase();
+}
+
 /** Return the letters of a word as people count them; of a pile of marks only the first few. */
 function lettersOf(word: string): string[] {
   const start = word.slice(0, 64);

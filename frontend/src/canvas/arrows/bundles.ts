@@ -9,6 +9,7 @@ import {
   type Relation,
   type Response,
 } from "../../graph/model";
+import { type HandOver, handOverOf, isResponding, type RobotOf } from "../../graph/robots";
 import { readWaypoints } from "../../graph/waypoints";
 import type { PillSize } from "./scene";
 
@@ -67,6 +68,20 @@ function made(relation: Relation): Bundle[] {
   }));
 }
 
+/** Returns the two robots of a bundle that leads from one to another; null for any other bundle. */
+export type HandOvers = (bundle: Pick<Bundle, "relation" | "response">) => HandOver | null;
+
+/** Find the arrows between actions of two robots; a bundle that does nothing is none of them. */
+export function handOversIn(relations: readonly Relation[], robots: RobotOf): HandOvers {
+  const found = new Map<string, HandOver>();
+  for (const relation of robots.size > 0 ? relations : []) {
+    const hand = handOverOf(relation, robots);
+    if (hand !== null) found.set(relationId(relation), hand);
+  }
+  return ({ relation, response }) =>
+    isResponding(response) ? (found.get(relation) ?? null) : null;
+}
+
 /** Return the word on a pill beside its signs. The usual response `run` has none. */
 export function pillWord({ response, entry }: Pick<Bundle, "response" | "entry">): string {
   if (entry || response === "run") return "";
@@ -79,13 +94,17 @@ const EDGE = 13;
 const GLYPH = 13;
 const LETTER = 7.3;
 const BADGE = 34;
+const HAND = 42;
 
-/** Return the size of a bundle's pill, px; null if it has nothing to show. */
-export function pillSizeOf(bundle: Bundle, marked: boolean): PillSize | null {
+/**
+ * Return the size of a bundle's pill, px; null if it has nothing to show. `handed`: it leads from
+ * one robot to another.
+ */
+export function pillSizeOf(bundle: Bundle, marked: boolean, handed = false): PillSize | null {
   const word = pillWord(bundle);
   const glyphs = bundle.entry ? 0 : bundle.outcomes.length;
   if (glyphs === 0 && word === "" && !marked) return null;
   const said = word === "" ? 0 : word.length * LETTER + 3;
-  const width = EDGE + glyphs * GLYPH + said + (marked ? BADGE : 0);
+  const width = EDGE + glyphs * GLYPH + said + (marked ? BADGE : 0) + (handed ? HAND : 0);
   return { width: Math.ceil(width), height: PILL_HEIGHT };
 }

@@ -1,7 +1,8 @@
 /** Turns a graph into the input of elkjs, and its output into places. Pure; `layout.ts` runs it. */
 import type { ElkExtendedEdge, ElkNode, ElkPort, LayoutOptions } from "elkjs/lib/elk-api";
 import { ENTRY, EXIT, type Graph, type Key } from "../../graph/model";
-import { type Bundle, bundlesOf, pillSizeOf } from "../arrows/bundles";
+import { robotOf } from "../../graph/robots";
+import { type Bundle, bundlesOf, handOversIn, pillSizeOf } from "../arrows/bundles";
 import {
   CARD,
   estimatedSizes,
@@ -69,12 +70,20 @@ function holds(graph: Graph, tied: ReadonlySet<Key>): [Key, Key][] {
  */
 const BESIDE_PILL = 24;
 
-/** Return the size of a bundle's port: that of its pill, which then has room before the first bend. */
-function portSize(bundle: Bundle, right: boolean): Size {
-  const pill = pillSizeOf(bundle, false);
-  if (pill === null) return { width: 1, height: 1 };
-  const { width, height } = pill;
-  return right ? { width: width + BESIDE_PILL, height } : { width, height: height + BESIDE_PILL };
+type PortSize = (bundle: Bundle) => Size;
+
+/**
+ * Return a function for the size of a bundle's port: that of its pill, which then has room before
+ * the first bend.
+ */
+function portSizes(graph: Graph, right: boolean): PortSize {
+  const handOf = handOversIn(graph.relations, robotOf(graph));
+  return (bundle) => {
+    const pill = pillSizeOf(bundle, false, handOf(bundle) !== null);
+    if (pill === null) return { width: 1, height: 1 };
+    const { width, height } = pill;
+    return right ? { width: width + BESIDE_PILL, height } : { width, height: height + BESIDE_PILL };
+  };
 }
 
 const POINT: Size = { width: 1, height: 1 };
@@ -84,9 +93,9 @@ const POINT: Size = { width: 1, height: 1 };
  * wide as the port that the line left: then both sides of a card are divided alike, and successive
  * cards stand level.
  */
-function arrivalSizes(lines: readonly Bundle[], sizes: Sizes, right: boolean) {
+function arrivalSizes(lines: readonly Bundle[], sizes: Sizes, portSize: PortSize, right: boolean) {
   const across = (line: Bundle): Size => {
-    const { width, height } = portSize(line, right);
+    const { width, height } = portSize(line);
     return right ? { width: 1, height } : { width, height: 1 };
   };
   const taken = new Map<Key, number>();
@@ -152,16 +161,17 @@ export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
     ports.set(key, list);
     list.push({ id, ...size, layoutOptions: { "elk.port.side": side } });
   };
-  const arrivals = arrivalSizes(lines, sizes, right);
+  const portSize = portSizes(graph, right);
+  const arrivals = arrivalSizes(lines, sizes, portSize, right);
   const edges = lines.map((line, i): ElkExtendedEdge => {
-    port(line.source, `o${i}`, portSize(line, right), right ? "EAST" : "SOUTH");
+    port(line.source, `o${i}`, portSize(line), right ? "EAST" : "SOUTH");
     port(line.target, `i${i}`, arrivals(line), right ? "WEST" : "NORTH");
     return { id: `e${i}`, sources: [`o${i}`], targets: [`i${i}`] };
   });
   // elkjs draws no arrow from a card to itself: a port keeps the room for its pill.
   const loops = loopsIn(graph);
   for (const [i, line] of loops.entries())
-    port(line.source, `l${i}`, portSize(line, right), right ? "EAST" : "SOUTH");
+    port(line.source, `l${i}`, portSize(line), right ? "EAST" : "SOUTH");
   const held = graph.actions.length <= THOROUGH ? holds(graph, tied) : [];
   for (const [i, [parent, child]] of held.entries()) {
     port(parent, `ho${i}`, POINT, right ? "EAST" : "SOUTH");
@@ -195,17 +205,22 @@ export function layoutRequest(graph: Graph, measured: Sizes): LayoutRequest {
     edges,
   };
   const loose = [...order.keys()].filter((key) => !tied.has(key));
-  return { root, keys, loose, room: withLoops(sizes, loops, right), sizes };
+  return { root, keys, loose, room: withLoops(sizes, loops, portSize, right), sizes };
 }
 
 const loopsIn = (graph: Graph): Bundle[] =>
   graph.relations.filter(({ parent, child }) => parent === child).flatMap(bundlesOf);
 
 /** Return the sizes of cards including the pills of arrows that lead back to the same card. */
-function withLoops(sizes: Sizes, loops: readonly Bundle[], right: boolean): Sizes {
+function withLoops(
+  sizes: Sizes,
+  loops: readonly Bundle[],
+  portSize: PortSize,
+  right: boolean,
+): Sizes {
   const room = new Map(sizes);
   for (const line of loops) {
-    const [card, pill] = [sizes.get(line.source) ?? CARD, portSize(line, right)];
+    const [card, pill] = [sizes.get(line.source) ?? CARD, portSize(line)];
     const before = room.get(line.source) ?? card;
     room.set(line.source, {
       width: Math.max(before.width, card.width + (right ? pill.width : 0)),

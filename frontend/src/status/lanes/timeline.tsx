@@ -228,7 +228,7 @@ function Groups({ track, axis, named, inside, ...props }: GroupsProps) {
       {named && (
         <li className={style.robot} style={{ color: colorOfName(robot) }}>
           <i style={{ background: colorOfName(robot) }} aria-hidden />
-          {robot === "" ? "any robot" : robot}
+          <bdi>{robot === "" ? "any robot" : robot}</bdi>
         </li>
       )}
       {lanes
