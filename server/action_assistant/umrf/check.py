@@ -31,6 +31,7 @@ __all__ = [
     "check_action",
     "check_reading",
     "check_written",
+    "forbids_start",
     "is_final",
     "refused_by_parser",
 ]
@@ -115,8 +116,7 @@ def refused_by_parser(reading: Reading) -> list[Problem]:
 
 
 def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ()) -> list[Problem]:
-    """Return the problems that forbid a start on one robot: the errors, and warnings for which one
-    engine refuses the graph.
+    """Return the problems that forbid a start on one robot.
 
     `overridden`: codes of errors that a person accepts. A final error forbids the start even if its
     code is overridden.
@@ -124,9 +124,14 @@ def blocking(problems: Collection[Problem], *, overridden: Collection[str] = ())
     return [
         problem
         for problem in problems
-        if (problem.severity == "error" or problem.code in REFUSED_ALONE)
-        and (is_final(problem) or problem.code not in overridden)
+        if forbids_start(problem) and (is_final(problem) or problem.code not in overridden)
     ]
+
+
+def forbids_start(problem: Problem) -> bool:
+    """Return whether a problem forbids a start on one robot, unless a person overrides it: an error,
+    or a warning for which one engine refuses the graph."""
+    return problem.severity == "error" or problem.code in REFUSED_ALONE
 
 
 def is_final(problem: Problem) -> bool:

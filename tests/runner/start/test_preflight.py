@@ -16,7 +16,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Parameter
 from action_assistant.umrf.packages.naming import snake_case
 from runner.colcon_workspace import changed, workspace
-from runner.harness import ANN, BEN, Harness, order, sequence, until, virtual
+from runner.harness import ANN, BEN, Harness, ended, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet, given, group, verdicts
 
 
@@ -129,6 +129,12 @@ async def test_the_simulator_that_plays_a_robot_refuses_what_the_robot_would() -
     async with fleet(Harness(), David=Open()) as control:
         with pytest.raises(Conflict, match="synchronise"):
             await control.start(order(graph, like="David"), ANN)
+        override = Override(codes=("actors",), reason="it is a test")
+        run = (await control.start(order(graph, like="David", override=override), ANN)).run
+        assert [each.code for each in run.despite] == ["actors"]
+        assert await ended(control, run.id) == "refused"
+        run = (await control.start(order(graph), ANN)).run
+        assert await ended(control, run.id) == "finished"
         await control.register(Registration(name="David", profile={"synchronises": True}), ANN)
         assert (await control.start(order(graph, like="David"), ANN)).run.like == "David"
 

@@ -213,3 +213,18 @@ async def test_an_action_of_the_robot_comes_before_a_graph() -> None:
         asked = group(outer(), "David", digest="", subgraphs=(sent(sequence("round")),))
         (look,) = await control.look(asked)
         assert verdicts(look)["subgraphs"] == "blocked"
+
+
+@virtual
+async def test_a_robot_is_not_given_a_graph_with_actions_of_another_robot_inside() -> None:
+    inner = sequence("round", actions=1)
+    eves = msgspec.structs.replace(inner.actions[0], actor="Eve")
+    inner = msgspec.structs.replace(inner, actions=(eves,))
+    david, inside = Open(), sent(inner)
+    index_of(david, inner)
+    async with fleet(Harness(), David=david) as control:
+        with pytest.raises(Conflict, match="belong to Eve") as refused:
+            await control.start(start(inside, engine="David"), ANN)
+        assert (refused.value.where or {})["item"] == "actors"
+        run = (await control.start(start(inside), ANN)).run
+        assert await ended(control, run.id) == "finished"

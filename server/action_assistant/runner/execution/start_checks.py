@@ -29,6 +29,7 @@ from action_assistant.runner.start.admission import GroupRequest, Prepared, Star
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.umrf.check import forbids_start
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 
 #: Facts of the simulator when it plays no robot: there a paused run can be stopped.
@@ -342,9 +343,9 @@ class StartChecks:
 
 
 def _overridden(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:
-    """Return the problems that a person overrides: errors of the graph, and those that block it on
-    the robot."""
-    problems = [each for each in ready.problems if each.severity == "error"]
+    """Return the problems that a person overrides: those of the graph that forbid a start, and
+    those that block it on the robot."""
+    problems = list(filter(forbids_start, ready.problems))
     found: list[Overridden] = []
     for item in items:
         if item.verdict != "blocked":

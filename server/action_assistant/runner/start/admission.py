@@ -19,7 +19,7 @@ from action_assistant.runner.runs.sent_graphs import (
     read_sent,
     tree_of,
 )
-from action_assistant.umrf.check import blocking, check, is_final
+from action_assistant.umrf.check import blocking, check, forbids_start, is_final
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
@@ -95,8 +95,8 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class Admitted(msgspec.Struct, frozen=True, kw_only=True):
-    """A start whose graph passed all checks. `problems`: warnings, and errors that are
-    overridden."""
+    """A start whose graph passed all checks. `problems`: warnings, and those that forbid a start
+    and are overridden."""
 
     graph: Graph
     graph_id: str | None
@@ -194,8 +194,8 @@ def prepared(
     admitted = admit(request, facts, approved=approved)
     graph = admitted.graph
     inside = [action for each in admitted.inside.values() for action in each.actions]
-    errors = [each for each in admitted.problems if each.severity == "error"]
-    warnings = [each for each in admitted.problems if each.severity != "error"]
+    overridden = list(filter(forbids_start, admitted.problems))
+    warnings = [each for each in admitted.problems if not forbids_start(each)]
     return Prepared(
         run=run,
         name=graph.name,
@@ -206,7 +206,7 @@ def prepared(
         digest=admitted.digest,
         laps=laps(graph),
         inner_laps={name: laps(each, inside=True) for name, each in admitted.inside.items()},
-        problems=(*errors[:_MOST_KEPT], *warnings[:_MOST_KEPT]),
+        problems=(*overridden[:_MOST_KEPT], *warnings[:_MOST_KEPT]),
         subgraphs=admitted.subgraphs,
         inner=tuple(sorted({each.name for each in inside if not each.missing})),
         tree_digest=tree_of(admitted.digest, admitted.subgraphs),

@@ -34,7 +34,7 @@ from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.runner.start.built_libraries import older_libraries
 from action_assistant.safe_text import hold_names
-from action_assistant.umrf.check import check, is_final
+from action_assistant.umrf.check import check, forbids_start, is_final
 from action_assistant.umrf.codes import QUIET
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
@@ -143,10 +143,10 @@ def refusal_item(code: str, refused: Refused) -> Item:
 
 def graph_item(admitted: Admitted | Prepared) -> Item:
     """Return the item of the preflight list for the graph itself: passed, or warned if it has loud
-    warnings or errors that were overridden. The graph was admitted, so the item is never a
+    warnings or problems that were overridden. The graph was admitted, so the item is never a
     refusal."""
-    warned = tuple(each for each in admitted.problems if each.severity == "warning")[:_SHOWN]
-    overridden = tuple(each for each in admitted.problems if each.severity == "error")[:_SHOWN]
+    overridden = tuple(filter(forbids_start, admitted.problems))[:_SHOWN]
+    warned = tuple(each for each in admitted.problems if not forbids_start(each))[:_SHOWN]
     if overridden:
         text = f"{len(overridden)} certain problems are overridden."
         return Item(code="graph", verdict="warned", text=text, problems=(*overridden, *warned))
