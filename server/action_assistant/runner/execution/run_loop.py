@@ -328,7 +328,7 @@ class OpenRun:
     async def _send_stops(self) -> None:
         """Send stop messages from the first press on, until cancelled. A simulated engine that does not
         obey is given up."""
-        async for attempt in self._stopping.attempts(lambda: self.run):
+        async for attempt in self._stopping.attempts():
             failed = await send_stop(self._link, self.run.graph_name)
             if not failed:
                 self.watch.stop_left()

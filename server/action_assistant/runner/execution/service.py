@@ -25,7 +25,7 @@ from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Regist
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registration import Robot, registration_of
-from action_assistant.runner.robots.registry import RobotListeners, Robots
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended
@@ -319,7 +319,10 @@ class ExecutionService:
         self._runs.last_number = (await self._runtime.journal.query(queries.last_number()))[0][0]
         self._runtime.tasks.start_soon(self._late_activity.run)
         self.robots.open(
-            self._runtime, RobotListeners(self._robots_changed, self._hear_of, self._show)
+            self._runtime,
+            changed=self._robots_changed,
+            commanded=self._hear_of,
+            shows=self._show,
         )
         for row in await self._runtime.journal.query(queries.all_robots()):
             self.robots.add(registration_of(row))

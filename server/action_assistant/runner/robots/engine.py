@@ -13,6 +13,7 @@ from typing import Final, TypeVar
 import anyio
 import msgspec
 
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     Answer,
@@ -64,14 +65,20 @@ class EngineIndex(msgspec.Struct, frozen=True, kw_only=True):
     unread: int = 0
 
 
-class KnownEngine:
-    """Watches an engine while `watch` runs.
+class EngineListeners(msgspec.Struct, frozen=True, kw_only=True):
+    """The functions that are called with what an engine reports. `changed`: the page has to show
+    something else; `became`: the engine has changed its state; `commanded`: somebody else has sent
+    it a command; `shows`: an answer or feedback shows these graphs."""
 
-    `changed` is called after each visible change; `foreign` with each command of somebody else;
-    `became` when the engine has changed its state; `shows` with all graphs that an answer or
-    feedback shows. `indexes`: the runner writes into the folder that the engine indexes while it
-    runs.
-    """
+    changed: Callable[[], None]
+    became: "Callable[[KnownEngine], None]"
+    commanded: "Callable[[KnownEngine, ForeignCommand], None]"
+    shows: "Callable[[KnownEngine, tuple[Snapshot, ...]], None]"
+
+
+class KnownEngine:
+    """Watches an engine while `watch` runs. `indexes`: the runner writes into the folder that the
+    engine indexes while it runs."""
 
     def __init__(
         self,
@@ -79,13 +86,10 @@ class KnownEngine:
         facts: EngineFacts,
         link: Link,
         *,
-        clock_us: Callable[[], int],
-        changed: Callable[[], None] = lambda: None,
-        became: "Callable[[KnownEngine], None]" = lambda _: None,
-        foreign: "Callable[[KnownEngine, ForeignCommand], None]" = lambda _, __: None,
-        shows: "Callable[[KnownEngine, tuple[Snapshot, ...]], None]" = lambda _, __: None,
-        recordings: Recordings | None = None,
-        indexes: bool = False,
+        clock_us: ClockUs,
+        listeners: EngineListeners,
+        recordings: Recordings | None,
+        indexes: bool,
     ) -> None:
         self.registration = registration
         self.facts = facts
@@ -97,10 +101,7 @@ class KnownEngine:
         self.took_ms: float | None = None
         self._link = link
         self._clock_us = clock_us
-        self._changed = changed
-        self._became = became
-        self._foreign = foreign
-        self._shows = shows
+        self._listeners = listeners
         self._recordings = recordings
         self._rarely = _RARELY if indexes else 1
         self._indexing_until = 0.0
@@ -218,7 +219,7 @@ class KnownEngine:
             now = self._link.standing
             if now != known:
                 known = now
-                self._changed()
+                self._listeners.changed()
 
     async def _ask(self) -> None:
         """Send a get every ten seconds: more rarely where answers are slow or the engine indexes,
@@ -264,7 +265,7 @@ class KnownEngine:
 
     def _hear(self, report: Report) -> None:
         if isinstance(report, Feedback):
-            self._shows(self, report.snapshots)
+            self._listeners.shows(self, report.snapshots)
         match report:
             case EngineChanged(state=("gone" | "busy") as state, why=why):
                 self._turn(state, why)
@@ -273,7 +274,8 @@ class KnownEngine:
             case Feedback() if self._recordings is not None:
                 self._recordings.record_feedback(self.registration.name, report)
             case ForeignCommand():
-                self._foreign(self, report)
+                if not report.targets or self.registration.name in report.targets:
+                    self._listeners.commanded(self, report)
                 self._look.set()  # the engine may obey after that answer: ask again later
                 self.look_closely()
             case _:
@@ -291,8 +293,8 @@ class KnownEngine:
         fresh = self._restarted is not None and now - self._restarted < _FRESH_S
         self._turn("restarted" if fresh else "answering", "")
         if known is None or _held(known) != _held(answer):
-            self._changed()
-        self._shows(self, answer.graphs)
+            self._listeners.changed()
+        self._listeners.shows(self, answer.graphs)
 
     def _silent(self, why: str) -> None:
         standing = self._link.standing
@@ -308,8 +310,8 @@ class KnownEngine:
         is_other = state != self.state
         self.state, self.why = state, why
         if is_other:
-            self._became(self)
-        self._changed()
+            self._listeners.became(self)
+        self._listeners.changed()
 
     async def index(self, run_in_worker: "RunInAnyWay[EngineIndex]") -> EngineIndex:
         """Return the actions and graphs that the engine has indexed, as of its last answer. A

@@ -20,7 +20,7 @@ from action_assistant.runner.links.port import (
     Registration,
     Sighting,
 )
-from action_assistant.runner.robots.engine import EngineIndex, KnownEngine
+from action_assistant.runner.robots.engine import EngineIndex, EngineListeners, KnownEngine
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registration import (
     STREAM,
@@ -47,16 +47,6 @@ _NOT_YET: Final = "It has not answered yet."
 _ANSWERS: Final = frozenset({"answering", "restarted"})
 
 
-class RobotListeners(msgspec.Struct, frozen=True):
-    """The functions that are called with what robots report. `changed`: the page has to show
-    something else; `commanded`: somebody else has sent a command to a robot; `shows`: an engine
-    shows these graphs."""
-
-    changed: Callable[[], None]
-    commanded: Callable[[KnownEngine, ForeignCommand], None]
-    shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None]
-
-
 class Robots:
     """Keeps the registered robots and watches their engines. `reach` makes links, or is the reason
     why there are none; `links` exist already, by robot. `recordings` store raw messages.
@@ -76,12 +66,25 @@ class Robots:
         self._registered: dict[str, Registration] = {}
         self._engines: dict[str, KnownEngine] = {}
         self._scopes: dict[str, anyio.CancelScope] = {}
-        self._opened: tuple[Runtime, RobotListeners] | None = None
+        self._opened: tuple[Runtime, EngineListeners] | None = None
         self._robot_log: RobotLog | None = None
 
-    def open(self, runtime: Runtime, listeners: RobotListeners) -> None:
-        """Start to watch the robots of `links`, and from now on every robot that is added."""
-        self._opened = runtime, listeners
+    def open(
+        self,
+        runtime: Runtime,
+        *,
+        changed: Callable[[], None],
+        commanded: Callable[[KnownEngine, ForeignCommand], None],
+        shows: Callable[[KnownEngine, tuple[Snapshot, ...]], None],
+    ) -> None:
+        """Start to watch the robots of `links`, and from now on every robot that is added. The
+        functions are called with what robots report, as those of `EngineListeners`."""
+        self._opened = (
+            runtime,
+            EngineListeners(
+                changed=changed, became=self._note_state, commanded=commanded, shows=shows
+            ),
+        )
         self._robot_log = RobotLog(runtime.journal, runtime.tasks)
         if self.recordings is not None:
             runtime.tasks.start_soon(self.recordings.run)
@@ -132,10 +135,7 @@ class Robots:
             facts,
             link,
             clock_us=runtime.clock_us,
-            changed=listeners.changed,
-            became=self._note_state,
-            foreign=self._pass_on,
-            shows=listeners.shows,
+            listeners=listeners,
             recordings=self.recordings,
             indexes=name in self._indexing,
         )
@@ -167,7 +167,7 @@ class Robots:
         with scope:
             await engine.watch()
 
-    def _while_open(self) -> tuple[Runtime, RobotListeners]:
+    def _while_open(self) -> tuple[Runtime, EngineListeners]:
         if self._opened is None:
             raise RuntimeError("the registry is not open")
         return self._opened
@@ -322,11 +322,6 @@ class Robots:
         at = self._while_open()[0].clock_us()
         became = EngineBecame(at=at, state=engine.state, why=engine.why, incarnation=incarnation)
         self.robot_log.note(name, became, name)
-
-    def _pass_on(self, engine: KnownEngine, command: ForeignCommand) -> None:
-        """Pass a command of somebody else on, if it is for this robot."""
-        if not command.targets or engine.registration.name in command.targets:
-            self._while_open()[1].commanded(engine, command)
 
     @property
     def robot_log(self) -> RobotLog:

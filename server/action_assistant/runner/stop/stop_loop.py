@@ -5,7 +5,7 @@ is down. Whoever sends them ends this when rest is proven (`OpenRun`).
 """
 
 import itertools
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from typing import Final, NamedTuple
 
 import anyio
@@ -34,6 +34,7 @@ class StopLoop:
 
     def __init__(self, run: Run, clock_us: ClockUs) -> None:
         self.hung = ""
+        self._run = run
         self._clock_us = clock_us
         self._wanted = anyio.Event()
         self._pressed = anyio.Event()
@@ -58,19 +59,20 @@ class StopLoop:
         return StopRequested(self._clock_us(), author, stop_id) if is_new else None
 
     def notice(self, run: Run) -> None:
-        """Send again soon, if the last message could not help but the run has changed so that the
-        next one may."""
+        """Take over the run as it is now. Send again soon, if the last message could not help but
+        the next one may."""
+        self._run = run
         if self._vain and not _is_vain(run):
             self._news.set()
 
-    async def attempts(self, current: Callable[[], Run]) -> AsyncIterator[StopAttempt]:
-        """Yield each stop message when it is due, without end. `current` gives the run as it is."""
+    async def attempts(self) -> AsyncIterator[StopAttempt]:
+        """Yield each stop message when it is due, without end."""
         await self._wanted.wait()
         since, gap = anyio.current_time(), _FIRST_GAP_S
-        for number in itertools.count(current().stops_sent + 1):
-            await self._turn(current)
+        for number in itertools.count(self._run.stops_sent + 1):
+            await self._turn()
             yield StopAttempt(number, since)
-            self._vain = _is_vain(current())
+            self._vain = _is_vain(self._run)
             self._news = anyio.Event()
             with anyio.move_on_after(gap) as quiet:
                 await self._news.wait()
@@ -78,10 +80,10 @@ class StopLoop:
             if not quiet.cancelled_caught:
                 gap = _FIRST_GAP_S
 
-    async def _turn(self, current: Callable[[], Run]) -> None:
+    async def _turn(self) -> None:
         """If the engine does not hold the run any more, wait for a press: only one message is sent
         for each then, since a graph of that name would be another one."""
-        while current().lost and not self._pressed.is_set():
+        while self._run.lost and not self._pressed.is_set():
             with anyio.move_on_after(_GAP_S):
                 await self._pressed.wait()
         self._pressed = anyio.Event()
