@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.logs.setup import say
 from action_assistant.safe_text import make_streams_printable
 from action_assistant.settings import (
@@ -235,6 +235,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except CannotStart as error:
         say(str(error), "error")
         return 2
+    except RequestRefused as error:
+        say(str(error), "error")
+        return 1
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # somebody piped us into `head`

@@ -17,6 +17,7 @@
     CannotStart                          the process cannot begin its work; one sentence, exit 2
     ├── AnothersDatabase                 a database that another program made
     └── NewerSchema                      one that a newer version of this program made
+    RequestRefused                       a server refused what a command asked; one sentence, exit 1
 
 On the wire, `title` stands for the class and `detail` for one instance.
 """
@@ -149,3 +150,11 @@ class AnothersDatabase(CannotStart):
 
 class NewerSchema(CannotStart):
     """A newer version of this program has made the tables of the database."""
+
+
+class RequestRefused(Exception):
+    """A server refused the request of a command. `status`: the HTTP status; 0 if no request was sent."""
+
+    def __init__(self, why: str, status: int = 0) -> None:
+        super().__init__(why)
+        self.status = status

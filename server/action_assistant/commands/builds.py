@@ -10,7 +10,7 @@ from typing import Any, Final
 
 import msgspec
 
-from action_assistant.commands.client import RequestRefused, add_server, refused, running
+from action_assistant.commands.client import add_server, running
 from action_assistant.errors import CannotStart
 from action_assistant.ros_workspace import source_of
 from action_assistant.safe_text import one_line
@@ -148,19 +148,16 @@ def _builds(options: argparse.Namespace) -> int:
         print("The last build had no package of an action.", file=sys.stderr)
         return 0
     with running(options) as server:
-        try:
-            listed = server.editor("GET", "/api/actions").json()
-            documents = {each["name"]: each["document"] for each in reversed(listed)}
-            for each in found:
-                _tell(each)
-                document = documents.get(each.action)
-                if document is None:
-                    print(one_line(f"{each.action}: is not in the library."), file=sys.stderr)
-                    continue
-                path = f"/api/actions/{document}/build"
-                server.editor("PUT", path, content=msgspec.json.encode(_body(each)))
-        except RequestRefused as error:
-            return refused(error)
+        listed = server.editor("GET", "/api/actions").json()
+        documents = {each["name"]: each["document"] for each in reversed(listed)}
+        for each in found:
+            _tell(each)
+            document = documents.get(each.action)
+            if document is None:
+                print(one_line(f"{each.action}: is not in the library."), file=sys.stderr)
+                continue
+            path = f"/api/actions/{document}/build"
+            server.editor("PUT", path, content=msgspec.json.encode(_body(each)))
     return 0 if all(each.build.ended_well for each in found) else 1
 
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import msgspec
 
 from action_assistant import paths, settings
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.certificate import Certificate
 
@@ -93,14 +93,6 @@ class Server:
             )
         found: str = named[0]
         return found
-
-
-class RequestRefused(Exception):
-    """A request was refused. `status`: the HTTP status; 0 if no request was sent."""
-
-    def __init__(self, why: str, status: int = 0) -> None:
-        super().__init__(why)
-        self.status = status
 
 
 def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "httpx.Response":
@@ -186,6 +178,7 @@ def print_json(value: object) -> None:
     sys.stdout.write(msgspec.json.format(msgspec.json.encode(value)).decode() + "\n")
 
 
-def refused(error: RequestRefused) -> int:
-    print(f"action-assistant: {error}", file=sys.stderr)
+def refused(why: str) -> int:
+    """Print why a part of a command was refused, and return its exit code. Other refusals are raised."""
+    print(f"action-assistant: {why}", file=sys.stderr)
     return 1

@@ -7,9 +7,9 @@ from typing import Final, NamedTuple
 
 import msgspec
 
-from action_assistant.commands.client import RequestRefused, Server, add_server, refused, running
+from action_assistant.commands.client import Server, add_server, running
 from action_assistant.commands.files import file_text, refusal
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.difference import Difference, difference
 from action_assistant.umrf.difference_text import by_name, is_same, lines, without_looks
@@ -55,7 +55,7 @@ def _diff(options: argparse.Namespace) -> int:
             with running(options) as server:
                 found = _on_server(server, given)
     except RequestRefused as error:
-        return refused(error) + 1  # 1 is for what differs
+        raise CannotStart(str(error)) from error  # exit 2: 1 is for what differs
     if options.without_looks:
         found = without_looks(found)
     if options.json:

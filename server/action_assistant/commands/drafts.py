@@ -4,15 +4,7 @@ import argparse
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Final
 
-from action_assistant.commands.client import (
-    RequestRefused,
-    Server,
-    command,
-    decoded,
-    print_json,
-    refused,
-    running,
-)
+from action_assistant.commands.client import Server, command, decoded, print_json, running
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.difference import Difference
@@ -69,11 +61,8 @@ COMMANDS: Final = {"drafts": _add_drafts}
 
 def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
-        try:
-            graph = server.graph_id(options.graph)
-            answer = server.editor("GET", f"/api/graphs/{graph}/drafts")
-        except RequestRefused as error:
-            return refused(error)
+        graph = server.graph_id(options.graph)
+        answer = server.editor("GET", f"/api/graphs/{graph}/drafts")
     if options.json:
         print_json(answer.json())
         return 0
@@ -90,11 +79,8 @@ def _new(options: argparse.Namespace) -> int:
 
     wanted = {"name": options.name, "seq": options.at}
     with running(options) as server:
-        try:
-            graph = server.graph_id(options.graph)
-            answer = server.editor("POST", f"/api/graphs/{graph}/drafts", json=wanted)
-        except RequestRefused as error:
-            return refused(error)
+        graph = server.graph_id(options.graph)
+        answer = server.editor("POST", f"/api/graphs/{graph}/drafts", json=wanted)
     print(decoded(answer, DraftView).id)
     return 0
 
@@ -104,21 +90,18 @@ def _merge(options: argparse.Namespace) -> int:
 
     asked = {"into": options.into, "choices": _choices(options.choose)}
     with running(options) as server:
-        try:
-            below = f"/api/drafts/{options.draft}"
-            answer = server.editor("POST", f"{below}/preview", json=asked)
-            if options.json and options.look:
-                print_json(answer.json())
-                return 0
-            preview = decoded(answer, MergePreview)
-            _print_preview(preview)
-            left = [each for each in preview.conflicts if each.place not in asked["choices"]]
-            _print_conflicts(left)
-            if options.look or left:
-                return 1 if left else 0
-            return _merged(server, below, preview, asked)
-        except RequestRefused as error:
-            return refused(error)
+        below = f"/api/drafts/{options.draft}"
+        answer = server.editor("POST", f"{below}/preview", json=asked)
+        if options.json and options.look:
+            print_json(answer.json())
+            return 0
+        preview = decoded(answer, MergePreview)
+        _print_preview(preview)
+        left = [each for each in preview.conflicts if each.place not in asked["choices"]]
+        _print_conflicts(left)
+        if options.look or left:
+            return 1 if left else 0
+        return _merged(server, below, preview, asked)
 
 
 def _merged(server: Server, below: str, preview: "MergePreview", asked: dict[str, Any]) -> int:

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
-from action_assistant.commands.client import RequestRefused, Server, add_server, refused, running
-from action_assistant.errors import CannotStart
+from action_assistant.commands.client import Server, add_server, refused, running
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS, read_action, write_action
@@ -68,7 +68,7 @@ class _Bringing:
             found = True
             self.file(path, of_folder=True)
         if not found:
-            self.code = refused(RequestRefused(f"{folder}: has no file of an action (*{_ENDING})."))
+            self.code = refused(f"{folder}: has no file of an action (*{_ENDING}).")
 
     def file(self, path: Path, *, of_folder: bool = False) -> None:
         body = _bytes(path)
@@ -85,7 +85,7 @@ class _Bringing:
                 made = self._server.editor("POST", "/api/graphs", content=body, headers=_JSON)
                 _tell(made.json()["id"], made.json()["name"])
         except RequestRefused as error:
-            self.code = refused(RequestRefused(f"{path}: {error}"))
+            self.code = refused(f"{path}: {error}")
 
     def _action(self, path: Path, body: bytes) -> None:
         documents = self._known()

@@ -7,16 +7,14 @@ from typing import TYPE_CHECKING, Final
 import msgspec
 
 from action_assistant.commands.client import (
-    RequestRefused,
     Server,
     add_server,
     command,
     decoded,
     print_json,
-    refused,
     running,
 )
-from action_assistant.errors import CannotStart, Refused
+from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.private_files import own_folder
 from action_assistant.safe_text import one_line
 from action_assistant.web.auth.keys import Keys
@@ -60,10 +58,7 @@ COMMANDS: Final = {"people": _add_people, "link": _add_link}
 
 def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
-        try:
-            answer = server.editor("GET", "/api/invitations")
-        except RequestRefused as error:
-            return refused(error)
+        answer = server.editor("GET", "/api/invitations")
         if options.json:
             print_json(answer.json())
             return 0
@@ -80,12 +75,9 @@ def _invite(options: argparse.Namespace) -> int:
     from action_assistant.editor.people.invitations import Invitation
 
     with running(options) as server:
-        try:
-            wanted = {"role": options.role, "label": options.label}
-            made = decoded(server.editor("POST", "/api/invitations", json=wanted), Invitation)
-            _show(decoded(server.editor("GET", "/api/invitations"), Sharing).origins, made)
-        except RequestRefused as error:
-            return refused(error)
+        wanted = {"role": options.role, "label": options.label}
+        made = decoded(server.editor("POST", "/api/invitations", json=wanted), Invitation)
+        _show(decoded(server.editor("GET", "/api/invitations"), Sharing).origins, made)
     return 0
 
 
@@ -116,8 +108,6 @@ def _revoke(options: argparse.Namespace) -> int:
             raise CannotStart(f"{silent} {error}") from error
         print("No server answers; the link is marked as revoked in the data folder.")
         return 0
-    except RequestRefused as error:
-        return refused(error)
 
 
 def _revoke_at(server: Server, invitation: str) -> int:
@@ -125,11 +115,9 @@ def _revoke_at(server: Server, invitation: str) -> int:
     try:
         server.runner("POST", "/api/revocations", json={"invitation": invitation})
     except (RequestRefused, CannotStart) as error:
-        return refused(
-            RequestRefused(
-                f"Revoked, but a runner with a data folder of its own has not been told: {error}"
-            )
-        )
+        raise RequestRefused(
+            f"Revoked, but a runner with a data folder of its own has not been told: {error}"
+        ) from error
     from action_assistant.editor.people.invitations import Invitation
 
     gone = decoded(answer, Invitation)
@@ -143,10 +131,7 @@ def _link(options: argparse.Namespace) -> int:
     """Print links by which the owner signs in, the likeliest address first. The link holds the
     token, so only addresses of a server that has proven to know it are printed."""
     with running(options) as server:
-        try:
-            answer = server.editor("GET", "/api/invitations")
-        except RequestRefused as error:
-            return refused(error)
+        answer = server.editor("GET", "/api/invitations")
     from action_assistant.editor.api.invitations import Sharing
 
     sharing = decoded(answer, Sharing)

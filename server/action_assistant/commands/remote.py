@@ -10,13 +10,11 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import msgspec
 
 from action_assistant.commands.client import (
-    RequestRefused,
     Server,
     add_server,
     command,
     decoded,
     print_json,
-    refused,
     running,
 )
 from action_assistant.commands.databases import runs_copy
@@ -118,12 +116,9 @@ COMMANDS: Final = {
 
 def _export(options: argparse.Namespace) -> int:
     with running(options) as server:
-        try:
-            graph = server.graph_id(options.graph)
-            query = {"at": options.at} if options.at is not None else {}
-            answer = server.editor("GET", f"/api/graphs/{graph}/umrf", params=query)
-        except RequestRefused as error:
-            return refused(error)
+        graph = server.graph_id(options.graph)
+        query = {"at": options.at} if options.at is not None else {}
+        answer = server.editor("GET", f"/api/graphs/{graph}/umrf", params=query)
         sys.stdout.write(answer.text if answer.text.endswith("\n") else answer.text + "\n")
     return 0
 
@@ -149,21 +144,15 @@ def _verify(options: argparse.Namespace) -> int:
 
 def _examples(options: argparse.Namespace) -> int:
     with running(options) as server:
-        try:
-            taken = decoded(server.runner("POST", "/api/examples"), list[str])
-        except RequestRefused as error:
-            return refused(error)
+        taken = decoded(server.runner("POST", "/api/examples"), list[str])
     print(f"{len(taken)} examples are there, with the label “example”.")
     return 0
 
 
 def _runs(options: argparse.Namespace) -> int:
     with running(options) as server:
-        try:
-            query = {"graph": server.graph_id(options.graph)} if options.graph else {}
-            answer = server.runner("GET", "/api/runs", params=query)
-        except RequestRefused as error:
-            return refused(error)
+        query = {"graph": server.graph_id(options.graph)} if options.graph else {}
+        answer = server.runner("GET", "/api/runs", params=query)
     if options.json:
         print_json(answer.json())
         return 0
@@ -186,27 +175,24 @@ def _run(options: argparse.Namespace) -> int:
     from action_assistant.runner.runs.views import RunShown
 
     with running(options) as server:
-        try:
-            graph = server.graph_id(options.graph)
-            label = {"label": options.label} if options.label else {}
-            version = server.editor("POST", f"/api/graphs/{graph}/versions", json=label).json()
-            order = {
-                "version": version["id"],
-                "digest": version["digest"],
-                "umrf": version["umrf"],
-                "engine": options.engine,
-                "request_id": str(uuid.uuid4()),
-                "graph": graph,
-            }
-            if version.get("subgraphs"):
-                order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
-            if script is not None:
-                order["script"] = script
-            run = decoded(server.runner("POST", "/api/runs", json=order), RunShown)
-            print(run.id, flush=True)
-            return 0 if options.no_wait else _watch(server, run.id)
-        except RequestRefused as error:
-            return refused(error)
+        graph = server.graph_id(options.graph)
+        label = {"label": options.label} if options.label else {}
+        version = server.editor("POST", f"/api/graphs/{graph}/versions", json=label).json()
+        order = {
+            "version": version["id"],
+            "digest": version["digest"],
+            "umrf": version["umrf"],
+            "engine": options.engine,
+            "request_id": str(uuid.uuid4()),
+            "graph": graph,
+        }
+        if version.get("subgraphs"):
+            order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
+        if script is not None:
+            order["script"] = script
+        run = decoded(server.runner("POST", "/api/runs", json=order), RunShown)
+        print(run.id, flush=True)
+        return 0 if options.no_wait else _watch(server, run.id)
 
 
 def _watch(server: Server, run: str) -> int:
@@ -240,11 +226,8 @@ def _why(run: Run) -> str:
 def _at_rest(options: argparse.Namespace) -> int:
     """Record a person's word that a run is at rest, where no engine can prove it."""
     with running(options) as server:
-        try:
-            path = f"/api/runs/{options.run}/at_rest"
-            answer = server.runner("POST", path, json={"how": options.how})
-        except RequestRefused as error:
-            return refused(error)
+        path = f"/api/runs/{options.run}/at_rest"
+        answer = server.runner("POST", path, json={"how": options.how})
     from action_assistant.runner.runs.views import RunShown
 
     run = decoded(answer, RunShown)
@@ -280,21 +263,18 @@ def insisting(server: Server, method: str, path: str) -> Any:
 def _stop(options: argparse.Namespace) -> int:
     """Request a Stop, then wait for the proof that nothing moves; return the exit code."""
     with running(options) as server:
-        try:
-            path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
-            asked = insisting(server, "POST", path)
-            others = asked.get("graphs", {})
-            deadline = time.monotonic() + options.wait
-            while True:
-                runs = [insisting(server, "GET", f"/api/runs/{run}") for run in asked["runs"]]
-                robots = insisting(server, "GET", "/api/robots") if others else []
-                graphs = _unproven(others, robots)
-                settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
-                if (settled and not graphs) or time.monotonic() > deadline:
-                    break
-                time.sleep(_POLL)
-        except RequestRefused as error:
-            return refused(error)
+        path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
+        asked = insisting(server, "POST", path)
+        others = asked.get("graphs", {})
+        deadline = time.monotonic() + options.wait
+        while True:
+            runs = [insisting(server, "GET", f"/api/runs/{run}") for run in asked["runs"]]
+            robots = insisting(server, "GET", "/api/robots") if others else []
+            graphs = _unproven(others, robots)
+            settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
+            if (settled and not graphs) or time.monotonic() > deadline:
+                break
+            time.sleep(_POLL)
     doubts = [_unconfirmed(run) for run in runs if not _is_at_rest(run)]
     doubts += [f"STOP UNCONFIRMED for {each}. {_LOOK_AT_ROBOT}" for each in graphs]
     doubts += [

@@ -7,15 +7,8 @@ from urllib.parse import quote
 
 import msgspec
 
-from action_assistant.commands.client import (
-    RequestRefused,
-    command,
-    decoded,
-    print_json,
-    refused,
-    running,
-)
-from action_assistant.errors import CannotStart
+from action_assistant.commands.client import command, decoded, print_json, running
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import SECOND_PERSON
 
@@ -69,10 +62,7 @@ COMMANDS: Final = {"robots": _add_robots}
 
 def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
-        try:
-            answer = server.runner("GET", "/api/robots")
-        except RequestRefused as error:
-            return refused(error)
+        answer = server.runner("GET", "/api/robots")
     if options.json:
         print_json(answer.json())
         return 0
@@ -93,28 +83,20 @@ def _add(options: argparse.Namespace) -> int:
     if options.get_service is not None:
         wanted["get_service"] = options.get_service
     with running(options) as server:
-        try:
-            from action_assistant.runner.robots.registration import Robot
+        from action_assistant.runner.robots.registration import Robot
 
-            robots = decoded(server.runner("GET", "/api/robots"), list[Robot])
-            if options.name in {each.name for each in robots} and not options.replace:
-                return refused(
-                    RequestRefused(
-                        f"{options.name} is registered already. --replace registers it anew."
-                    )
-                )
-            print(_line(decoded(server.runner("POST", "/api/robots", json=wanted), Robot)))
-        except RequestRefused as error:
-            return refused(error)
+        robots = decoded(server.runner("GET", "/api/robots"), list[Robot])
+        if options.name in {each.name for each in robots} and not options.replace:
+            raise RequestRefused(
+                f"{options.name} is registered already. --replace registers it anew."
+            )
+        print(_line(decoded(server.runner("POST", "/api/robots", json=wanted), Robot)))
     return 0
 
 
 def _remove(options: argparse.Namespace) -> int:
     with running(options) as server:
-        try:
-            server.runner("DELETE", f"/api/robots/{quote(options.name, safe='')}")
-        except RequestRefused as error:
-            return refused(error)
+        server.runner("DELETE", f"/api/robots/{quote(options.name, safe='')}")
     print(one_line(f"{options.name} is not registered any more"))
     return 0
 

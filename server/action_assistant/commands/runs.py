@@ -6,17 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from action_assistant import paths, settings
-from action_assistant.commands.client import (
-    RequestRefused,
-    Server,
-    command,
-    decoded,
-    print_json,
-    refused,
-    running,
-)
+from action_assistant.commands.client import Server, command, decoded, print_json, refused, running
 from action_assistant.commands.drafts import changes_lines
-from action_assistant.errors import CannotStart, Refused
+from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.difference_text import lines, without_looks
@@ -47,17 +39,14 @@ def add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> No
 
 def _since(options: argparse.Namespace) -> int:
     with running(options) as server:
-        try:
-            run = server.runner("GET", f"/api/runs/{options.run}").json()
-            graph, bad = run["graph"], _seq(server, run)
-            good = options.good or _last_good(server, run)
-            script = server.runner("GET", f"/api/runs/{options.run}/script").json()
-            asked = {"good": good, "bad": bad, "script": {"behaviours": script["behaviours"]}}
-            answer = server.editor("POST", f"/api/graphs/{graph}/since", json=asked)
-            query = {"from": good, "to": bad}
-            edits = server.editor("GET", f"/api/graphs/{graph}/diff", params=query)
-        except RequestRefused as error:
-            return refused(error)
+        run = server.runner("GET", f"/api/runs/{options.run}").json()
+        graph, bad = run["graph"], _seq(server, run)
+        good = options.good or _last_good(server, run)
+        script = server.runner("GET", f"/api/runs/{options.run}/script").json()
+        asked = {"good": good, "bad": bad, "script": {"behaviours": script["behaviours"]}}
+        answer = server.editor("POST", f"/api/graphs/{graph}/since", json=asked)
+        query = {"from": good, "to": bad}
+        edits = server.editor("GET", f"/api/graphs/{graph}/diff", params=query)
     from action_assistant.editor.history.course_search import SinceWhen
 
     found = decoded(answer, SinceWhen)
@@ -146,10 +135,7 @@ def _archive(options: argparse.Namespace) -> int:
     if options.runs is None and options.raw is None:
         raise CannotStart("Say how old what goes may be: --runs DAYS, --raw DAYS, or both.")
     with running(options) as server:
-        try:
-            return _sweep(server, {"runs": options.runs, "raw": options.raw})
-        except RequestRefused as error:
-            return refused(error)
+        return _sweep(server, {"runs": options.runs, "raw": options.raw})
 
 
 def _sweep(server: Server, ages: dict[str, float | None]) -> int:
@@ -196,7 +182,7 @@ def _restore(options: argparse.Namespace) -> int:
             archive_file.put(path, folder / place)
         except (Refused, OSError) as error:
             text = error.detail if isinstance(error, Refused) else f"{path}: {error.strerror}"
-            code = refused(RequestRefused(text))
+            code = refused(text)
             continue
         print(f"{place}: {events} events, all of them sound")
     return code

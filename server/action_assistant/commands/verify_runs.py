@@ -6,7 +6,8 @@ from typing import Literal
 
 import msgspec
 
-from action_assistant.commands.client import RequestRefused, Server, print_json, refused, running
+from action_assistant.commands.client import Server, print_json, running
+from action_assistant.errors import RequestRefused
 from action_assistant.runner.analysis.expected_runs import Expectation
 from action_assistant.safe_text import one_line, told
 from action_assistant.umrf.courses.expected import check_expected
@@ -31,10 +32,7 @@ class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
 def verify(options: argparse.Namespace) -> int:
     """Simulate every expectation again; 1 when any takes another course."""
     with running(options) as server:
-        try:
-            verdicts = list(_verdicts(server, options))
-        except RequestRefused as error:
-            return refused(error)
+        verdicts = list(_verdicts(server, options))
     if options.json:
         print_json(msgspec.to_builtins(verdicts))
     elif not verdicts:

@@ -35,15 +35,13 @@ from action_assistant.errors import BadInput
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
-from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.keys import Keys, ScrapeToken
 from action_assistant.web.auth.revocations import Revocations
-from action_assistant.web.auth.scrape_token import ScrapeToken
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import session_routes
 from action_assistant.web.monitoring.gauges import Family
-from action_assistant.web.monitoring.monitoring import Monitoring
+from action_assistant.web.monitoring.monitoring import Monitoring, Watched
 from action_assistant.web.monitoring.status import Activity
-from action_assistant.web.monitoring.watched import Watched
 from action_assistant.web.network.addresses import Addresses, addresses_of
 from action_assistant.web.server.application import application
 from action_assistant.web.workers.lanes import run_here

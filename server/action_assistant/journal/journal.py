@@ -3,6 +3,7 @@
 import asyncio
 import contextlib
 import logging
+from collections import deque
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager
 from functools import partial
@@ -26,7 +27,6 @@ from action_assistant.journal.database import (
 )
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.events import Addition, Draft, Event, Fold
-from action_assistant.journal.follower import Follower
 from action_assistant.journal.probe import JournalProbe
 from action_assistant.journal.reader import JournalReader, body_of, following, seal_of
 from action_assistant.journal.removal import STREAM, StreamRemoved, delete_some, taken_out
@@ -40,6 +40,7 @@ log: Final = logging.getLogger(__name__)
 T = TypeVar("T")
 
 _PAGE: Final = 500  # events that a follower reads at once
+_HELD: Final = 1000  # events that wait for a follower in memory; after that it reads them
 _BRIEF: Final = 64 * 1024  # bytes of events that are written without a thread
 
 # The tables of the log are the same for both branches.
@@ -49,6 +50,51 @@ _head, _snapshot = editor_head.c, editor_snapshot.c
 def _before(copies: Path | None) -> Before:
     """Keep a copy in that folder before tables change."""
     return no_copy if copies is None else partial(keep_copy, copies)
+
+
+class Follower:
+    """The bounded queue of committed events for one reader."""
+
+    def __init__(self) -> None:
+        self._waiting: deque[Event] = deque()
+        self._missed = False
+        self._ended = False
+        self._news = asyncio.Event()
+
+    def hear(self, events: Sequence[Event]) -> None:
+        """Queue events that were just committed; a full queue is dropped, and the reader reads the
+        log instead."""
+        if not events or self._missed:
+            return
+        if len(self._waiting) + len(events) > _HELD:
+            self._waiting.clear()
+            self._missed = True
+        else:
+            self._waiting.extend(events)
+        self._news.set()
+
+    def wake(self) -> None:
+        """Empty the queue of events, and have the reader read the events from the log instead."""
+        self._waiting.clear()
+        self._missed = True
+        self._news.set()
+
+    def end(self) -> None:
+        """End the queue: no event will come any more."""
+        self._ended = True
+        self._news.set()
+
+    async def next(self) -> list[Event] | None:
+        """Wait for events and return them; return [] if the log has to be read, None at the end."""
+        await self._news.wait()
+        found = list(self._waiting)
+        if self._ended and not found and not self._missed:
+            return None
+        self._waiting.clear()
+        self._missed = False
+        if not self._ended:
+            self._news.clear()
+        return found
 
 
 class Journal(JournalReader):

@@ -43,9 +43,8 @@ from action_assistant.runner.start.index_writer import IndexWriter, folder_troub
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.auth.caller import BackgroundTasks
-from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.keys import Keys, ScrapeToken
 from action_assistant.web.auth.revocations import Revocations
-from action_assistant.web.auth.scrape_token import ScrapeToken
 from action_assistant.web.auth.sessions import revocation
 from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import addresses_of

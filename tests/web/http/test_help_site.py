@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from action_assistant.web.http.help_site import HelpSite
+from action_assistant.web.http.static_files import HelpSite
 
 
 async def _nobody(scope: Any, receive: Any, send: Any) -> None:

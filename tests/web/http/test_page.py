@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from action_assistant.web.http.page import Page
+from action_assistant.web.http.static_files import Page
 
 
 async def _nobody(scope: Any, receive: Any, send: Any) -> None:

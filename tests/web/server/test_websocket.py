@@ -8,8 +8,7 @@ import pytest
 import uvicorn
 from uvicorn.server import ServerState
 
-from action_assistant.web.server.direct import DirectSocket, direct_socket
-from action_assistant.web.server.websocket import WebSocketProtocol
+from action_assistant.web.server.direct import DirectSocket, WebSocketProtocol, direct_socket
 from web.server.wire import REQUEST, Wire, end, frame, opened
 
 EITHER: Final = pytest.mark.parametrize("kind", [DirectSocket, WebSocketProtocol])

@@ -1,15 +1,36 @@
-"""Files below a folder, read and replaced all together; no link is followed."""
+"""The folder that packages are written to: planned by what is there, checked, and written all together.
+
+No link is followed. In the source folder of a colcon workspace nothing is written that colcon would not take.
+"""
 
 import errno
+import os
 import secrets
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from typing import Final
+from xml.etree import ElementTree
 
 import msgspec
 
 from action_assistant.commands.directories import Directory, closing, opened, why
 from action_assistant.errors import CannotStart
+from action_assistant.umrf.packages.bases import (
+    BASE_NAME,
+    GenerationBase,
+    UnreadableBase,
+    read_base,
+)
+from action_assistant.umrf.packages.regenerating import (
+    Regeneration,
+    readable_paths,
+    regenerated,
+)
+
+#: Below a folder that has one of them, colcon looks for no packages.
+_IGNORED: Final = frozenset({"COLCON_IGNORE", "AMENT_IGNORE"})
+_MANIFEST: Final = "package.xml"
 
 
 class FolderContents(msgspec.Struct, frozen=True):
@@ -160,3 +181,143 @@ def _undo(top: Directory, done: Sequence[FileStep], known: Mapping[str, bytes]) 
 
 def _remove(top: Directory, path: str) -> None:
     _do(top, path, None)
+
+
+class PackagesPlan(msgspec.Struct, frozen=True):
+    """The changes of packages in a folder. `regenerations`: by folder of the package; `there`:
+    present contents by path; `barred`: why a path cannot be read, by path."""
+
+    regenerations: dict[str, Regeneration]
+    there: dict[str, bytes] = {}
+    barred: dict[str, str] = {}
+
+    @property
+    def refused(self) -> bool:
+        """Return whether anything prevents writing."""
+        return bool(self.barred) or any(
+            each.conflicts or each.differing or each.broken for each in self.regenerations.values()
+        )
+
+    @property
+    def writes(self) -> dict[str, bytes]:
+        """Return the new content of each file that changes or is missing, base files included."""
+        found: dict[str, bytes] = {}
+        for folder, each in self.regenerations.items():
+            found |= {f"{folder}/{path}": content for path, content in each.writes.items()}
+            if each.base is not None:
+                found[f"{folder}/{BASE_NAME}"] = each.base
+        return found
+
+    @property
+    def removals(self) -> tuple[str, ...]:
+        """Return the paths of files to be removed."""
+        return tuple(
+            f"{folder}/{path}"
+            for folder, each in self.regenerations.items()
+            for path in each.removals
+        )
+
+    @property
+    def steps(self) -> tuple[FileStep, ...]:
+        """Return the steps of writing, in an order that may be interrupted anywhere.
+
+        The base files come last. If they came first, a killed call would leave files that look as
+        if people had reverted the new content. Before all files, each base announces which files
+        will follow, so that the next call knows those that were written.
+        """
+        announced = [
+            FileStep(f"{folder}/{BASE_NAME}", each.announced)
+            for folder, each in self.regenerations.items()
+            if each.writes
+        ]
+        writes = self.writes
+        files = [path for path in writes if not path.endswith(f"/{BASE_NAME}")]
+        bases = [path for path in writes if path.endswith(f"/{BASE_NAME}")]
+        return (
+            *announced,
+            *(FileStep(path, writes[path]) for path in files),
+            *(FileStep(path, None) for path in self.removals),
+            *(FileStep(path, writes[path]) for path in bases),
+        )
+
+
+def plan(root: Path, packages: Mapping[str, Mapping[str, bytes]]) -> PackagesPlan:
+    """Plan how generated packages go into the folder `root`. `packages`: contents by package folder
+    and path. Raise CannotStart if a folder cannot be read."""
+    regenerations: dict[str, Regeneration] = {}
+    there: dict[str, bytes] = {}
+    barred: dict[str, str] = {}
+    found = contents(root, [f"{folder}/{BASE_NAME}" for folder in packages])
+    for folder, now in packages.items():
+        base, at = None, f"{folder}/{BASE_NAME}"
+        if at in found.barred:
+            barred[at] = found.barred[at]
+        elif at in found.present:
+            there[at] = found.present[at]
+            try:
+                base = read_base(found.present[at])
+            except UnreadableBase as error:
+                barred[at] = str(error)
+        below = contents(root, [f"{folder}/{path}" for path in readable_paths(folder, now, base)])
+        there |= below.present
+        barred |= below.barred
+        if not barred:
+            regenerations[folder] = _regenerated(folder, now, below.present, base)
+    return PackagesPlan(regenerations, there, barred)
+
+
+def _regenerated(
+    folder: str,
+    now: Mapping[str, bytes],
+    there: Mapping[str, bytes],
+    base: GenerationBase | None,
+) -> Regeneration:
+    inside = {path.removeprefix(f"{folder}/"): content for path, content in there.items()}
+    return regenerated(folder, now, inside, base)
+
+
+def prevented_in(source: Path, packages: Iterable[str]) -> tuple[str, ...]:
+    """Return sentences about what prevents these packages in a source folder. Raise CannotStart if
+    there is no such folder, or one in which colcon finds no packages."""
+    if not source.is_dir():
+        raise CannotStart(
+            f"{source} is no folder. --into wants the source folder of a workspace that is there, as "
+            "~/ws/src; --output makes folders."
+        )
+    for name in sorted(_IGNORED | {_MANIFEST}):
+        if (source / name).exists():
+            raise CannotStart(f"{source} has a {name}: colcon looks for no packages in it.")
+    wanted = frozenset(packages)
+    return tuple(
+        f"{folder}: is a package “{name}” already, and colcon takes no two of one name."
+        for folder, name in _packages(source)
+        if name in wanted and os.path.realpath(folder) != os.path.realpath(source / name)
+    )
+
+
+def _packages(source: Path) -> Iterator[tuple[Path, str]]:
+    """Yield the folder and name of every package below. As colcon does, follow links to folders,
+    and skip hidden folders and folders inside packages."""
+    seen: set[str] = set()
+    for at, folders, files in os.walk(source, followlinks=True):
+        real = os.path.realpath(at)
+        if real in seen or not _IGNORED.isdisjoint((*files, *folders)):
+            folders.clear()
+            continue
+        seen.add(real)
+        if _MANIFEST in files:
+            folders.clear()
+            name = _name(Path(at, _MANIFEST))
+            if name is not None:
+                yield Path(at), name
+        folders[:] = sorted(folder for folder in folders if not folder.startswith("."))
+
+
+def _name(manifest: Path) -> str | None:
+    """Return the package name in a manifest; None if it cannot be read, as colcon skips it then,
+    too."""
+    try:
+        name = ElementTree.fromstring(manifest.read_bytes()).findtext("name")
+    except (OSError, ElementTree.ParseError):
+        return None
+    return None if name is None else name.strip()

@@ -7,11 +7,9 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
-from action_assistant.commands.client import RequestRefused, add_server, refused, running
-from action_assistant.commands.packages import workspace
-from action_assistant.commands.packages.folder import write_all
-from action_assistant.commands.packages.planning import PackagesPlan, plan
-from action_assistant.errors import CannotStart
+from action_assistant.commands.client import add_server, running
+from action_assistant.commands.packages.folder import PackagesPlan, plan, prevented_in, write_all
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS
@@ -178,15 +176,13 @@ def _package(options: argparse.Namespace) -> int:
         place = f"{options.file}:{error.line}:{error.column}"
         print(f"{place}: {error.message}", file=sys.stderr)
         return 1
-    except RequestRefused as error:
-        return refused(error)
     packages, more = _packages(actions, options.together)
     if refusals := (*refusals, *more):
         for refusal in dict.fromkeys(refusals):
             print(f"{source}: {one_line(refusal.sentence)}", file=sys.stderr)
         return 1
     root = options.into or options.output
-    duplicates = () if options.into is None else workspace.against(options.into, packages)
+    duplicates = () if options.into is None else prevented_in(options.into, packages)
     for sentence in duplicates:
         print(one_line(sentence), file=sys.stderr)
     return 1 if duplicates else _regenerated(root, plan(root, packages), options)

@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from msgspec.structs import replace
 
-from action_assistant.commands.client import RequestRefused, Server, add_server, decoded, running
+from action_assistant.commands.client import Server, add_server, decoded, running
 from action_assistant.commands.directories import why
 from action_assistant.commands.sync.folder import Folder, SyncedFile, sha
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.system.posix import fcntl
 from action_assistant.umrf.digest import digest

@@ -20,11 +20,11 @@ from httpx_ws import (
 from pycrdt import Doc, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from action_assistant.commands.client import RequestRefused, reach, refused, running, sentence
+from action_assistant.commands.client import reach, running, sentence
 from action_assistant.commands.watch.changes import GraphChange, ShownGraph, changes
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents import document
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 
 _PAUSES: Final = (0.3, 1.0, 3.0, 10.0)  # seconds before coming again; the last one from then on
@@ -213,12 +213,9 @@ class QuietSocket(HttpxWebsocket):
 def watch(options: argparse.Namespace) -> int:
     """Run the command `watch`: print changes of a graph until Ctrl-C. Raise CannotStart if the
     server cannot be reached."""
-    try:
-        with running(options) as server:
-            graph = server.graph_id(options.graph)
-        anyio.run(_follow, options, graph)
-    except RequestRefused as error:
-        return refused(error)
+    with running(options) as server:
+        graph = server.graph_id(options.graph)
+    anyio.run(_follow, options, graph)
     return 0
 
 

@@ -17,9 +17,9 @@ from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.runs import views
 from action_assistant.web.monitoring.gauges import Family
+from action_assistant.web.monitoring.monitoring import Watched
 from action_assistant.web.monitoring.readiness import Parts
 from action_assistant.web.monitoring.status import Activity, RobotLink
-from action_assistant.web.monitoring.watched import Watched
 
 log: Final = logging.getLogger(__name__)
 

@@ -6,7 +6,8 @@ import asyncio
 import getpass
 import logging
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from itertools import islice
 from typing import Any, Final, NamedTuple
 
 import anyio
@@ -25,11 +26,9 @@ from action_assistant.errors import (
 )
 from action_assistant.logs.context import request_id
 from action_assistant.web.auth.caller import Caller, set_caller
-from action_assistant.web.auth.keys import Keys, Person, Session
+from action_assistant.web.auth.keys import Keys, Person, ScrapeToken, Session
 from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
 from action_assistant.web.auth.roles import OWNER, Permission, allowed, may
-from action_assistant.web.auth.scrape_token import ScrapeToken
-from action_assistant.web.http import cookies
 from action_assistant.web.http.problems import problem_of
 from action_assistant.web.network.addresses import Addresses
 
@@ -37,6 +36,9 @@ log: Final = logging.getLogger(__name__)
 
 #: Under this name the state of a request has what wants to be told who asks.
 KNOWN: Final = "known"
+#: Cookies of one name: each is tried against our seal, and whoever plants more gains nothing.
+_TRIED: Final = 50
+_BLANKS: Final = " \t"
 _CALLS: Final = frozenset({"http", "websocket"})
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _STOPS: Final = re.compile(r"/api/stop|/api/(runs|robots)/[^/]+/stop")
@@ -288,13 +290,13 @@ class Access:
     def _sessions(self, headers: dict[str, str]) -> list[Session]:
         """Return the sessions of all cookies that this server sealed. A browser may send several,
         one for each path at which this server was reachable."""
-        tried = map(self._keys.session, cookies.values(headers.get("cookie", ""), self._cookie))
+        tried = map(self._keys.session, cookie_values(headers.get("cookie", ""), self._cookie))
         return [each for each in tried if each is not None]
 
     def _device(self, headers: dict[str, str]) -> str:
         """Return the id of the browser from the first cookie that this server sealed; "" without
         one."""
-        given = cookies.values(headers.get("cookie", ""), self._device_cookie)
+        given = cookie_values(headers.get("cookie", ""), self._device_cookie)
         return next(filter(None, map(self._keys.device, given)), "")
 
     def _lasting(self, genuine: list[Session]) -> Session | None:
@@ -413,3 +415,16 @@ def _user_name() -> str:
         return getpass.getuser()
     except (KeyError, OSError):  # no such user in this container
         return "operator"
+
+
+def cookie_values(header: str, name: str) -> Iterator[str]:
+    """Yield the values of the cookies of this name in a Cookie header, in order. Never raises.
+
+    `http.cookies` gives up at the first malformed cookie, such as `g_state={"i_l":0}`. Browsers
+    (RFC 6265, 5.4) send the cookies of all programs of this host, on any port.
+    """
+    pairs = (each.partition("=") for each in header.split(";"))
+    ours = (value for found, sign, value in pairs if sign and found.strip(_BLANKS) == name)
+    for value in islice(ours, _TRIED):
+        plain = value.strip(_BLANKS)
+        yield plain[1:-1] if len(plain) > 1 and plain[0] == plain[-1] == '"' else plain

@@ -22,6 +22,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.roles import OWNER, Role
 
+METRICS: Final = "/metrics"
 TOKEN_FILE: Final = "token"
 SESSION_SECONDS: Final = 30 * 24 * 3600
 _MIN_TOKEN: Final = 32  # characters; the tokens made here have 43 (256 bit)
@@ -240,3 +241,24 @@ def _token_in(data: Path) -> str:
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else f"{file} is no text"
         raise CannotStart(f"Cannot keep the token in {data}: {why}.") from error
+
+
+class ScrapeToken:
+    """The token for scraping metrics, which opens `/metrics` and nothing else.
+
+    Tokens are compared in constant time. If no token is set, no request is accepted.
+    """
+
+    def __init__(self, token: str | None = None) -> None:
+        self._digest = None if token is None else _digest(token)
+
+    def opens(self, method: str, path: str, token: str) -> bool:
+        """Return whether the token is right and the request is `GET /metrics`."""
+        wanted = self._digest
+        is_it = wanted is not None and hmac.compare_digest(_digest(token), wanted)
+        return is_it and method == "GET" and path == METRICS
+
+
+def _digest(token: str) -> bytes:
+    """Return a digest of the token, which has the same length for every token."""
+    return hashlib.sha256(token.encode(errors="replace")).digest()

@@ -1,13 +1,20 @@
-"""Built files as browsers get them: typed, compressed where that pays, and asked for again by a tag."""
+"""Serves the built page and the built documentation: typed, compressed where that pays, with a tag.
 
+Both are read from memory, and again when somebody builds them anew. They say nothing of this server.
+"""
+
+import asyncio
 import gzip
 import hashlib
 import mimetypes
+from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any, Final
 
 from anyio import to_thread
-from litestar.types import HTTPScope, Send
+from litestar.enums import ScopeType
+from litestar.types import ASGIApp, HTTPScope, Receive, Scope, Send
 
 _COMPRESSED: Final = frozenset({".html", ".js", ".css", ".svg", ".json", ".webmanifest"})
 _TEXTS: Final = frozenset({".html", ".js", ".css"})
@@ -15,6 +22,25 @@ _WORTH: Final = 1000  # bytes
 _MEDIA: Final = {**mimetypes.types_map, ".webmanifest": "application/manifest+json"}
 
 Fields = tuple[tuple[bytes, bytes], ...]
+
+
+_NOT_PAGES: Final = ("/api/", "/runner/", "/schema", "/healthz", "/readyz", "/metrics")
+_UNBUILT: Final = b"""<!doctype html><meta charset="utf-8"><title>Page not built</title>
+<p>The page has not been built. Run <code>make setup</code> in the folder of the source code.</p>
+"""
+_HELP: Final = "/help"
+#: Stricter than the page's: nothing inline, and no other origin, not even the runner's.
+_POLICY: Final = (
+    "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data:; "
+    "font-src 'self'; connect-src 'self'; form-action 'self'; base-uri 'none'; "
+    "frame-ancestors 'none'"
+)
+_FIELDS: Final = ((b"content-security-policy", _POLICY.encode()),)
+_HELP_UNBUILT: Final = (
+    "The documentation is not part of this installation. In the folder of the source code, "
+    "<code>make site</code> builds it; its texts are in the folder <code>docs</code> there."
+)
+_MISSING: Final = "There is no such page."
 
 
 class File:
@@ -62,5 +88,160 @@ async def send_file(
     start: Any = {"type": "http.response.start", "status": status, "headers": fields}
     sent = b"" if scope["method"] == "HEAD" else body
     end: Any = {"type": "http.response.body", "body": sent, "more_body": False}
+    await send(start)
+    await send(end)
+
+
+class Page:
+    """An ASGI middleware that answers for the page's own paths and passes other requests on.
+
+    `root_of(scope)` is the path prefix of the page for this client: "" or for example "/temoto".
+    """
+
+    def __init__(
+        self, app: ASGIApp, folder: Path, root_of: Callable[[HTTPScope], str] = lambda _: ""
+    ) -> None:
+        self._app = app
+        self._folder = folder
+        self._root_of = root_of
+        self._built: float | None = None
+        self._files: dict[str, File] = {}
+        self._index = File(_UNBUILT, ".html", lasting=False)
+        self._rooted: dict[str, File] = {}
+        self._renew()
+
+    def _renew(self) -> None:
+        """Read the files if the page was built since; a build writes its index last."""
+        try:
+            built = (self._folder / "index.html").stat().st_mtime
+        except OSError:
+            return
+        if built != self._built:
+            files = _load(self._folder)
+            self._files, self._index, self._built = files, files["/index.html"], built
+            self._rooted = {}
+
+    def _index_at(self, root: str) -> File:
+        """Return the index page, with its relative links changed to links below `root`."""
+        if root not in self._rooted:
+            body = self._index.body.replace(b'="./', f'="{root}/'.encode())
+            self._rooted[root] = File(body, ".html", lasting=False)
+        return self._rooted[root]
+
+    def knows(self, path: str, accepts_html: bool) -> bool:
+        """Return whether a path is public: a file of the page or one of its addresses."""
+        if path in self._files or path == "/":
+            return True
+        return accepts_html and not path.startswith(_NOT_PAGES)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send the file, or the page itself for an address that the page's router knows."""
+        if scope["type"] != ScopeType.HTTP or scope["method"] not in {"GET", "HEAD"}:
+            await self._app(scope, receive, send)
+            return
+        accepts = dict(scope["headers"]).get(b"accept", b"")
+        if not self.knows(scope["path"], b"text/html" in accepts):
+            await self._app(scope, receive, send)
+            return
+        found = self._files.get(scope["path"])
+        if found is None or found is self._index:
+            self._renew()
+            found = self._index_at(self._root_of(scope))
+        await send_file(scope, send, found)
+
+
+def _load(folder: Path) -> dict[str, File]:
+    return {
+        f"/{path.relative_to(folder).as_posix()}": File(
+            path.read_bytes(), path.suffix, lasting="assets" in path.parts
+        )
+        for path in folder.rglob("*")
+        if path.is_file() and not path.relative_to(folder).parts[0].startswith(".")
+    }
+
+
+class HelpSite:
+    """An ASGI middleware that answers for `/help/` and passes other requests on.
+
+    Files are read at the first request, and again when the site was built again. The site has
+    relative links only, so it works below any path.
+    """
+
+    def __init__(self, app: ASGIApp, folder: Path) -> None:
+        self._app = app
+        self._folder = folder
+        self._built: float | None = None
+        self._paths: dict[str, Path] = {}
+        self._files: dict[str, File] = {}
+
+    @staticmethod
+    def knows(path: str) -> bool:
+        """Return whether a path belongs to the documentation."""
+        return path == _HELP or path.startswith(f"{_HELP}/")
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Send a file of the site, or a 404 for an unknown path below `/help/`; pass other requests
+        on."""
+        if (
+            scope["type"] != ScopeType.HTTP
+            or scope["method"] not in {"GET", "HEAD"}
+            or not self.knows(scope["path"])
+        ):
+            await self._app(scope, receive, send)
+        elif scope["path"] == _HELP:
+            await _lead_below(send)
+        else:
+            await self._answer(scope, send)
+
+    async def _answer(self, scope: HTTPScope, send: Send) -> None:
+        name = scope["path"].removeprefix(f"{_HELP}/")
+        found = await asyncio.to_thread(self._find, name)
+        if found is not None:
+            await send_file(scope, send, found, more=_FIELDS)
+            return
+        text = _MISSING if self._paths else _HELP_UNBUILT
+        way = "" if not self._paths else f'<p><a href="{"../" * name.count("/")}./">Help</a></p>'
+        page = _message(f"<p>{text}</p>{way}")
+        await send_file(scope, send, page, status=404, more=_FIELDS)
+
+    def _find(self, name: str) -> File | None:
+        if name in {"", "index.html"}:
+            self._renew()
+            name = "index.html"
+        if not self._paths:
+            self._renew()
+        path = self._paths.get(name)
+        if path is None:
+            return None
+        if name not in self._files:
+            try:
+                self._files[name] = File(path.read_bytes(), path.suffix, lasting=False)
+            except OSError:  # it is being built anew
+                return None
+        return self._files[name]
+
+    def _renew(self) -> None:
+        try:
+            built = (self._folder / "index.html").stat().st_mtime
+        except OSError:
+            self._built, self._paths, self._files = None, {}, {}
+            return
+        if built != self._built:
+            files = [each for each in self._folder.rglob("*") if each.is_file()]
+            self._paths = {each.relative_to(self._folder).as_posix(): each for each in files}
+            self._files, self._built = {}, built
+
+
+def _message(body: str) -> File:
+    text = f'<!doctype html><html lang="en"><meta charset="utf-8"><title>Help</title>{body}'
+    return File(text.encode(), ".html", lasting=False)
+
+
+async def _lead_below(send: Send) -> None:
+    """Send a redirect (308) to `help/`. The address is relative, so that the redirect also works if
+    a proxy serves this page below another path."""
+    fields = [(b"location", b"help/"), (b"content-length", b"0")]
+    start: Any = {"type": "http.response.start", "status": 308, "headers": fields}
+    end: Any = {"type": "http.response.body", "body": b"", "more_body": False}
     await send(start)
     await send(end)

@@ -2,7 +2,7 @@
 
 import asyncio
 from collections import deque
-from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from datetime import UTC, datetime
 from pathlib import Path
@@ -19,13 +19,14 @@ from prometheus_client import (
 from prometheus_client.exposition import generate_latest
 from prometheus_client.registry import Collector
 
+from action_assistant.journal.journal import Journal
 from action_assistant.journal.migrate import revisions_of
 from action_assistant.version import VERSION
 from action_assistant.web.http.requests import RequestCounts
-from action_assistant.web.monitoring.backups import backups_shown
 from action_assistant.web.monitoring.gauges import Family, Looked
 from action_assistant.web.monitoring.readiness import Check, DiskCheck, Parts, Readiness
 from action_assistant.web.monitoring.status import (
+    Activity,
     ProcessName,
     ProcessStatus,
     began_at,
@@ -35,13 +36,41 @@ from action_assistant.web.monitoring.status import (
     storage_shown,
     versions,
 )
-from action_assistant.web.monitoring.storage import StorageWatch
-from action_assistant.web.monitoring.watched import Watched
+from action_assistant.web.monitoring.storage import StorageWatch, backups_shown
 from action_assistant.web.workers.lanes import Lane
 
 _TICK_S: Final = 0.25
 _REMEMBERED: Final = 240  # ticks: a minute
 _BUCKETS: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10)
+
+
+class Watched:
+    """The parts of an open process that monitoring reads: its journal, its workers (the last lane
+    counts `folders`), and its own metrics."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        lanes: Sequence[Lane],
+        collectors: Sequence[Collector],
+        folders: Mapping[str, Path],
+    ) -> None:
+        self.journal: Final = journal
+        self.lanes: Final = lanes
+        self.collectors: Final = collectors
+        self.folders: Final = folders
+
+    def families(self) -> Iterator[Family]:
+        """Yield the metrics that are computed at each request."""
+        raise NotImplementedError
+
+    def activity(self) -> Activity:
+        """Return the present activity of the process."""
+        raise NotImplementedError
+
+    async def parts(self) -> Parts:
+        """Return the state of the other parts that have to work, beside journal and disk."""
+        return {}
 
 
 class LoopLag(Collector):

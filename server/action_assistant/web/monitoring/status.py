@@ -14,9 +14,8 @@ from action_assistant.safe_text import hold_names
 from action_assistant.system import limits
 from action_assistant.system.posix import resource
 from action_assistant.version import VERSION
-from action_assistant.web.monitoring.backups import BackupsShown
 from action_assistant.web.monitoring.readiness import Readiness
-from action_assistant.web.monitoring.storage import Storage
+from action_assistant.web.monitoring.storage import BackupsShown, Storage
 from action_assistant.web.workers.lanes import Lane
 
 ProcessName: TypeAlias = Literal["editor", "runner"]

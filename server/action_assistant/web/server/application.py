@@ -17,14 +17,12 @@ from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive,
 from action_assistant.errors import NotFound
 from action_assistant.version import VERSION, commit
 from action_assistant.web.auth.access import Access, Needs, require
-from action_assistant.web.auth.keys import Keys, ServerProof
+from action_assistant.web.auth.keys import METRICS, Keys, ScrapeToken, ServerProof
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Permission
-from action_assistant.web.auth.scrape_token import METRICS, ScrapeToken
-from action_assistant.web.http.help_site import HelpSite
-from action_assistant.web.http.page import Page
 from action_assistant.web.http.problems import problem_handlers
 from action_assistant.web.http.requests import RequestCounts, Requests
+from action_assistant.web.http.static_files import HelpSite, Page
 from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.monitoring.readiness import Readiness
 from action_assistant.web.monitoring.status import ProcessStatus

@@ -10,18 +10,21 @@ Of each socket a few frames are dealt with in a turn of the loop, and pings of t
 wait: a client could send hundreds of thousands at once, for which everybody waited, also for a Stop.
 """
 
-from collections.abc import Mapping, MutableMapping
+import asyncio
+import logging
+from collections.abc import Callable, Mapping, MutableMapping
 from typing import Any, Final, Protocol
 
 from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
+from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
-
-from action_assistant.web.server.websocket import WebSocketProtocol
 
 try:
     from websockets.speedups import apply_mask
 except ImportError:  # where it was not compiled
     from websockets.utils import apply_mask
+
+log: Final = logging.getLogger(__name__)
 
 #: The extension of a scope that holds, as `socket`, a socket that can be taken over.
 _EXTENSION: Final = "action_assistant.direct"
@@ -36,6 +39,54 @@ _WRITTEN_AT_ONCE: Final = 1 << 16  # bytes; more is written message by message
 _IN_A_TURN: Final = 16  # frames of one socket that are dealt with before others have their turn
 _PIECES: Final = 10_000  # of one message; empty ones would not end at the limit of its bytes
 _TOO_BIG: Final = 1009
+_RESTARTING: Final = 1012  # the close code of a server that ends
+
+
+class WebSocketProtocol(WebSocketsSansIOProtocol):
+    """uvicorn's protocol for one WebSocket, with two rules more: to end a socket raises nothing, in whatever state
+    it is, and a peer that nobody reads from is not taken for dead.
+
+    uvicorn ends its connections one after the other without a `try`: an error at one of them would leave all
+    others as they are, and the process to end with a traceback.
+    """
+
+    def shutdown(self) -> None:
+        """Close the socket because the process shuts down."""
+        if not self.transport.is_closing():
+            end_connection(self.transport, super().shutdown)
+            return
+        # All is said, and goes out as far as the peer reads it; another close frame would be an error.
+        self.stop_keepalive()
+        self.queue.put_nowait({"type": "websocket.disconnect", "code": _RESTARTING})
+
+    def send_500_response(self) -> None:
+        """Answer a request for an upgrade that the application did not answer."""
+        if not self.conn.eof_sent:  # else it was refused already, by the parser perhaps
+            super().send_500_response()
+
+    def keepalive_timeout(self) -> None:
+        """End the connection after a missing pong, unless the pong may be received but not read
+        yet."""
+        if not self.may_be_unread():
+            super().keepalive_timeout()
+            return
+        # The next ping asks again. Where the peer is gone, the kernel hears of none (TCP_USER_TIMEOUT).
+        self.pong_timer = None
+        self.pending_ping_payload = None
+        self.schedule_ping()
+
+    def may_be_unread(self) -> bool:
+        """Return whether the answer to the last ping may be received but not read yet."""
+        return self.read_paused
+
+
+def end_connection(transport: asyncio.Transport, shutdown: Callable[[], None]) -> None:
+    """End a connection as its protocol does it, by `shutdown`; where that fails, without a word."""
+    try:
+        shutdown()
+    except Exception as error:  # noqa: BLE001 - the next ones are to be ended, too
+        log.warning("a connection is cut off, it cannot be ended otherwise: %r", error)
+        transport.abort()
 
 
 class MessageReceiver(Protocol):

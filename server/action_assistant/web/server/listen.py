@@ -23,10 +23,9 @@ from action_assistant.public_url import Network
 from action_assistant.system import limits
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.connections import Connections
-from action_assistant.web.server.direct import DirectSocket
+from action_assistant.web.server.direct import DirectSocket, WebSocketProtocol, end_connection
 from action_assistant.web.server.proxy import ASKED, Forwarded
 from action_assistant.web.server.sockets import bound
-from action_assistant.web.server.websocket import WebSocketProtocol, end_connection
 
 if TYPE_CHECKING:  # slow to load, and most servers do without
     from action_assistant.web.network.certificate import Certificate
