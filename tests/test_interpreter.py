@@ -45,7 +45,7 @@ def test_a_stale_environment_is_left_alone_and_named(
     assert "`make ros` renews it" in found.remark
 
 
-def test_who_is_named_is_taken_and_must_be_a_program(tmp_path: Path) -> None:
+def test_a_named_interpreter_is_used_and_must_be_a_program(tmp_path: Path) -> None:
     assert for_runner({interpreter.VARIABLE: str(HERE)}).origin == "named"
     with pytest.raises(CannotStart, match="is no program"):
         for_runner({interpreter.VARIABLE: str(tmp_path)})

@@ -165,7 +165,7 @@ def test_every_step_can_be_taken_back_and_again(empty: Empty) -> None:
     assert empty.do(schema) == wanted
 
 
-def test_from_every_earlier_revision_what_is_stored_comes_along(empty: Empty) -> None:
+def test_rows_of_every_earlier_revision_survive_the_migration(empty: Empty) -> None:
     for revision in steps(empty):
         empty.migrate(revision)
         stored = empty.do(fill)

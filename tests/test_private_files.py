@@ -38,7 +38,7 @@ def modes(data: Path) -> dict[str, str]:
 
 
 @pytest.mark.long
-def test_everything_that_is_made_is_this_users_alone(tmp_path: Path) -> None:
+def test_all_files_of_a_data_folder_belong_to_this_user_alone(tmp_path: Path) -> None:
     data = tmp_path / "data"
     before = os.umask(0)
     try:

@@ -166,7 +166,7 @@ def test_links_of_documents_lead_somewhere() -> None:
     assert {str(path.relative_to(ROOT)): dead for path, dead in found.items() if dead} == {}
 
 
-def test_nothing_refers_to_documents_that_no_clone_has() -> None:
+def test_no_reference_leads_to_documents_that_no_clone_has() -> None:
     found = {path: _ELSEWHERE.findall(text_of(path)) for path in files()}
     assert {str(path.relative_to(ROOT)): words for path, words in found.items() if words} == {}
 

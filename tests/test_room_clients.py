@@ -123,7 +123,9 @@ def test_what_the_page_calls_saved_is_in_the_log(
     assert sorted(action["name"] for action in file["actions"]) == [f"A{n}" for n in range(5)]
 
 
-def test_who_is_there_is_the_server_s_word(page: Page, product: Product, graph_id: str) -> None:
+def test_the_server_vouches_for_the_person_in_presence(
+    page: Page, product: Product, graph_id: str
+) -> None:
     join(page, product, graph_id, "page")
     join_stock(page, product, graph_id, "stock")
     liar = {"user": {"id": "someone else", "name": "Mallory"}, "selection": ["a"]}

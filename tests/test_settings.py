@@ -35,7 +35,7 @@ def test_the_ports_are_those_that_the_environment_says(
 @pytest.mark.parametrize(
     ("said", "share", "tls"), [("", False, False), ("http", True, False), ("TLS", True, True)]
 )
-def test_who_is_let_in_is_what_the_environment_says(
+def test_the_environment_sets_who_may_enter(
     said: str, share: bool, tls: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ACTION_ASSISTANT_SHARE", said)

@@ -47,7 +47,9 @@ def test_a_wheel_says_what_it_was_built_from(
     assert version.described() == f"{version.VERSION} ({said})"
 
 
-def test_where_nobody_knows_that_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unknown_commit_is_reported_as_not_known(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """The sources may also lie in the repository of another project."""
     subprocess.run(["git", "init", "--quiet", str(tmp_path)], check=True)
     (tmp_path / "inner" / ".git").mkdir(parents=True)
@@ -58,7 +60,7 @@ def test_where_nobody_knows_that_is_said(tmp_path: Path, monkeypatch: pytest.Mon
         assert version.described() == f"{version.VERSION} (commit not known)"
 
 
-def test_both_processes_say_it(tmp_path: Path) -> None:
+def test_both_processes_report_version_and_commit(tmp_path: Path) -> None:
     with running(tmp_path / "data") as product, product.editor() as editor:
         known = {"version": version.VERSION, "commit": head()}
         assert known.items() <= editor.get("/api/config").json().items()

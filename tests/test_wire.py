@@ -186,7 +186,7 @@ arrows = st.lists(
 
 @settings(deadline=None, max_examples=examples(60))
 @given(arrows, st.sets(st.integers(0, 3)), st.lists(st.sampled_from(["on_true", "on_false", "on_error"]), max_size=4))  # fmt: skip
-def test_where_one_thing_follows_the_other_a_drawn_graph_never_waits_for_its_end(
+def test_a_drawn_sequence_never_waits_at_its_end(
     page: Page, arrows: list[tuple[int, int, str]], giving: set[int], ends: list[str]
 ) -> None:
     forward = [(a, b, outcome) for a, b, outcome in arrows if a < b]

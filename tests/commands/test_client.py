@@ -91,7 +91,7 @@ def test_a_server_of_ours_proves_itself_once(tmp_path: Path) -> None:
             ask()
 
 
-def test_whoever_passes_a_challenge_on_is_sent_nothing_where_our_server_is_only_supposed(
+def test_a_program_that_passes_the_challenge_on_gets_no_token(
     tmp_path: Path,
 ) -> None:
     with (

@@ -44,7 +44,7 @@ def test_the_file_of_an_action_goes_into_the_library(product: Product, tmp_path:
     assert answer.stdout.split() == [library(product)["GoAlone"]["document"], "GoAlone"]
 
 
-def test_of_a_folder_all_actions_do_but_those_that_colcon_ignores(
+def test_all_actions_of_a_folder_are_imported_except_those_that_colcon_ignores(
     product: Product, tmp_path: Path
 ) -> None:
     graph = {"graph_name": "g", "graph_entry": [], "graph_exit": [], "actions": []}

@@ -21,7 +21,7 @@ def product(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Product]:
         yield found
 
 
-def test_it_signs_in_where_the_page_is(product: Product) -> None:
+def test_the_link_signs_in_at_the_pages_address(product: Product) -> None:
     answer = product.cli("link")
     assert answer.stdout.splitlines() == [f"{PUBLIC}/#t={TOKEN}", f"{product.url}/#t={TOKEN}"]
     with httpx.Client(base_url=product.url, trust_env=False) as browser:

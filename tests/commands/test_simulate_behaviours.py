@@ -59,7 +59,7 @@ def test_a_command_at_a_time_reaches_it_and_nothing_is_left(
     assert not processes()
 
 
-def test_it_ends_when_its_time_is_over_and_kills_what_goes_on(tmp_path: Path) -> None:
+def test_simulate_ends_when_its_time_is_over_and_kills_running_calls(tmp_path: Path) -> None:
     behaviours = write(tmp_path / "behaviours", acts=DEAF)
     done = simulated(tmp_path, behaviours, "Acts", more=("--for", "0.5", "--trace"))
     assert done.returncode == 0, done.stderr

@@ -49,7 +49,7 @@ def test_commands_find_the_server_over_tls_on_its_port(stack: Stack) -> None:
         assert stack.is_healthy(service)
 
 
-def test_others_come_in_by_links_with_a_role(stack: Stack, tmp_path: Path) -> None:
+def test_people_enter_by_links_with_a_role(stack: Stack, tmp_path: Path) -> None:
     authority = tmp_path / "ca.pem"
     authority.write_text(podman("exec", stack.container("editor"), "cat", "/data/tls/ca.pem"))
     trust = ssl.create_default_context(cafile=str(authority))

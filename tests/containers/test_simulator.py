@@ -49,7 +49,7 @@ def test_an_example_runs_and_stops(stack: Stack) -> None:
     assert {each["state"] for each in runs if each["id"] == run} <= {"stopped", "finished"}
 
 
-def test_it_listens_on_this_computer_alone_and_has_no_rights(stack: Stack) -> None:
+def test_the_container_listens_on_this_computer_alone_and_has_no_rights(stack: Stack) -> None:
     found = state(stack.container("simulator"))
     hosts = {
         each["HostIp"]

@@ -88,7 +88,7 @@ def difference(client: Client, aid: str) -> bytes:
 
 
 @pytest.mark.usefixtures("small")
-async def test_who_takes_back_what_was_too_much_comes_in_again_with_everything_else(
+async def test_a_person_who_removes_the_excess_can_enter_again_with_all_other_edits(
     rooms: Rooms,
 ) -> None:
     ada = Client("ada")

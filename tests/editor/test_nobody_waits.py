@@ -322,7 +322,7 @@ async def test_many_small_updates_make_no_graph_that_takes_long_to_open(
     assert time.process_time() - begun < 0.2  # 0.8 s otherwise
 
 
-async def test_who_opens_it_often_does_not_get_further(
+async def test_opening_a_graph_often_does_not_raise_its_limit(
     journal: Journal, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(opening_time, "SECONDS", 0.02)

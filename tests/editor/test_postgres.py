@@ -97,7 +97,7 @@ async def test_after_a_kill_everything_acknowledged_is_there(
         assert "on Postgres" in [each["name"] for each in listed]
 
 
-async def test_when_postgres_has_stopped_and_is_back_the_editor_goes_on_by_itself(
+async def test_the_editor_goes_on_by_itself_when_postgres_is_back(
     mortal: Server, tmp_path: Path
 ) -> None:
     with running(tmp_path / "data", mortal.new_database()) as editor:

@@ -168,7 +168,7 @@ steps = st.lists(
 
 @settings(max_examples=examples(25), deadline=None)
 @given(steps)
-def test_whoever_commits_all_is_stored_told_and_followed_in_order(
+def test_events_are_stored_reported_and_followed_in_order_whoever_commits(
     tmp_path_factory: pytest.TempPathFactory, did: list[tuple[str, str, bool]]
 ) -> None:
     url = f"sqlite:///{tmp_path_factory.mktemp('dice') / 'editor.db'}"

@@ -62,7 +62,7 @@ async def test_an_append_that_expects_another_end_is_refused_and_leaves_nothing(
     assert await journal.append("a", [draft()], expected=1) == 2
 
 
-async def test_of_several_who_expect_the_same_end_one_succeeds(journal: Journal) -> None:
+async def test_one_of_several_appends_that_expect_the_same_end_succeeds(journal: Journal) -> None:
     async def attempt() -> bool:
         try:
             await journal.append("a", [draft()], expected=0)

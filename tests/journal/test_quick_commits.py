@@ -32,7 +32,7 @@ def after(clock: Clock, *seconds: float, every: float = 1.0) -> bool:
     return commits.are_quick
 
 
-def test_of_the_first_twenty_nothing_is_known(clock: Clock) -> None:
+def test_commits_do_not_count_as_quick_before_twenty_are_known(clock: Clock) -> None:
     assert not after(clock, *[0.001] * 19)
     assert after(clock, *[0.001] * 20)
 
@@ -43,7 +43,7 @@ def test_five_of_a_hundred_may_be_slow(clock: Clock) -> None:
     assert not after(clock, *[0.001] * 15, *[0.03] * 6)
 
 
-def test_one_that_is_far_too_slow_is_remembered_until_a_hundred_more_are_over(
+def test_a_very_slow_commit_counts_until_a_hundred_more_are_done(
     clock: Clock,
 ) -> None:
     assert not after(clock, *[0.001] * 50, 0.11, *[0.001] * 99)
@@ -55,6 +55,6 @@ def test_a_disk_that_becomes_quick_is_trusted_again(clock: Clock) -> None:
     assert after(clock, *[0.03] * 100, *[0.001] * 95)
 
 
-def test_all_of_them_may_take_a_sixth_of_the_time(clock: Clock) -> None:
+def test_commits_may_take_a_sixth_of_the_time_together(clock: Clock) -> None:
     assert after(clock, *[0.001] * 100, every=0.007)
     assert not after(clock, *[0.001] * 100, every=0.005)

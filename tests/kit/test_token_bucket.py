@@ -21,7 +21,7 @@ def test_tokens_that_were_spent_come_back_at_the_rate() -> None:
 
 
 @given(AMOUNTS)
-def test_who_waits_for_the_debt_spends_no_more_than_burst_and_rate(
+def test_a_client_that_waits_for_its_debt_spends_no_more_than_burst_and_rate(
     amounts: list[tuple[float, float]],
 ) -> None:
     now = spent = 0.0

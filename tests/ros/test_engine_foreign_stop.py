@@ -69,7 +69,7 @@ def moving(
             yield events, product, ada
 
 
-def test_everything_is_stopped_when_its_code_has_ended(domain: int, tmp_path: Path) -> None:
+def test_stop_all_succeeds_when_the_code_has_ended(domain: int, tmp_path: Path) -> None:
     with moving(domain, tmp_path) as (events, product, _):
         said = product.cli("stop", "--all", "--wait", "30")
         assert events() == ["begin", "stop", "end"]

@@ -45,7 +45,7 @@ def order(run: str) -> Order:
     return Order(run=run, graph=GraphOutline("pair", {}), umrf=text)
 
 
-async def test_both_begin_though_one_was_busy_with_the_stop_of_another_graph(
+async def test_both_graphs_begin_although_one_engine_was_busy_with_a_stop(
     domain: int, tmp_path: Path
 ) -> None:
     context = Context()

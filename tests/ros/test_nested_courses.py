@@ -277,7 +277,9 @@ def robots(product: Product, domain: int, folder: Path, task: Task, name: str) -
 
 
 @pytest.mark.parametrize("name", [needs(each) for each in (*OURS, *ENGINES)])
-def test_it_does_the_same_played_nested_and_flat(name: str, domain: int, tmp_path: Path) -> None:
+def test_a_recorded_hierarchy_runs_alike_played_nested_and_flat(
+    name: str, domain: int, tmp_path: Path
+) -> None:
     with running(tmp_path / "data") as product:
         with product.editor() as editor:
             task = imported(editor, name)

@@ -42,7 +42,7 @@ async def test_its_actions_do_what_their_behaviours_do_and_the_others_what_the_s
         assert robot.end() == 0
 
 
-async def test_one_that_ignores_its_stop_is_an_error_as_on_an_engine_and_killed(
+async def test_a_behaviour_that_ignores_its_stop_is_an_error_as_on_an_engine_and_is_killed(
     domain: int, tmp_path: Path
 ) -> None:
     folder = write(tmp_path / "behaviours", deaf=DEAF)

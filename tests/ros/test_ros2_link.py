@@ -258,7 +258,9 @@ async def test_two_engines_on_one_path_prove_nothing(domain: int) -> None:
             await link.get()
 
 
-async def test_who_hears_starts_and_does_not_serve_may_be_a_second_engine(domain: int) -> None:
+async def test_a_node_that_hears_starts_and_does_not_serve_may_be_a_second_engine(
+    domain: int,
+) -> None:
     """One by one: what listens as an engine, what only watches, and what serves in the end."""
     with engine(domain), engine(domain, namespace="r2"):
         async with robot(domain) as link:

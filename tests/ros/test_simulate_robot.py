@@ -17,7 +17,7 @@ from runner.harness import sequence
 from runner.links.contract import Bench, answer, moves, placed, shown
 
 
-async def test_it_answers_falls_silent_when_frozen_and_tells_afterwards_what_it_did(
+async def test_an_emulated_robot_answers_is_silent_when_frozen_and_then_reports_what_it_did(
     domain: int, tmp_path: Path
 ) -> None:
     robot = RobotProcess(domain, tmp_path, SCRIPT, "--quirk", "loss=0")

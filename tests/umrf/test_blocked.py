@@ -119,7 +119,7 @@ def test_recorded_graphs_that_went_well_are_not_blocked() -> None:
     assert found == known
 
 
-def test_with_the_files_of_the_actions_an_optional_input_blocks_nothing() -> None:
+def test_an_optional_input_blocks_nothing_if_the_actions_files_are_known() -> None:
     library = {
         "OxWork": Signature(inputs={"delay": "number", "result": "string"}),
         "OxOptional": Signature(inputs={"text": "string"}, optional=frozenset({"text"})),

@@ -97,7 +97,9 @@ def assert_rehearsed(file: Path, data: Path) -> None:
 
 
 @pytest.mark.long
-def test_everything_is_there_again_on_an_empty_machine(tmp_path: Path, postgres: Server) -> None:
+def test_backup_restores_the_whole_server_on_an_empty_machine(
+    tmp_path: Path, postgres: Server
+) -> None:
     """Events, answers, archived runs, keys, links, sessions, certificates."""
     old, new = tmp_path / "old", tmp_path / "new"
     urls = [postgres.new_database(), postgres.new_database()]

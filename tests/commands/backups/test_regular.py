@@ -49,7 +49,9 @@ def until(holds: Callable[[], Any]) -> None:
         time.sleep(0.05)
 
 
-def test_one_goes_into_the_folder_and_older_ones_go(data: Path, tmp_path: Path) -> None:
+def test_a_new_backup_goes_into_the_folder_and_older_ones_are_removed(
+    data: Path, tmp_path: Path
+) -> None:
     into = tmp_path / "backups"
     into.mkdir()
     old = into / "action-assistant-20200101-000000Z.zip"
@@ -72,7 +74,7 @@ def test_one_goes_into_the_folder_and_older_ones_go(data: Path, tmp_path: Path) 
     assert last.off_site is None
 
 
-def test_where_something_is_missing_no_older_one_goes(data: Path, tmp_path: Path) -> None:
+def test_an_incomplete_backup_removes_no_older_one(data: Path, tmp_path: Path) -> None:
     """The older one may have it."""
     into = tmp_path / "b"
     into.mkdir()
@@ -180,7 +182,7 @@ def test_the_server_makes_them_by_itself(tmp_path: Path) -> None:
     assert rehearsed.returncode == 0, rehearsed.stdout
 
 
-def test_one_that_was_made_not_long_ago_is_not_made_again(data: Path, tmp_path: Path) -> None:
+def test_a_backup_is_not_repeated_before_its_time(data: Path, tmp_path: Path) -> None:
     into = tmp_path / "b"
     assert command("backup", "--into", into, "--data", data).returncode == 0
     staying = subprocess.Popen(

@@ -29,7 +29,7 @@ def test_a_year_of_nights_leaves_seventeen_at_most() -> None:
     assert months == {"202606", "202607", "202608", "202609", "202610", "202611"}
 
 
-def test_of_one_day_the_newest_stays() -> None:
+def test_the_newest_backup_of_a_day_stays() -> None:
     hours = paths(*(timedelta(hours=n) for n in range(30)))
     assert left(hours, "2d") == [hours[0], hours[13]]
 
@@ -59,7 +59,7 @@ def test_backups_of_a_clock_that_was_wrong_stay_and_none_goes_for_them() -> None
     assert superfluous([*of_tomorrow, *nights], parse_retention("3d"), NOW) == nights[3:]
 
 
-def test_all_stay_if_somebody_says_so() -> None:
+def test_the_rule_all_keeps_every_backup() -> None:
     assert (
         superfluous(paths(*(timedelta(hours=n) for n in range(99))), parse_retention("all"), NOW)
         == []

@@ -95,7 +95,7 @@ def test_what_is_left_of_one_that_was_killed_goes(tmp_path: Path) -> None:
     assert list(elsewhere.iterdir()) == []
 
 
-def test_who_begins_where_somebody_is_just_sweeping_is_told(
+def test_a_command_whose_folder_is_just_being_removed_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Between the folder and its lock there is a moment: a sweeper that comes then has the lock."""

@@ -192,7 +192,9 @@ def test_tables_that_are_not_what_the_events_say_stop_it(tmp_path: Path, postgre
         ("postgresql://aa@127.0.0.1:1/x", "Cannot use the database"),
     ],
 )
-def test_where_nothing_can_be_moved_to_is_said(tmp_path: Path, to: str, told: str) -> None:
+def test_a_target_that_graphs_cannot_move_to_is_refused_with_the_reason(
+    tmp_path: Path, to: str, told: str
+) -> None:
     data = made(tmp_path / "data", 1)
     refused = move(data, to)
     assert (refused.returncode, told in refused.stderr) == (2, True)

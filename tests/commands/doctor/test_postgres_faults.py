@@ -39,7 +39,7 @@ def test_a_sound_one_has_nothing_wrong(data: Path) -> None:
     assert faults(data) == []
 
 
-def test_one_that_loses_what_it_confirms_is_named(data: Path, server: Server) -> None:
+def test_doctor_names_a_server_that_loses_confirmed_commits(data: Path, server: Server) -> None:
     server.sql("ALTER SYSTEM SET fsync = off")
     server.sql("SELECT pg_reload_conf()")
     try:

@@ -89,7 +89,7 @@ def test_what_is_no_source_folder_is_wrong_use(
     assert {**before, "given.json": b""}.keys() == everything(tmp_path).keys()
 
 
-def test_one_place_is_wanted(tmp_path: Path) -> None:
+def test_exactly_one_of_output_and_into_is_required(tmp_path: Path) -> None:
     for options in ([], ["--output", str(tmp_path), "--into", str(tmp_path)]):
         with pytest.raises(SystemExit) as ended:
             main(["package", "x.json", *options])

@@ -41,7 +41,7 @@ def wanted(unit: Path) -> bool:
     return (unit.parent / "multi-user.target.wants" / unit.name).is_symlink()
 
 
-def test_it_is_written_enabled_and_removed_again(
+def test_a_unit_is_written_enabled_and_removed_again(
     service: Service, unit: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert service("install", "--as", "robot", "--port", "9000") == 0
@@ -90,7 +90,7 @@ def test_an_edited_one_is_left_alone_until_somebody_says_so_and_then_kept(
     assert not unit.exists() or is_untouched(unit.read_text())
 
 
-def test_one_of_somebody_else_is_no_ours(service: Service, unit: Path) -> None:
+def test_a_unit_of_another_program_is_left_alone(service: Service, unit: Path) -> None:
     unit.parent.mkdir(parents=True)
     unit.write_text("[Service]\nExecStart=/usr/bin/other\n")
     assert service("install", "--as", "robot") == 2
@@ -158,7 +158,7 @@ def test_every_option_of_serve_reaches_it_or_has_a_reason_not_to() -> None:
     assert known == {*_VALUES, *_FLAGS, *left_out, *apart}
 
 
-def test_it_makes_the_backups_that_were_asked_for_and_may_write_to_their_folder(
+def test_the_service_makes_the_requested_backups_and_may_write_to_their_folder(
     service: Service, unit: Path
 ) -> None:
     words = ("--backup-to", "/srv/copies", "--backup-every", "12h", "--backup-keep", "3d")

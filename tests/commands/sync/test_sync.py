@@ -130,7 +130,7 @@ def test_changes_of_both_that_do_not_meet_are_merged(place: Place) -> None:
     assert b"there" in file.read_bytes()
 
 
-def test_where_both_changed_the_same_both_stay_until_somebody_has_looked(place: Place) -> None:
+def test_conflicting_changes_both_stay_until_a_person_decides(place: Place) -> None:
     file = place.folder / f"pair{ENDING}"
     file.write_bytes(_text())
     place.round()

@@ -166,7 +166,7 @@ def test_a_name_steers_no_terminal_and_makes_no_line_of_its_own(product: Product
         assert json.loads(values.line())["field"] == "name"
 
 
-def test_it_comes_again_when_the_server_does_and_tells_what_it_missed(tmp_path: Path) -> None:
+def test_watch_reconnects_when_the_server_is_back_and_prints_missed_changes(tmp_path: Path) -> None:
     product = Product(tmp_path / "data")
     product.start()
     try:
@@ -213,7 +213,7 @@ def test_an_unknown_graph_and_a_wrong_token_are_refused_in_a_sentence(product: P
     assert len(answer.stderr.splitlines()) == 1
 
 
-async def test_nothing_that_could_change_a_graph_is_ever_sent() -> None:
+async def test_watch_sends_no_message_that_could_change_a_graph() -> None:
     sent: list[bytes] = []
 
     class Socket:

@@ -55,7 +55,7 @@ def _map(doc: Doc[Any], root: str) -> "Map[Any]":
     return found
 
 
-async def test_both_values_are_in_the_history_whoever_was_away(editor: Editor) -> None:
+async def test_the_history_shows_both_values_whichever_person_was_offline(editor: Editor) -> None:
     async with httpx.AsyncClient(base_url=editor.url, headers=BEARER, trust_env=False) as http:
 
         async def ask(path: str, **params: Any) -> Any:

@@ -106,7 +106,7 @@ def test_one_action_goes_back_alone(http: httpx.Client) -> None:
     assert http.get(f"/api/graphs/{graph}/umrf").json()["graph_name"] == "later"
 
 
-def test_where_no_edit_changes_the_course_none_is_named(http: httpx.Client) -> None:
+def test_no_edit_is_named_if_none_changes_the_course(http: httpx.Client) -> None:
     graph = _imported(http)
     http.patch(f"/api/graphs/{graph}", json={"description": "to the dock"})
     asked = {"good": 1, "script": {"behaviours": {}}}

@@ -107,7 +107,7 @@ def test_what_is_no_action_is_refused_with_a_reason(http: httpx.Client, body: by
     assert refused.json()["detail"]
 
 
-def test_of_two_actions_of_one_name_the_second_is_refused_and_led_to_the_first(
+def test_a_second_action_of_one_name_is_refused_and_names_the_first(
     http: httpx.Client, name: str
 ) -> None:
     first = brought(http, action(name, **TAKES))
@@ -320,7 +320,9 @@ def test_a_graph_is_told_as_the_action_that_stands_for_it(http: httpx.Client, na
     assert made not in [each["graph"] for each in http.get("/api/actions/graphs").json()]
 
 
-def test_of_graphs_of_one_name_the_oldest_is_listed_first(http: httpx.Client, name: str) -> None:
+def test_the_oldest_of_several_graphs_of_one_name_is_listed_first(
+    http: httpx.Client, name: str
+) -> None:
     made = [graph(http, f"{name}_twice", action(f"{name}{n}")) for n in range(4)]
     listed = http.get("/api/actions/graphs").json()
     assert [each["graph"] for each in listed if each["name"] == f"{name}_twice"] == made

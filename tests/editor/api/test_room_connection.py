@@ -50,7 +50,7 @@ async def test_stock_clients_converge(either: Editor) -> None:
         await eventually(lambda: things(one) == things(two) and things(two)["name"] == "renamed")
 
 
-async def test_whoever_only_looks_hears_at_once_which_history_this_is(either: Editor) -> None:
+async def test_a_viewer_is_sent_the_epoch_at_once(either: Editor) -> None:
     keys = Keys(TOKEN)
     cookie = f"aa_{either.port}={keys.sealed(keys.new_session('Eve', role='viewer'))}"
     who = {"cookie": cookie, "origin": either.url}
@@ -113,7 +113,7 @@ async def test_a_message_beyond_the_limit_is_refused_by_its_head(either: Editor)
     assert await asyncio.to_thread(close_code, raw) == 1009
 
 
-async def test_who_says_goodbye_hears_it_back(either: Editor) -> None:
+async def test_a_close_frame_is_answered_by_a_close_frame(either: Editor) -> None:
     raw = upgraded(either, new_graph(either))
     raw.sendall(bytes((0x88,)) + masked(b"\x03\xe8")[1:])
     assert await asyncio.to_thread(close_code, raw) == 1000

@@ -144,7 +144,7 @@ async def test_the_server_stamps_who_is_there(editor: Editor, graph: str) -> Non
         (BEARER, "nonsense", 404),
     ],
 )
-async def test_who_may_not_in_is_told_before_the_upgrade(
+async def test_a_forbidden_client_is_refused_before_the_upgrade(
     editor: Editor, graph: str, headers: dict[str, str], path: str, status: int
 ) -> None:
     async with httpx.AsyncClient(trust_env=False) as client:

@@ -120,7 +120,7 @@ def test_a_version_stays_and_tells_that_a_graph_inside_has_moved_on(client: http
     assert (gone["umrf"], gone["current_digest"]) == (before["umrf"], None)
 
 
-def test_all_levels_are_pinned(client: httpx.Client) -> None:
+def test_a_version_pins_all_levels(client: httpx.Client) -> None:
     made(client, "Grip", "Close")
     made(client, "Fetch", "Grip", "Lift")
     outer = made(client, "Task", "Fetch")
@@ -229,7 +229,7 @@ def test_actions_become_a_graph_of_their_own_and_are_unpacked_again(client: http
     assert keys(client, made_graph["id"]) == {name: known[name] for name in "BC"}
 
 
-def test_where_a_renamed_graph_is_used_the_actions_follow_by_one_edit_each(
+def test_actions_that_use_a_renamed_graph_follow_by_one_edit_for_each_graph(
     client: httpx.Client,
 ) -> None:
     inner = made(client, "Lift", "A")
@@ -252,7 +252,9 @@ def test_where_a_renamed_graph_is_used_the_actions_follow_by_one_edit_each(
     assert gone.status_code == 404
 
 
-def test_of_people_who_make_one_of_a_name_at_once_one_gets_it(client: httpx.Client) -> None:
+def test_one_of_several_people_who_make_a_graph_of_one_name_at_once_succeeds(
+    client: httpx.Client,
+) -> None:
     tasks = [
         client.post("/api/graphs", json=line(f"T{i}", "A", "B", "C")).json()["id"] for i in range(4)
     ]

@@ -109,7 +109,7 @@ async def test_what_is_wrong_with_a_graph_follows_the_graph_inside_of_it(tmp_pat
         )
 
 
-async def test_of_several_graphs_of_a_name_the_oldest_counts_and_that_is_told(
+async def test_the_oldest_of_several_graphs_of_one_name_counts_with_a_warning(
     tmp_path: Path,
 ) -> None:
     async with editor(tmp_path) as services:
@@ -303,7 +303,7 @@ async def test_a_name_that_cannot_be_read_now_is_read_the_next_time(tmp_path: Pa
         assert [[each["code"] for each in problems] for problems in found] == [[], ["H8"]]
 
 
-async def test_who_leaves_takes_nothing_from_those_who_stay(tmp_path: Path) -> None:
+async def test_a_cancelled_refresh_of_names_takes_nothing_from_others(tmp_path: Path) -> None:
     async with editor(tmp_path) as services:
         outer = await made(services, "Outer", "Inner")
         await made(services, "Inner", "Step", exits=False)

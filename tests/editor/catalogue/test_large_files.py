@@ -47,7 +47,7 @@ async def test_a_large_file_is_not_in_the_commit_of_its_graph(
         assert [(each["kind"], each["seq"]) for each in history] == [("imported", 1)]
 
 
-async def test_where_the_graph_cannot_be_stored_nothing_is_seen_of_its_file(
+async def test_a_file_whose_graph_cannot_be_stored_leaves_no_trace(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")

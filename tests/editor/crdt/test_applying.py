@@ -43,7 +43,7 @@ def watched() -> tuple[Doc[Any], list[Any]]:
 
 @settings(max_examples=examples(100), deadline=None)
 @given(changes, st.randoms(use_true_random=False))
-def test_it_leaves_the_same_document_and_tells_observers_the_same(
+def test_the_short_way_makes_the_same_document_and_events_for_observers(
     changed: list[tuple[str, Any]], chance: Any
 ) -> None:
     made = updates(changed)

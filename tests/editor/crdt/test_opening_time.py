@@ -32,7 +32,7 @@ def test_without_doubt_no_more_is_added_than_may_be(history: list[tuple[int, int
         structs += meanwhile
 
 
-def test_it_is_due_long_before_it_is_in_doubt() -> None:
+def test_a_measurement_is_due_long_before_the_opening_time_is_in_doubt() -> None:
     opening = OpeningTime()
     while not opening.is_due:
         opening.took(10)

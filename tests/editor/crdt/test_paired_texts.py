@@ -97,7 +97,9 @@ OPENED: list[Callable[[], Replica]] = [
 
 @pytest.mark.parametrize("opened", OPENED)
 @pytest.mark.parametrize("name", WITHIN)
-def test_nothing_comes_between_the_two(opened: Callable[[], Replica], name: str) -> None:
+def test_no_item_is_inserted_between_the_two_clocks_of_a_character(
+    opened: Callable[[], Replica], name: str
+) -> None:
     replica = opened()
     before = replica.doc.get_update()
     with pytest.raises(Malformed, match="within one character"):
@@ -140,7 +142,7 @@ def test_nobody_says_where_the_characters_of_others_are() -> None:
     assert replica.take(deleted(1, 1), "ada") is UpdateEffect.NEWS
 
 
-def test_how_much_is_remembered_has_a_bound() -> None:
+def test_the_memory_for_paired_texts_is_bounded() -> None:
     replica, clock = Replica(), 0
     words = "😀" * 100_000
     for _ in range(MOST_BYTES // (4 * len(words) + 1000)):

@@ -89,7 +89,7 @@ def mutated(chance: random.Random, update: bytes, other: bytes) -> bytes:
 
 
 @pytest.mark.slow
-def test_nothing_that_passes_kills_or_costs_much() -> None:
+def test_no_accepted_update_kills_the_process_or_costs_much() -> None:
     chance = random.Random(int(os.environ.get("TEST_SEED", "11")))
     start, updates = base()
     passed: list[bytes] = []

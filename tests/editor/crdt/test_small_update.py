@@ -44,7 +44,7 @@ def agree(update: bytes) -> bool:
     ),
     st.sampled_from([1, 127, 128, 2**31, 2**53 - 1]),
 )
-def test_it_says_what_the_scanner_says_of_what_people_do(
+def test_the_short_cut_agrees_with_the_scanner_on_edits_of_people(
     changes: list[tuple[str, str, Any]], client: int
 ) -> None:
     doc: Doc[Any] = Doc(client_id=client)
@@ -63,7 +63,7 @@ def test_it_says_what_the_scanner_says_of_what_people_do(
 
 
 @pytest.mark.slow
-def test_it_says_what_the_scanner_says_of_forged_updates() -> None:
+def test_the_short_cut_agrees_with_the_scanner_on_forged_updates() -> None:
     chance = random.Random(int(os.environ.get("TEST_SEED", "12")))
     _, updates = base()
     updates += drags()

@@ -154,7 +154,7 @@ async def test_what_waits_for_ever_does_not_stop_snapshots(tmp_path: Path) -> No
     await journal.close()
 
 
-async def test_who_waits_for_something_is_still_its_author_after_a_snapshot(
+async def test_a_waiting_update_keeps_its_author_after_a_snapshot(
     tmp_path: Path,
 ) -> None:
     first, second = later_edits(2)

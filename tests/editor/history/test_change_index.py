@@ -64,7 +64,7 @@ async def test_changes_between_two_moments_lead_from_one_to_the_other(
 
 
 @pytest.mark.parametrize("seed", range(examples(12) // 2))
-async def test_who_set_a_value_is_who_a_search_of_the_whole_log_finds(
+async def test_the_author_of_a_value_is_the_one_that_a_search_of_the_whole_log_finds(
     journal: Journal, rooms: Rooms, seed: int
 ) -> None:
     held = await edited(rooms, seed, 50)
@@ -165,7 +165,7 @@ async def test_a_document_kept_by_another_version_is_made_again(
     assert _seen(await index.value(index_queries.at, GRAPH, len(held))) == plain(held[-1])
 
 
-async def test_where_the_log_is_damaged_it_ends(journal: Journal, rooms: Rooms) -> None:
+async def test_the_index_ends_where_the_log_is_damaged(journal: Journal, rooms: Rooms) -> None:
     held = await edited(rooms, 2, 30)
     await rooms.close()
     bad = Draft("graph.updated.v1", "ada", b"\x01\x01\xff\xff\xff\xff\xff")
@@ -176,7 +176,7 @@ async def test_where_the_log_is_damaged_it_ends(journal: Journal, rooms: Rooms) 
     assert _seen(await index.value(index_queries.at, GRAPH, len(held) + 1)) == plain(held[-1])
 
 
-async def test_it_is_kept_up_while_nobody_asks(
+async def test_the_index_follows_the_log_without_any_question(
     journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("action_assistant.editor.history.change_index._PERIOD", 0.01)

@@ -72,7 +72,7 @@ def _by_key(changes: Changes) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("seed", range(examples(12) // 2))
-async def test_of_people_who_edit_at_once_each_is_told_their_own(
+async def test_the_summary_of_each_person_names_only_their_own_changes(
     journal: Journal, rooms: Rooms, seed: int
 ) -> None:
     held = await edited(rooms, seed, 40)

@@ -113,7 +113,7 @@ def test_a_breaking_edit_among_a_thousand_is_named(seed: int) -> None:
     assert [(f.field, f.before, f.after) for f in change.fields] == [("on_true", "run", "ignore")]
 
 
-def test_where_it_parts_more_than_once_each_place_is_named() -> None:
+def test_every_change_of_the_course_is_named() -> None:
     past = Past()
     for _ in range(20):
         past.harmless()
@@ -140,7 +140,7 @@ def test_what_changed_and_changed_back_is_no_other_course() -> None:
     assert (found.same, len(found.partings)) == (True, 2)
 
 
-def test_of_edits_that_nothing_notices_none_is_named() -> None:
+def test_edits_that_the_engine_does_not_notice_are_not_named() -> None:
     past = Past()
     for _ in range(100):
         past.harmless()
@@ -157,7 +157,7 @@ def test_the_step_in_which_the_courses_part_is_told() -> None:
     assert one.before != one.after
 
 
-def test_when_time_is_up_it_says_that_there_may_be_more() -> None:
+def test_a_search_that_runs_out_of_time_says_that_it_is_not_exact() -> None:
     past = Past()
     for _ in range(60):
         past.harmless()

@@ -126,7 +126,7 @@ _STEPS = st.lists(
 
 
 @given(steps=_STEPS, clients=st.permutations([5, 6, 7]), step=st.sampled_from([1, 3, 1000]))
-def test_whoever_edits_while_away_each_value_stood_or_is_told_as_overwritten(
+def test_every_value_set_offline_stood_or_is_listed_as_overwritten(
     steps: list[Any], clients: list[int], step: int
 ) -> None:
     """People set keys while they are away. An update that is sent sets a key to what its author saw then: the

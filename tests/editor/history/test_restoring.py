@@ -142,7 +142,7 @@ async def test_an_action_that_was_deleted_comes_back_with_its_arrows(
     assert plain(await _now(rooms)) == plain(before)
 
 
-async def test_nothing_that_was_not_there_is_gone_back_to(
+async def test_going_back_to_a_missing_thing_moment_or_edit_is_refused(
     going_back: Restoring, rooms: Rooms
 ) -> None:
     held = await edited(rooms, 1, 20)

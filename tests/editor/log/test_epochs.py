@@ -49,7 +49,7 @@ async def test_what_is_no_number_says_nothing(editor: Editor, graph: str, query:
     assert code is None
 
 
-async def test_nothing_that_another_history_brings_is_taken(
+async def test_edits_of_another_epoch_are_refused(
     editor: Editor, http: httpx.Client, graph: str
 ) -> None:
     before = (await got(http, f"/api/graphs/{graph}")).json()["seq"]

@@ -33,7 +33,7 @@ async def test_windows_are_longer_the_busier_the_loop_is(monkeypatch: pytest.Mon
     assert lengths == pytest.approx([0.001, 0.001, 0.0025, 0.01, 0.01, 0.001])
 
 
-async def test_whoever_fails_keeps_no_other_from_its_turn(
+async def test_a_room_that_fails_keeps_no_other_from_its_turn(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     end, done = TurnEnd(), list[str]()

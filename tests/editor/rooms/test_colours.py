@@ -70,7 +70,7 @@ def test_nobody_takes_a_colour_in_use_and_nobody_loses_theirs(
         assert len(set(here)) == len(here)
 
 
-def test_who_comes_back_has_the_colour_of_before_while_colours_last() -> None:
+def test_a_person_who_comes_back_has_the_same_colour_while_colours_last() -> None:
     colours = PersonColours()
     with colours.held("ada") as first:
         pass

@@ -63,7 +63,7 @@ async def test_edits_that_keep_the_loop_busy_are_read_later(
     assert member.cpu_debt() > 0
 
 
-async def test_who_edits_a_hundred_times_a_second_for_an_hour_never_waits(
+async def test_a_person_who_edits_a_hundred_times_a_second_for_an_hour_never_waits(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = 0.0

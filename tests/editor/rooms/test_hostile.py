@@ -82,7 +82,7 @@ async def test_ids_are_learned_from_the_log(journal: Journal) -> None:
         await rooms.close()
 
 
-async def test_who_echoes_what_others_wrote_is_not_blamed(rooms: Rooms) -> None:
+async def test_a_client_that_echoes_updates_of_others_is_not_closed(rooms: Rooms) -> None:
     ada, bob = Client("ada"), Client("bob")
     async with rooms.enter(STREAM) as room:
         for client in (ada, bob):
@@ -299,7 +299,7 @@ def test_upgrades_come_in_bursts_and_then_at_a_rate() -> None:
             pass
 
 
-def test_where_stop_is_sent_the_first_socket_of_a_person_is_always_admitted() -> None:
+def test_the_first_socket_of_a_person_is_always_admitted_where_stop_is_sent() -> None:
     connection_limits = ConnectionLimits(limits=True, keeps_one=True, clock=lambda: 0.0)
     held = [connection_limits.admitted("eve", "a") for _ in range(OF_A_PERSON)]
     for each in held:

@@ -24,7 +24,7 @@ async def test_an_acknowledgement_goes_in_one_write_with_the_news() -> None:
     assert written == [NEWS + framed(messages.acks(1, 7))]
 
 
-async def test_nothing_is_acknowledged_twice() -> None:
+async def test_a_moment_is_acknowledged_only_once() -> None:
     member, written = writing()
     assert member.send_now(b"", 7)
     assert member.send_now(b"", 7)
@@ -50,7 +50,7 @@ async def test_what_could_not_be_written_is_not_taken_for_said() -> None:
     assert member.gather() == [messages.acks(0, 7)]
 
 
-async def test_who_knows_no_acknowledgements_hears_the_news_alone() -> None:
+async def test_a_client_without_acknowledgements_gets_only_the_updates() -> None:
     member, written = writing(acks=False)
     assert member.send_now(NEWS, 7)
     assert written == [NEWS]

@@ -82,7 +82,7 @@ async def test_a_room_vouches_for_its_graph_while_somebody_is_in_it_and_it_is_no
         assert not rooms.is_joined(STREAM)  # the next one asks
 
 
-async def test_where_a_graph_may_be_deleted_whoever_comes_asks_and_whoever_is_there_stays(
+async def test_when_a_graph_may_be_deleted_new_people_ask_the_database_and_present_ones_stay(
     rooms: Rooms,
 ) -> None:
     ada = Client()
@@ -95,7 +95,7 @@ async def test_where_a_graph_may_be_deleted_whoever_comes_asks_and_whoever_is_th
         assert not ada.member.closed
 
 
-async def test_when_the_server_ends_everyone_is_told_to_come_again(journal: Journal) -> None:
+async def test_everyone_is_told_to_reconnect_when_the_server_ends(journal: Journal) -> None:
     rooms = Rooms(journal)
     ada = Client("ada")
     async with rooms.enter(STREAM) as room:

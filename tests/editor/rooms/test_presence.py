@@ -61,7 +61,7 @@ def test_nobody_speaks_for_others() -> None:
     assert set(said(list(room.everyone()))) == {1, 2}
 
 
-def test_who_reconnects_takes_over_from_the_socket_before() -> None:
+def test_a_client_that_reconnects_takes_over_its_entry_from_the_old_socket() -> None:
     room, old, new = RoomPresence(), owner("ada"), owner("ada")
     room.update(old, (entry(1, 5),))
     assert len(room.update(new, (entry(1, 6, cursor=[1, 1]),))) == 1
@@ -80,7 +80,7 @@ def test_another_window_of_the_same_person_is_left_alone_by_an_echo() -> None:
     assert set(said(list(room.everyone()))) == {1}
 
 
-def test_who_takes_itself_away_is_gone_and_may_come_back() -> None:
+def test_a_client_that_removes_its_entry_is_gone_and_may_come_back() -> None:
     room, ada = RoomPresence(), owner("ada")
     room.update(ada, (entry(1, 1),))
     assert room.update(ada, (PresenceEntry(1, 2, b"null"),)) == [PresenceEntry(1, 2, b"null")]
@@ -136,7 +136,7 @@ async def test_a_newcomer_sees_who_is_there_and_all_see_who_leaves(rooms: Rooms)
         assert set(bob.others) == {2}
 
 
-async def test_of_many_words_of_one_person_only_the_last_waits(rooms: Rooms) -> None:
+async def test_only_the_last_of_many_presence_entries_of_a_person_waits(rooms: Rooms) -> None:
     ada, slow = Client("ada"), Client("slow")
     async with rooms.enter("graph/g") as room:
         ada.join(room)
@@ -151,7 +151,7 @@ async def test_of_many_words_of_one_person_only_the_last_waits(rooms: Rooms) -> 
         assert json.loads(slow.others[1])["cursor"] == [1999, 1999]
 
 
-async def test_of_several_who_speak_at_once_each_hears_all_and_one_alone_hears_nothing(
+async def test_clients_that_send_presence_at_once_get_all_entries_and_one_alone_gets_none(
     rooms: Rooms,
 ) -> None:
     """Stock servers send a client's own message back to it only together with others' messages."""
@@ -203,7 +203,7 @@ def test_what_a_page_could_not_read_as_json_is_not_passed_on(state: bytes) -> No
     assert room.everyone() == ()
 
 
-def test_of_a_key_that_comes_twice_the_last_is_passed_on_and_the_stamp_stays() -> None:
+def test_the_last_of_two_equal_keys_is_passed_on_and_the_servers_stamp_stays() -> None:
     state = b'{"a":1,"user":{"id":"bob"},"a":2,"\\u0075ser":{"id":"cyd"}}'
     (told,) = RoomPresence().update(owner("eve"), (PresenceEntry(1, 1, state),))
     assert told.state.count(b'"a"') == told.state.count(b'"user"') == 1

@@ -259,7 +259,7 @@ async def test_a_snapshot_that_cannot_be_applied_is_passed_over(journal: Journal
     assert loaded.replica.doc.get("things", type=Map).to_py() == {"a": "1"}
 
 
-async def test_who_reads_too_slowly_is_let_go_and_nobody_waits(rooms: Rooms) -> None:
+async def test_a_client_that_reads_too_slowly_is_closed_and_nobody_waits(rooms: Rooms) -> None:
     ada, bob, slow = Client("ada"), Client("bob"), Client("slow")
     async with rooms.enter(STREAM) as room:
         for client in (ada, bob, slow):

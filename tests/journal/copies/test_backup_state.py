@@ -21,7 +21,7 @@ SOUND = BackupRehearsed(at=1e9, file="/b/monday.zip", bytes=7, seconds=1)
 NOT_SOUND = BackupRehearsed(at=2e9, file="/b/monday.zip", bytes=7, seconds=1, why="damaged")
 
 
-def test_nothing_is_known_of_a_folder_without_backups(tmp_path: Path) -> None:
+def test_the_state_of_a_folder_without_backups_is_empty(tmp_path: Path) -> None:
     assert backup_state(tmp_path) == BackupState()
 
 
@@ -56,7 +56,7 @@ def test_only_this_user_can_read_it(tmp_path: Path) -> None:
     assert [path.stat().st_mode & 0o077 for path in tmp_path.iterdir()] == [0, 0]
 
 
-def test_whoever_writes_at_once_loses_nothing_of_the_others(tmp_path: Path) -> None:
+def test_concurrent_writers_lose_nothing_of_each_other(tmp_path: Path) -> None:
     writers = [
         threading.Thread(target=known.made, args=(tmp_path, MONDAY)),
         threading.Thread(target=known.rehearsed, args=(tmp_path, SOUND)),

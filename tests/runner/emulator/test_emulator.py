@@ -97,7 +97,7 @@ def test_the_newest_command_of_a_topic_wins_and_the_lost_one_leaves_no_trace() -
     assert any("Cannot stop UMRF graph 'nothing'" in line for line in lines)
 
 
-def test_with_deeper_topics_nothing_is_overwritten() -> None:
+def test_deeper_topics_overwrite_no_message() -> None:
     david = robot(ENDLESS, EngineTraits(loss=0.0, depth=0))
     for name in ("one", "two", "three"):
         david.hear(start(sequence(name)), 0)
@@ -105,7 +105,9 @@ def test_with_deeper_topics_nothing_is_overwritten() -> None:
     assert david.moving == ("one", "two", "three")
 
 
-def test_it_is_deaf_while_an_action_does_not_stop_and_then_answers_everything_at_once() -> None:
+def test_the_robot_is_deaf_while_an_action_does_not_stop_and_then_answers_everything_at_once() -> (
+    None
+):
     david = robot({"*": [{"never": True, "ignores_stop": True}]})
     david.hear(start(sequence("patrol")), 0)
     david.hear(Stop(graph_name="patrol", targets=DAVID), 100)
@@ -252,7 +254,7 @@ def test_sub_graphs_come_from_its_index_and_are_named_after_their_node() -> None
     assert any("graph name not unique" in line for line in told(david.advance(300)))
 
 
-def test_it_answers_to_its_wake_words_and_the_first_extra_one_becomes_its_name() -> None:
+def test_the_robot_answers_to_its_wake_words_and_the_first_extra_one_becomes_its_name() -> None:
     for quirk, actor in ((True, "all"), (False, "David")):
         quirks = EngineTraits(loss=0.0, extra_is_actor=quirk)
         david = robot(ENDLESS, quirks, extra_wake_words=("all", "kitchen"))

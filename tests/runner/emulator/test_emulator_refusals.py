@@ -135,7 +135,7 @@ def test_a_graph_with_a_sub_graph_that_is_started_again_kills_the_engine_at_the_
     assert (life.alive, life.held, life.lines) == (False, None, ["map::at"])
 
 
-def test_until_somebody_asks_it_lives_and_a_plain_graph_of_the_name_repairs_it() -> None:
+def test_the_engine_lives_until_a_get_and_a_plain_graph_of_the_name_repairs_it() -> None:
     life = Life().start(SUB, get=False).start(SUB, get=False)
     assert (life.alive, life.lines) == (True, ["map::at"])
     life.start(PLAIN)
@@ -144,7 +144,7 @@ def test_until_somebody_asks_it_lives_and_a_plain_graph_of_the_name_repairs_it()
     assert life.held["g"][0] == "FINISHED"
 
 
-def test_with_the_sub_graph_first_in_the_file_nothing_is_built_and_nothing_happens() -> None:
+def test_a_restart_builds_nothing_if_the_sub_graph_comes_first_in_the_file() -> None:
     life = Life().start(SUB_FIRST).start(SUB_FIRST)
     assert (life.alive, life.lines) == (True, ["map::at"])
     idle = ("INITIALIZED", {"SubSeq_0": "UNINITIALIZED", "Work_0": "UNINITIALIZED"})
@@ -210,7 +210,7 @@ def test_a_refused_start_leaves_nothing_behind() -> None:
     assert life.start(SUB).lines == FINISHED
 
 
-def test_by_name_it_says_the_same_in_other_words() -> None:
+def test_a_start_by_name_is_refused_in_other_words() -> None:
     life = Life({"SubLong/Work_0": [{"never": True}]}).by_name("TwiceIn")
     assert life.lines == [
         "origin [in stopGraph]: Cannot stop UMRF graph 'TwiceIn' because it doesn't exist.\n"

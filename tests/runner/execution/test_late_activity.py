@@ -56,7 +56,7 @@ async def proven_stopped(control: ExecutionService) -> str:
 
 
 @virtual
-async def test_it_is_called_stopped_no_more_until_that_is_proven_anew() -> None:
+async def test_a_run_that_moves_again_is_not_called_stopped_until_that_is_proven_anew() -> None:
     here = scene()
     async with here.played() as control:
         run = await said_to_rest(control)
@@ -93,7 +93,7 @@ async def test_answers_show_it_where_all_feedback_is_lost() -> None:
 
 
 @virtual
-async def test_it_is_said_also_while_nothing_can_be_recorded() -> None:
+async def test_a_run_that_moves_again_is_shown_also_while_the_journal_fails() -> None:
     here = scene()
     async with here.played() as control:
         run = await said_to_rest(control)
@@ -108,7 +108,7 @@ async def test_it_is_said_also_while_nothing_can_be_recorded() -> None:
 
 
 @virtual
-async def test_it_is_said_also_where_the_first_end_is_not_recorded_yet() -> None:
+async def test_a_run_that_moves_again_is_shown_also_before_its_first_end_is_recorded() -> None:
     here = scene()
     async with here.played() as control:
         run = (await control.start(asked(), ANN)).run.id

@@ -345,7 +345,7 @@ async def test_a_simulated_run_that_is_paused_can_be_stopped() -> None:
 
 
 @virtual
-async def test_where_the_simulator_plays_a_robot_it_pauses_only_as_safely_as_that() -> None:
+async def test_the_simulator_pauses_only_as_safely_as_the_robot_that_it_plays() -> None:
     harness = Harness({"David": Robot(engine())})
     async with harness.runner() as control:
         asked = order(sequence(), like="David", script={"*": [{"after_s": 20}]})

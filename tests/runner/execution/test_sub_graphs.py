@@ -79,7 +79,7 @@ async def test_a_sub_graph_of_an_earlier_run_is_no_part_of_one_that_has_only_its
 
 
 @virtual
-async def test_until_its_own_begins_a_run_does_not_show_the_one_from_before() -> None:
+async def test_a_run_does_not_show_an_earlier_sub_graph_before_its_own_begins() -> None:
     scene = WithSub(2, script=SCRIPT)
     await played(scene, named("Sub"))
     run = scene.harness.journal.history(await played(scene, named("Work", "Sub")))

@@ -103,7 +103,7 @@ async def lived(calls: list[dict[str, Any]], loss: float, seed: int, stop: float
     seed=0,
     stop=4.5,
 )
-def test_nothing_is_shown_that_was_not_seen_and_live_is_as_it_is_told_later(
+def test_only_observed_states_are_shown_and_live_agrees_with_the_history(
     calls: list[dict[str, Any]], loss: float, seed: int, stop: float | None
 ) -> None:
     witness: Witness = run_in_virtual_time(lambda: lived(calls, loss, seed, stop))

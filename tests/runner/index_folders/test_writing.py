@@ -90,7 +90,7 @@ def test_a_file_of_an_older_form_is_none_that_an_engine_reads(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("replace", [(), ("leg",)])
-def test_with_two_definitions_of_a_name_nothing_is_written(
+def test_two_definitions_of_one_name_prevent_the_write(
     tmp_path: Path, replace: tuple[str, ...]
 ) -> None:
     add(tmp_path, "a/leg.graph.json", sequence("leg", 2))
@@ -120,7 +120,7 @@ def test_an_engine_that_looks_elsewhere_is_not_written_for_in_vain(tmp_path: Pat
     assert put(tmp_path, sequence("leg", 3), index=known).written == ()
 
 
-def test_with_an_unreadable_file_nothing_is_written(tmp_path: Path) -> None:
+def test_an_unreadable_file_prevents_the_write(tmp_path: Path) -> None:
     with (tmp_path / "large.graph.json").open("wb") as large:
         large.truncate(9 << 20)
     with pytest.raises(Conflict, match=r"is not known: large\.graph\.json"):

@@ -132,7 +132,7 @@ def test_an_engine_that_says_its_name_is_told_with_that_robot_and_no_other(
     assert "says no name" not in "".join(each.message for each in found.values())
 
 
-def test_where_one_robot_alone_is_absent_an_engine_without_a_name_is_told_with_it(
+def test_a_single_absent_robot_is_named_with_an_engine_without_a_name(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     found = {each.where: each for each in looked(monkeypatch, 1, engine(0))}

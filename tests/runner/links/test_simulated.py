@@ -50,12 +50,12 @@ def process_of(link: SimulatedLink) -> psutil.Process:
 
 
 @pytest.mark.parametrize("promise", PROMISES)
-async def test_it_keeps_what_every_link_promises(promise: Promise) -> None:
+async def test_a_simulated_engine_keeps_the_promises_of_every_link(promise: Promise) -> None:
     async with simulated() as link:
         await keep(promise, Bench(link=link, endless=sequence("endless"), quick=sequence("quick")))
 
 
-async def test_it_reads_the_graph_from_the_text_that_is_sent() -> None:
+async def test_a_simulated_engine_reads_the_graph_from_the_text_that_is_sent() -> None:
     async with simulated() as link:
         order = placed(sequence("quick"), "r1")
         outline = GraphOutline("quick", {})

@@ -211,7 +211,7 @@ async def test_an_engine_that_shows_another_graph_raises_an_alarm_and_goes_on() 
 
 
 @virtual
-async def test_with_two_engines_on_one_path_nothing_is_called_stopped() -> None:
+async def test_no_run_is_called_stopped_while_two_engines_serve_one_path() -> None:
     david, harness = Open(NEVER), Harness()
     async with fleet(harness, David=david) as control:
         run = (await control.start(order(sequence(), engine="David"), ANN)).run

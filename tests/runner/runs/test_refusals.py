@@ -127,7 +127,7 @@ async def test_without_a_word_an_engine_that_does_not_show_the_run_has_refused_n
 
 
 @virtual
-async def test_with_two_engines_no_log_line_counts_as_a_refusal() -> None:
+async def test_no_log_line_counts_as_a_refusal_while_there_are_two_engines() -> None:
     scene = Knowing(6, "David", "Carol")
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run
@@ -223,7 +223,7 @@ async def test_a_start_that_was_refused_and_yet_shows_something_moving_is_an_ala
 
 
 @virtual
-async def test_of_several_engines_one_that_lacks_the_run_proves_nothing() -> None:
+async def test_one_of_several_engines_that_lacks_the_run_proves_nothing() -> None:
     david = Open(NEVER)
     async with fleet(Harness(), David=david) as control:
         run = (await control.start(order(PATROL, engine="David"), ANN)).run
@@ -283,7 +283,7 @@ def test_a_line_counts_by_its_place_behind_the_one_that_received_the_start(
     assert found.words == words
 
 
-def test_once_somebody_else_has_started_something_no_line_counts() -> None:
+def test_no_log_line_counts_after_a_start_of_somebody_else() -> None:
     found = log()
     found.hear(RECEIVED)
     found.doubt()

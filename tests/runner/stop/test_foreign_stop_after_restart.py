@@ -50,7 +50,7 @@ async def _told(control: ExecutionService) -> list[RobotEvent]:
 
 @pytest.mark.parametrize("crash", [True, False])
 @virtual
-async def test_it_goes_on_until_it_is_proven(crash: bool) -> None:
+async def test_a_foreign_stop_goes_on_after_a_restart_until_it_is_proven(crash: bool) -> None:
     david = Open(NEVER)
     harness = Harness({"David": david})
     sent = await _left(harness, david, crash=crash)
@@ -87,7 +87,7 @@ async def test_an_engine_that_was_restarted_meanwhile_is_told_nothing() -> None:
 
 
 @virtual
-async def test_one_that_was_asked_for_before_lives_were_recorded_is_sent_to_nobody() -> None:
+async def test_a_foreign_stop_without_a_recorded_life_is_not_sent() -> None:
     david = Open(NEVER)
     harness = Harness({"David": david})
     old = draft_of(StopAsked(at=0, graph="cleaning", author=BEN), BEN.id)
@@ -170,7 +170,7 @@ async def test_a_log_that_cannot_be_read_holds_up_no_stop(caplog: pytest.LogCapt
 
 
 @virtual
-async def test_it_is_kept_although_the_runner_ends_at_once() -> None:
+async def test_a_foreign_stop_is_kept_although_the_runner_ends_at_once() -> None:
     david = Open(NEVER)
     harness = Harness({"David": david})
     async with harness.runner() as control:

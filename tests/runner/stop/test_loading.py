@@ -302,7 +302,7 @@ async def test_an_end_of_a_sub_graph_counts_only_once_the_graph_around_it_has_le
 
 
 @virtual
-async def test_of_a_graph_that_cannot_be_read_whoever_has_not_begun_may_be_loading() -> None:
+async def test_any_action_of_an_unreadable_graph_that_has_not_begun_may_be_loading() -> None:
     own = _look("g", "STOPPED", Work_0="FINISHED", Work_1="UNINITIALIZED", Work_2="UNINITIALIZED")
     assert await _loading_in(LoadingWatch("g"), own) == ["g/Work_1", "g/Work_2"]
 
@@ -385,9 +385,7 @@ async def test_feedback_of_a_moving_action_counts_only_while_the_answers_do_not_
 
 
 @virtual
-async def test_how_long_an_action_usually_loads_is_said_once_it_was_seen_to_begin_three_times() -> (
-    None
-):
+async def test_the_usual_loading_time_is_shown_after_three_observed_begins() -> None:
     here = scene(3.0, {"*": [{"after_s": 0.2}]}, loss=0.0)
     async with here.played() as control:
         told: list[str] = []

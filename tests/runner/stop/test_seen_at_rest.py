@@ -27,7 +27,7 @@ from runner.robots_in_network import LOOKED, STUBBORN, RobotsInNetwork, asked, s
 
 
 @virtual
-async def test_who_saw_rest_while_the_engine_was_silent_did_not_see_the_error_that_came_later() -> (
+async def test_a_word_of_rest_given_while_the_engine_was_silent_does_not_cover_a_later_error() -> (
     None
 ):
     script = {"patrol/Work_0": [{"never": True, "ignores_stop": True}], "*": [{"after_s": 1}]}

@@ -121,7 +121,7 @@ async def raced(seed: int) -> None:
 
 
 @pytest.mark.timeout(0 if RACES > 200 else 120)
-def test_of_many_starts_at_once_exactly_one_leaves() -> None:
+def test_exactly_one_of_many_starts_at_once_leaves() -> None:
     for seed in range(RACES):
 
         async def main(seed: int = seed) -> None:
@@ -177,7 +177,7 @@ async def test_an_action_that_begins_after_the_stop_keeps_the_run_from_being_cal
 
 
 @virtual
-async def test_with_a_restarted_engine_the_run_is_lost_and_it_says_look_at_the_robot() -> None:
+async def test_a_run_of_a_restarted_engine_is_lost_and_asks_to_look_at_the_robot() -> None:
     scene = RobotsInNetwork(3)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id
@@ -209,7 +209,7 @@ async def test_a_start_that_comes_a_minute_late_is_unknown_until_then_and_is_not
 
 
 @virtual
-async def test_of_two_robots_with_one_graph_name_only_the_meant_one_stops() -> None:
+async def test_only_the_addressed_one_of_two_robots_with_one_graph_name_stops() -> None:
     scene = RobotsInNetwork(5, "David", "Carol")
     async with scene.played() as control:
         david = (await control.start(asked("David"), ANN)).run.id

@@ -61,7 +61,7 @@ async def test_an_action_that_does_not_obey_is_never_called_at_rest(script: dict
 
 
 @virtual
-async def test_nothing_is_started_beside_it_and_stop_stays_pressable() -> None:
+async def test_no_graph_starts_beside_an_unconfirmed_run_and_stop_stays_pressable() -> None:
     async with stopped(STUBBORN) as (scene, control, run):
         with pytest.raises(Conflict, match="did not obey"):
             await control.start(asked(), ANN)
@@ -131,7 +131,7 @@ async def test_the_block_outlives_the_runner_the_engine_and_what_strangers_start
 
 
 @virtual
-async def test_after_that_the_engine_s_own_error_of_this_run_stands_in_nobody_s_way() -> None:
+async def test_after_a_confirmed_rest_the_runs_own_error_blocks_no_start() -> None:
     script = STUBBORN | {"other/Work_0": [{"after_s": 1}], "other/Work_1": [{"after_s": 1}]}
     async with stopped(script) as (_, control, run):
         await control.confirm_rest(run, LOOKED, BEN)

@@ -70,7 +70,7 @@ def test_a_graph_of_several_actors_plays_and_cannot_be_started_on_one_robot() ->
     [{}, {"A": "Scout", "B": "Scout"}, {"A": "Scout"}],
     ids=["none", "one", "one and none"],
 )
-def test_nothing_is_told_of_a_graph_that_names_one_actor_at_most(actors: dict[str, str]) -> None:
+def test_a_graph_with_at_most_one_actor_has_no_problem_of_actors(actors: dict[str, str]) -> None:
     for graph in (VALUES, FORK, LOOP, changed(CHAIN, "A", type="spontaneous")):
         assert told(owned(graph, **actors)) == []
         assert told(owned(graph, **actors), facts=replace(PINNED, synchronises=True)) == []

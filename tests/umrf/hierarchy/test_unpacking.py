@@ -130,7 +130,7 @@ def test_an_action_that_is_unpacked_twice_is_two_actions() -> None:
     assert len({action.key for action in two.graph.actions}) == len(two.graph.actions)
 
 
-def test_of_two_places_of_one_sub_graph_only_one_is_unpacked() -> None:
+def test_only_the_chosen_one_of_two_places_of_a_sub_graph_is_unpacked() -> None:
     outer = changed(graph_of("entry>S", "S>T", "T>exit"), "T", name="S", instance_id=1)
     back = unpacked(outer, "T", TWO)
     assert isinstance(back, Unpacked)

@@ -86,7 +86,7 @@ def test_lines_that_are_good_each_for_itself_may_make_no_file_together() -> None
     assert found.writes[path].endswith(b"</a>\n<")
 
 
-def test_of_a_killed_call_files_that_arrived_are_known_by_what_they_hold() -> None:
+def test_files_that_a_killed_call_wrote_are_recognised_by_their_contents() -> None:
     base = GenerationBase(
         {"README.md": b"old\n", "package.xml": b"<old/>\n"},
         {

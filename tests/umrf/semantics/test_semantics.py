@@ -117,7 +117,7 @@ def test_a_sub_graph_runs_under_the_name_of_its_place() -> None:
     assert results(traces) == ["on_true", "on_true"]
 
 
-def test_in_a_sub_graph_whose_pause_hangs_the_last_action_never_ends() -> None:
+def test_the_last_action_never_ends_in_a_sub_graph_whose_pause_hangs() -> None:
     """A get that comes meanwhile waits for the pause, and holds the lock that the end would
     need."""
     inner = msgspec.structs.replace(graph_of("entry>X", "X>exit"), name="B")

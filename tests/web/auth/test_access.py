@@ -333,7 +333,7 @@ def socket_to(port: int, headers: dict[str, str]) -> Any:
     )
 
 
-def test_who_signs_in_again_after_the_session_expired_is_the_same_person(
+def test_a_person_who_signs_in_after_the_session_expired_is_the_same_person(
     client: httpx.Client, port: int
 ) -> None:
     headers = {**cookie(port, expires=time.time() - 60), "origin": f"http://localhost:{port}"}

@@ -80,7 +80,7 @@ def test_a_planted_cookie_of_our_name_wins_nowhere(port: int, planted: bytes) ->
     assert b" 401 " in asked(port, b"aa_%d=%s" % (port, others)).partition(b"\r\n")[0]
 
 
-def test_of_several_genuine_ones_the_first_that_lasts_counts(port: int) -> None:
+def test_the_first_valid_one_of_several_genuine_cookies_counts(port: int) -> None:
     over = ours(port, "Old", time.time() - 60)
     assert asked(port, b"; ".join([ours(port, "Ada"), ours(port, "Ben")])).endswith(b"Ada")
     assert asked(port, b"; ".join([over, ours(port, "Ada")])).endswith(b"Ada")

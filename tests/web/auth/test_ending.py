@@ -225,7 +225,7 @@ def test_a_mark_that_cannot_be_written_holds_here_and_says_so(tmp_path: Path) ->
     assert Revocations(tmp_path).every() == {"abc"}
 
 
-async def test_all_sessions_of_a_browser_end_where_nothing_can_be_written(tmp_path: Path) -> None:
+async def test_all_sessions_of_a_browser_end_even_if_no_mark_can_be_written(tmp_path: Path) -> None:
     (tmp_path / "revoked").write_text("no folder")
     revoked = Revocations(tmp_path)
     held = [KEYS.new_session("Ada"), KEYS.new_session("Ada")]
@@ -321,7 +321,7 @@ async def test_hundreds_of_open_sockets_are_watched_with_one_look_at_the_folder(
     await asyncio.gather(*tasks, return_exceptions=True)
 
 
-async def test_who_is_watched_is_also_put_out_when_the_folder_cannot_be_listed(
+async def test_a_revoked_session_also_ends_when_the_folder_cannot_be_listed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     revoked, session = Revocations(tmp_path), KEYS.new_session("")

@@ -101,5 +101,5 @@ def test_no_path_leads_out_of_it(folder: Path, path: str) -> None:
     ("path", "method"),
     [("/helpers", "GET"), ("/", "GET"), ("/help/", "POST"), ("/api/help", "GET")],
 )
-def test_everything_else_is_passed_on(folder: Path, path: str, method: str) -> None:
+def test_requests_outside_help_are_passed_on(folder: Path, path: str, method: str) -> None:
     assert asked(HelpSite(_nobody, folder), path, method)[0] == 418

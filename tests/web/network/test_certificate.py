@@ -34,7 +34,7 @@ def test_keys_are_for_this_user_alone(tmp_path: Path) -> None:
     assert certificate.trusting().get_ca_certs()
 
 
-def test_it_is_kept_while_it_is_good_and_renewed_before_it_ends(tmp_path: Path) -> None:
+def test_a_certificate_is_kept_while_it_is_good_and_renewed_before_it_ends(tmp_path: Path) -> None:
     certificate = Certificate(tmp_path)
     certificate.renew(NAMES)
     first, authority = chain_of(certificate)

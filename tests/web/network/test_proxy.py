@@ -43,7 +43,7 @@ def signed_in(product: Product, **headers: str) -> httpx.Response:
     )
 
 
-def test_both_processes_are_below_one_address_whether_the_proxy_takes_the_path_off_or_not(
+def test_both_processes_answer_below_one_address_with_and_without_the_path(
     product: Product,
 ) -> None:
     for path in ("/temoto/healthz", "/healthz"):
@@ -102,9 +102,7 @@ def test_a_session_is_for_this_path_and_this_encryption_only(product: Product) -
     "origin",
     ["http://robots.example.org", "https://robots.example.org:8000", "https://example.org"],
 )
-def test_of_pages_elsewhere_only_the_public_one_may_talk_to_us(
-    product: Product, origin: str
-) -> None:
+def test_only_pages_of_the_public_address_may_call(product: Product, origin: str) -> None:
     refused = signed_in(product, origin=origin)
     assert (refused.status_code, refused.json()["type"]) == (403, "wrong-origin")
     refused = ask(f"{product.url}/healthz", headers={"host": "robots.example.com"})
@@ -180,7 +178,7 @@ def test_tries_are_counted_for_who_makes_them_not_for_the_proxy(product: Product
         ("", ["203.0.113.9"], "127.0.0.1"),
     ],
 )
-def test_who_asks_is_whom_the_last_believed_proxy_saw(
+def test_the_client_is_the_address_that_the_last_trusted_proxy_saw(
     trusted: str, chain: list[str], seen: str
 ) -> None:
     found: list[Any] = []

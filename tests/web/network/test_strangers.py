@@ -81,7 +81,9 @@ def test_strangers_who_do_not_even_finish_a_handshake_make_room_too(tmp_path: Pa
             assert answer.status_code == 202
 
 
-def test_who_says_nothing_is_let_go_and_who_waits_for_an_answer_is_not(tmp_path: Path) -> None:
+def test_a_silent_connection_is_closed_and_one_that_waits_for_an_answer_is_not(
+    tmp_path: Path,
+) -> None:
     with process("runner", tmp_path) as port, ExitStack() as stack:
         (silent,) = strangers(stack, port, 1, b"GET /healthz HTTP/1.1\r\n")
         stream = b"GET /api/robots HTTP/1.1\r\nhost: localhost\r\nauthorization: Bearer %b\r\n\r\n"
@@ -202,7 +204,7 @@ def is_answered(one: socket.socket) -> bool:
     ],
     ids=["behind the proxy", "forged"],
 )
-def test_one_who_floods_through_a_proxy_takes_nothing_from_others_behind_it(
+def test_a_client_that_floods_through_a_proxy_takes_nothing_from_others_behind_it(
     tmp_path: Path, source: str, asker: str
 ) -> None:
     with (

@@ -162,7 +162,7 @@ def pieces_of(stream: bytes, cuts: list[int]) -> list[bytes]:
     st.frozensets(st.integers(1, 6), max_size=3),
     st.sampled_from([1, 2, 64]),
 )
-def test_it_hears_says_and_ends_as_the_usual_way_does(
+def test_a_socket_taken_over_receives_sends_and_ends_as_the_usual_one_does(
     stream: bytes, cuts: list[int], before: int, stops: frozenset[int], in_a_turn: int
 ) -> None:
     pieces = pieces_of(stream, cuts)

@@ -138,7 +138,7 @@ async def test_what_goes_wrong_at_the_end_of_one_socket_stays_there(
 # --- who is not read --------------------------------------------------------------------------
 
 
-async def test_who_is_held_back_is_not_taken_for_dead_and_is_asked_again_afterwards() -> None:
+async def test_a_throttled_client_is_not_taken_for_dead_and_is_pinged_again_afterwards() -> None:
     protocol, wire, _ = await taken_over(**SOON)
     protocol.pause_hearing()
     await asyncio.sleep(LONG)
@@ -151,7 +151,7 @@ async def test_who_is_held_back_is_not_taken_for_dead_and_is_asked_again_afterwa
     end(protocol)
 
 
-async def test_who_was_held_back_until_now_has_time_to_be_read() -> None:
+async def test_a_client_that_was_throttled_until_now_has_time_to_be_read() -> None:
     protocol, wire, _ = await taken_over(ws_ping_interval=60, ws_ping_timeout=60)
     protocol.stop_keepalive()
     protocol.send_keepalive_ping()
@@ -174,7 +174,7 @@ async def test_a_pong_behind_a_flood_is_not_late_before_its_turn() -> None:
 
 
 @EITHER
-async def test_who_has_said_what_no_application_fetches_is_not_taken_for_dead(
+async def test_a_client_whose_messages_wait_to_be_fetched_is_not_taken_for_dead(
     kind: type[Any],
 ) -> None:
     protocol, wire = await opened(kind, silent, **SOON)
@@ -185,7 +185,7 @@ async def test_who_has_said_what_no_application_fetches_is_not_taken_for_dead(
 
 
 @EITHER
-async def test_who_is_read_and_answers_no_ping_is_taken_for_dead(kind: type[Any]) -> None:
+async def test_a_client_that_is_read_and_answers_no_ping_is_taken_for_dead(kind: type[Any]) -> None:
     protocol, wire = await opened(kind, silent, **SOON)
     await asyncio.sleep(LONG)
     assert wire.written.endswith(NO_PONG)

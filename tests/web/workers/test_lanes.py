@@ -36,7 +36,7 @@ async def test_a_start_makes_none(lane: Watched) -> None:
     assert lane.begun == 0
 
 
-async def test_one_is_there_after_it_though_nobody_has_asked(
+async def test_a_worker_is_warmed_without_any_request(
     lane: Watched, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(lanes, "_FIRST_S", 0.01)
@@ -46,13 +46,13 @@ async def test_one_is_there_after_it_though_nobody_has_asked(
                 await anyio.sleep(0.01)
 
 
-async def test_who_asks_earlier_has_one_made(lane: Watched) -> None:
+async def test_a_request_before_the_warm_up_gets_a_worker(lane: Watched) -> None:
     async with kept_warm(lane):
         assert await lane(add, 2, 3) == 5
     assert lane.begun == 0
 
 
-async def test_one_that_dies_before_it_is_told_anything_has_died_like_any_other(
+async def test_a_worker_that_dies_before_its_first_work_counts_as_a_death(
     lane: Watched, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its number is written to it when it is made: there the one who makes it finds it gone."""

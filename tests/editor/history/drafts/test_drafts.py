@@ -264,7 +264,7 @@ def _things(maps: Maps) -> set[str]:
     return exist(places) - loose(places)  # type: ignore[arg-type]
 
 
-async def test_where_nothing_was_done_in_a_draft_nothing_is_stored(editor: Editor) -> None:
+async def test_a_merge_of_an_unchanged_draft_stores_nothing(editor: Editor) -> None:
     dice = random.Random(3)
     await editor.edit(editor.origin, "ada", dice, 5)
     made = await _draft(editor)

@@ -49,7 +49,7 @@ def _without(places: Places, *owners: str) -> dict[Place, Any]:
 
 @given(seeds)
 @often
-def test_where_nothing_was_done_here_it_becomes_what_the_other_is(seed: int) -> None:
+def test_an_unchanged_side_becomes_equal_to_the_changed_one(seed: int) -> None:
     base, _, theirs = sides(seed, ours=0)
     found = merged(base, base, theirs, {})
     assert found.conflicts == ()
@@ -58,7 +58,7 @@ def test_where_nothing_was_done_here_it_becomes_what_the_other_is(seed: int) -> 
 
 @given(seeds)
 @often
-def test_where_nothing_was_done_there_nothing_is_set(seed: int) -> None:
+def test_an_unchanged_other_side_sets_nothing(seed: int) -> None:
     base, ours, _ = sides(seed, theirs=0)
     assert merged(base, ours, base, {}) == KeyMerge({}, ())
     assert merged(base, ours, ours, {}) == KeyMerge({}, ())
@@ -76,7 +76,7 @@ def test_no_arrow_without_an_end_comes_to_be_whatever_is_chosen(seed: int, choic
 
 @given(seeds, seeds)
 @often
-def test_nothing_is_touched_that_the_other_did_not_change(seed: int, choice: int) -> None:
+def test_a_merge_touches_only_keys_that_the_other_side_changed(seed: int, choice: int) -> None:
     base, ours, theirs = sides(seed)
     asked = merged(base, ours, theirs, {})
     found = merged(base, ours, theirs, _any_choices(asked, choice))
@@ -94,7 +94,7 @@ def test_nothing_is_touched_that_the_other_did_not_change(seed: int, choice: int
 
 @given(seeds)
 @often
-def test_both_ways_say_the_same_where_everything_is_chosen(seed: int) -> None:
+def test_merges_in_both_directions_agree_if_every_conflict_is_chosen(seed: int) -> None:
     base, ours, theirs = sides(seed)
     there = merged(base, ours, theirs, {})
     back = merged(base, theirs, ours, {})

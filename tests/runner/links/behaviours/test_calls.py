@@ -58,7 +58,7 @@ def bench(tmp_path: Path) -> Iterator[Bench]:
     assert not processes()
 
 
-def test_it_sees_nothing_of_our_environment_working_folder_and_input(
+def test_a_behaviour_sees_nothing_of_our_environment_working_folder_and_input(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     trap = "raise SystemExit('a trap')"
@@ -147,7 +147,7 @@ def test_a_stop_that_comes_before_its_process_is_heard_by_it(bench: Bench) -> No
     assert returned.result == "on_true"
 
 
-def test_it_can_be_killed_before_its_process_is_there(bench: Bench) -> None:
+def test_a_call_can_be_killed_before_its_process_is_there(bench: Bench) -> None:
     write(bench.folder, acts=DEAF)
     bench.begin()
     said = bench.performer.give_up(1)
@@ -180,7 +180,7 @@ def test_not_even_one_that_turns_on_its_supervisor_gets_away(bench: Bench, numbe
     assert not processes()
 
 
-def test_one_that_ignores_every_signal_is_killed(bench: Bench) -> None:
+def test_a_behaviour_that_ignores_every_signal_is_killed(bench: Bench) -> None:
     write(
         bench.folder,
         acts="""
@@ -250,7 +250,7 @@ def test_the_end_of_the_performer_leaves_nothing(bench: Bench) -> None:
     assert not processes()
 
 
-def test_where_no_process_can_be_had_the_call_is_an_error(
+def test_a_call_whose_process_cannot_be_made_is_an_error(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuses(*_: object) -> None:

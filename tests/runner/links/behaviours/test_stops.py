@@ -71,7 +71,7 @@ def test_a_paused_behaviour_holds_and_goes_on_when_it_may(
     assert log.stat().st_size == 20
 
 
-def test_one_that_never_ends_is_killed_five_seconds_after_its_stop_and_delays_no_other(
+def test_a_behaviour_that_never_ends_is_killed_five_seconds_after_its_stop_and_delays_no_other(
     client: httpx.Client, folder: Path
 ) -> None:
     write(folder, deaf=DEAF, waits=WAITS)
@@ -92,7 +92,7 @@ def test_one_that_never_ends_is_killed_five_seconds_after_its_stop_and_delays_no
     until(lambda: not processes())
 
 
-def test_one_that_floods_leaves_the_runner_and_other_runs_alone(
+def test_a_behaviour_that_floods_leaves_the_runner_and_other_runs_alone(
     client: httpx.Client, folder: Path
 ) -> None:
     flood = "while True:\n        print('x' * 999)\n        action.message('y' * 999)\n"
@@ -170,7 +170,7 @@ def test_the_end_of_the_engines_process_ends_its_behaviours(
     assert over(client, run)["state"] == "lost"
 
 
-def test_as_many_as_there_may_be_go_on_at_once_and_obey_one_stop(
+def test_the_largest_number_of_behaviours_runs_at_once_and_obeys_one_stop(
     client: httpx.Client, folder: Path
 ) -> None:
     write(folder, waits=WAITS)
