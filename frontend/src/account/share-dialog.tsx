@@ -25,6 +25,7 @@ import {
 import { copyText } from "../ui/copy-text";
 import { Segments } from "../ui/segments";
 import { ago, instant, useNow } from "../ui/times";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./share-dialog.module.css";
 
@@ -148,7 +149,7 @@ function Body() {
       {open.length > 0 && (
         <section className={style.links} aria-label="Links">
           <div className={style.heading}>
-            <h3>{open.length === 1 ? "1 link" : `${open.length} links`}</h3>
+            <h3>{counted(open.length, "link")}</h3>
             {origins.length > 1 && (
               <Select
                 aria-label="Address in the links"

@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
-import { changedLines, fieldWords, linesOf } from "./difference-words";
+import { fieldWords } from "../graph/field-words";
+import { changedLines, linesOf } from "./difference-words";
 
 test("of a parameter only what is another is told", () => {
   const before = '{"pvf_type":"number","pvf_value":1}';

@@ -1,6 +1,6 @@
 /** Describes differences between two moments of a document in words. Pure. */
+import { fieldWords } from "../graph/field-words";
 import { memberNames, memberText } from "../graph/json-members";
-import { pathWords } from "../graph/value-text";
 import { isolated } from "../words/isolated";
 
 /** A field that says something else. */
@@ -30,13 +30,6 @@ export function plainValue(value: unknown): string {
   } catch {
     return value;
   }
-}
-
-export function fieldWords(field: string): string {
-  if (field.startsWith("in/")) return `input ${pathWords(field.slice(3))}`;
-  if (field.startsWith("out/")) return `output ${pathWords(field.slice(4))}`;
-  if (field.startsWith("remap/")) return `remap of ${field.slice(6)}`;
-  return field.replaceAll("_", " ");
 }
 
 const MEMBERS: Readonly<Record<string, string>> = {

@@ -3,6 +3,7 @@ import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { type DraftProposal, type GraphDraft, refreshDrafts } from "../api/drafts";
 import { errorText } from "../api/http";
+import { counted } from "../words/counted";
 
 export function useDraftStep() {
   const client = useQueryClient();
@@ -23,7 +24,7 @@ export function useDraftStep() {
   return { busy, wrong, step };
 }
 
-const things = (count: number) => (count === 1 ? "1 change" : `${count} changes`);
+const things = (count: number) => counted(count, "change");
 
 /** Return how far a draft and its origin are apart, in words; empty while that is unknown. */
 export function apartWords({ ahead, behind }: Pick<GraphDraft, "ahead" | "behind">): string {

@@ -19,6 +19,7 @@ import { errorText } from "../api/http";
 import { CoursesOfText } from "../courses/courses-told";
 import { ChangeLines } from "../history/entry-row";
 import { namesWords } from "../history/history-words";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import { useDraftStep } from "./draft-steps";
 import style from "./drafts.module.css";
@@ -193,9 +194,7 @@ export function MergeProblems({ problems }: { problems: readonly Problem[] }) {
   if (problems.length === 0) return <p className={style.quiet}>The merge brings no problem.</p>;
   return (
     <section aria-label="Problems that the merge brings">
-      <h3>
-        The merge brings {problems.length === 1 ? "1 problem" : `${problems.length} problems`}
-      </h3>
+      <h3>The merge brings {counted(problems.length, "problem")}</h3>
       <ul className={style.problems}>
         {problems.map((problem) => (
           <li

@@ -4,6 +4,7 @@ import type { ActionRun, Run, Visit } from "../api/runs";
 import { fullName, type Graph, type Key } from "../graph/model";
 import { boundsText } from "../status/durations";
 import { visitBegin, visitDuration, visitDurationBound } from "../status/progress";
+import { counted } from "../words/counted";
 import type { DryRunSeed, SeedDoubt, SeededAction, SeedValue } from "./seed";
 
 type VisitState = "ended" | "goes on" | "not begun";
@@ -128,7 +129,7 @@ function valuesAt(run: Run, names: ReadonlyMap<string, string>, at: number): See
 export function seedOf(run: Run, graph: Graph, differs: number, at: number): DryRunSeed {
   const doubts: SeedDoubt[] = [];
   if (differs > 0) {
-    const places = differs === 1 ? "1 place" : `${differs} places`;
+    const places = counted(differs, "place");
     doubts.push({
       node: "",
       text: `The graph on screen differs from the one that ran in ${places}; the dry-run plays the one on screen`,

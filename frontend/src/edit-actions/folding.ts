@@ -2,6 +2,7 @@
 import { IconFold } from "@tabler/icons-react";
 import { framesOf } from "../canvas/folding/folding";
 import { announcer } from "../ui/announcer";
+import { counted } from "../words/counted";
 import type { EditAction } from "./edit-action";
 import type { EditorContext } from "./editor-context";
 
@@ -34,9 +35,7 @@ function foldEvery(context: EditorContext, folded: boolean): void {
   const keys = framesThat(context, !folded);
   context.fold(keys, folded);
   if (folded) context.select([]);
-  announcer.say(
-    `${keys.length === 1 ? "1 frame" : `${keys.length} frames`} ${folded ? "folded" : "unfolded"}`,
-  );
+  announcer.say(`${counted(keys.length, "frame")} ${folded ? "folded" : "unfolded"}`);
 }
 
 export const fold: EditAction = {

@@ -2,7 +2,8 @@
 import type { Problem } from "../api/graphs";
 import type { PartOnCard } from "../canvas/editor-store";
 import { relationId } from "../graph/document-keys";
-import { ENTRY, EXIT, type Graph, type Key, PRECONDITIONS } from "../graph/model";
+import { endLabel } from "../graph/field-words";
+import { ENTRY, type Graph, type Key, PRECONDITIONS } from "../graph/model";
 import { placeOf } from "../graph/problems/problem-groups";
 import { pathWords, valueText } from "../graph/value-text";
 import { isolated } from "../words/isolated";
@@ -34,8 +35,8 @@ const FIELDS = [
 ] as const; // biome-ignore format: one list
 
 const titleOf = (graph: Graph, key: Key): string => {
-  if (key === ENTRY) return "Entry";
-  if (key === EXIT) return "Exit";
+  const end = endLabel(key);
+  if (end !== null) return end;
   const action = graph.actions.find((candidate) => candidate.key === key);
   return action ? `${action.name} ${action.instanceId}` : "";
 };

@@ -5,15 +5,8 @@
  */
 
 import { isolated } from "../words/isolated";
-import {
-  bundleOfKey,
-  endsOf,
-  type Maps,
-  ROOTS,
-  type Root,
-  segmentsOf,
-  splitKey,
-} from "./document-keys";
+import { bundleOfKey, endsOf, type Maps, ROOTS, type Root, splitKey } from "./document-keys";
+import { endLabel, fieldWords, SILENT_FIELDS, shortText } from "./field-words";
 import { ENTRY, EXIT, type Key, PRECONDITIONS } from "./model";
 import { isEqual } from "./values";
 import { readWaypoints } from "./waypoints";
@@ -46,22 +39,6 @@ interface ChangesInput {
   readonly here: Maps;
 }
 
-const FIELDS: ReadonlyMap<string, string> = new Map([
-  ["", "Name"],
-  ["type", "Type"],
-  ["actor", "Robot"],
-  ["instance_id", "Number"],
-  ["description", "Description"],
-  ["name", "Name"],
-  ["direction", "Direction"],
-  ["on_true", "When true"],
-  ["on_false", "When false"],
-  ["on_error", "When error"],
-  ["on_stopped", "When stopped"],
-  ["required", "Waits for it"],
-]);
-/** Order of things and how a file listed them: changed along with what people change. */
-const SILENT = new Set(["order", "po", "co", "only", "in", "out", "missing", "twin", "schema"]);
 const ORDER = ["graph", "action", "arrow", "drawing", "comment"] as const;
 const LONGEST = 120;
 
@@ -186,8 +163,8 @@ function titleOf(thing: GraphChange["thing"], head: string, given: ChangesInput)
 }
 
 function nameOf(key: Key, { here, before }: ChangesInput): string {
-  if (key === ENTRY) return "Entry";
-  if (key === EXIT) return "Exit";
+  const end = endLabel(key);
+  if (end !== null) return end;
   const name = here.actions.get(key) ?? before.actions.get(key);
   return typeof name === "string" && name !== "" ? name : "an action";
 }
@@ -195,7 +172,7 @@ function nameOf(key: Key, { here, before }: ChangesInput): string {
 function lineOf(root: Root, key: string, given: ChangesInput, now: Maps): ChangedField | null {
   const rest = root === "meta" ? key : splitKey(key).rest;
   if (bundleOfKey(key) !== null && root === "positions") return bendsLine(key, given, now);
-  if (SILENT.has(rest) || (root === "comments" && rest !== "")) return null;
+  if (SILENT_FIELDS.has(rest) || (root === "comments" && rest !== "")) return null;
   const [was, is] = [given.before[root].get(key), given.difference[root].get(key)];
   const there = now[root].get(key);
   const line = { field: fieldOf(root, rest), before: words(root, was), after: words(root, is) };
@@ -217,17 +194,9 @@ function bendsLine(key: string, given: ChangesInput, now: Maps): ChangedField {
 }
 
 function fieldOf(root: Root, rest: string): string {
-  if (root === "positions") return "Place";
-  if (root === "comments") return "Text";
-  const known = FIELDS.get(rest);
-  if (known !== undefined) return known;
-  const slash = rest.indexOf("/");
-  if (slash < 0) return rest;
-  const [kind, path] = [rest.slice(0, slash), rest.slice(slash + 1)];
-  const name = segmentsOf(path).join(" ");
-  if (kind === "in") return `Input ${isolated(name)}`;
-  if (kind === "out") return `Output ${isolated(name)}`;
-  return kind === "remap" ? `Output ${path} as` : path;
+  const field = root === "positions" ? "position" : root === "comments" ? "text" : rest;
+  const words = fieldWords(field);
+  return isolated(`${words.charAt(0).toUpperCase()}${words.slice(1)}`);
 }
 
 /** A value for people. Parameters are JSON text, of which the value itself is shown. */
@@ -235,7 +204,8 @@ function words(root: Root, value: unknown): string | null {
   if (value === undefined || value === null) return null;
   if (root === "positions" && Array.isArray(value)) return value.map(Math.round).join(", ");
   if (typeof value === "boolean") return value ? "yes" : "no";
-  return short(typeof value === "string" ? parameterWords(value) : String(value));
+  const text = typeof value === "string" ? parameterWords(value) : String(value);
+  return shortText(text, LONGEST);
 }
 
 function parameterWords(text: string): string {
@@ -248,8 +218,4 @@ function parameterWords(text: string): string {
   } catch {
     return text;
   }
-}
-
-function short(text: string): string {
-  return text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text;
 }

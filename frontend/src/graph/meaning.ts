@@ -1,6 +1,7 @@
 /** Compares graphs by what they say, apart from how they are drawn: equal texts for equal tasks. */
 
 import { isolated } from "../words/isolated";
+import { fieldWords, shortText } from "./field-words";
 import {
   type Action,
   ENTRY,
@@ -108,12 +109,8 @@ export function differences(before: Graph, after: Graph): MeaningDifference[] {
 
 const LONGEST = 60; // characters of a value
 
-function short(text: string): string {
-  return text.length > LONGEST ? `${text.slice(0, LONGEST)}…` : text;
-}
-
 function becomes(what: string, was: string, is: string): string[] {
-  return was === is ? [] : [`${what}: ${short(was)} → ${short(is)}`];
+  return was === is ? [] : [`${what}: ${shortText(was, LONGEST)} → ${shortText(is, LONGEST)}`];
 }
 
 /** Returns the changed fields of an action, in words. */
@@ -121,7 +118,7 @@ function inAction(was: Action | undefined, is: Action | undefined): string[] {
   if (was === undefined || is === undefined) return [];
   return [
     ...becomes("type", was.type, is.type),
-    ...becomes("robot", was.actor || "any", is.actor || "any"),
+    ...becomes(fieldWords("actor"), was.actor || "any", is.actor || "any"),
     ...inParameters(was.inputs, is.inputs),
     ...inParameters(was.outputs, is.outputs, "output "),
     ...(was.description === is.description ? [] : ["its description"]),

@@ -6,6 +6,7 @@
  */
 
 import { isolated } from "../words/isolated";
+import { endLabel } from "./field-words";
 import {
   ENTRY,
   EXIT,
@@ -181,8 +182,8 @@ const all = list("and");
 /** Returns the name of an end of a relation, with its number only where the name is not enough. */
 
 export function endName(graph: Graph, key: Key): string {
-  if (key === ENTRY) return "Entry";
-  if (key === EXIT) return "Exit";
+  const end = endLabel(key);
+  if (end !== null) return end;
   const action = graph.actions.find((candidate) => candidate.key === key);
   if (!action) return "something deleted";
   const shared = graph.actions.some((other) => other !== action && other.name === action.name);

@@ -1,6 +1,7 @@
 import { expect, test } from "vitest";
 import type { FieldBlame } from "../api/history";
-import { blamedName, blamedValue, toldFields } from "./value-spans";
+import { plainFieldWords } from "../graph/field-words";
+import { blamedValue, toldFields } from "./value-spans";
 
 const blame = (field: string): FieldBlame => ({
   ...{ field, value: "a", before: null, seq: 2, at: "2026-01-01T00:00:00Z" },
@@ -8,7 +9,7 @@ const blame = (field: string): FieldBlame => ({
 });
 
 test("fields are called as in the form", () => {
-  expect(["", "in/speed", "out/side", "on_true", "position"].map(blamedName)).toEqual([
+  expect(["", "in/speed", "out/side", "on_true", "position"].map(plainFieldWords)).toEqual([
     "name",
     "speed",
     "output side",

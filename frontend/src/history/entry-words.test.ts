@@ -1,5 +1,6 @@
 import { expect, test } from "vitest";
-import { entryLines, lineText, shortened, spokenName, whenWords } from "./entry-words";
+import { spokenName } from "../graph/field-words";
+import { entryLines, lineText, shortened, whenWords } from "./entry-words";
 
 type SittingChanges = Parameters<typeof entryLines>[0];
 type Arrow = NonNullable<SittingChanges["relations"]>[number];

@@ -3,6 +3,9 @@
  */
 import type { HistoryEntry } from "../api/history";
 import { type FieldChange, linesOf } from "../differences/difference-words";
+import { fieldWords, shortText, spokenName } from "../graph/field-words";
+import { PRECONDITIONS } from "../graph/model";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 
 /**
@@ -32,17 +35,7 @@ const LONGEST = 60; // letters of a value
 
 const text = (words: string): LinePart => ({ kind: "text", text: words });
 const name = (words: string): LinePart => ({ kind: "name", text: words });
-const short = (value: string): string =>
-  value.length > LONGEST ? `${value.slice(0, LONGEST)}…` : value;
-
-/** `Drive_0` as people say it: the number only where there is one. */
-export function spokenName(fullName: string): string {
-  if (fullName === "entry") return "Entry";
-  if (fullName === "exit") return "Exit";
-  const [, own, number] = /^(.*)_(\d+)$/s.exec(fullName) ?? [];
-  if (own === undefined) return fullName || "an action";
-  return number === "0" ? own || "an action" : `${own} ${number}`;
-}
+const short = (value: string): string => shortText(value, LONGEST);
 
 /** From what to what, without a side on which nothing stood. */
 function fromTo(before: string | null, after: string | null): LinePart[] {
@@ -52,10 +45,6 @@ function fromTo(before: string | null, after: string | null): LinePart[] {
   if (old === null) return is === null ? [] : [text(" "), is];
   return [text(" "), old, text(" → "), is ?? text("nothing")];
 }
-
-/** Input and output are said where that is not plain: values that people set are inputs. */
-const plainField = (field: string): string =>
-  field.replace(/^input /, "").replace(/^actor$/, "robot");
 
 function actionLines(action: ChangedAction, arrows: number): EntryLine[] {
   const of = action.aid;
@@ -74,7 +63,7 @@ function actionLines(action: ChangedAction, arrows: number): EntryLine[] {
     parts: [
       text("set "),
       spoken,
-      text(` ${plainField(line.name)}`),
+      text(` ${line.name.replace(/^input /, "")}`),
       ...fromTo(line.before, line.after),
     ],
   }));
@@ -83,29 +72,24 @@ function actionLines(action: ChangedAction, arrows: number): EntryLine[] {
   return [{ sign: "changed", of, parts: [text("renamed "), was, text(" to "), spoken] }, ...lines];
 }
 
-const WHEN: Readonly<Record<string, string>> = {
-  on_true: "true",
-  on_false: "false",
-  on_error: "error",
-  on_stopped: "stopped",
-};
-
 /** `when true or false`, and what then happens unless that is the usual: it runs. */
 export function whenWords(when: readonly (readonly [outcome: string, response: string])[]): string {
   const responses = [...new Set(when.map(([, response]) => response))];
   return responses
     .map((response) => {
-      const outcomes = when.flatMap(([on, then]) => (then === response ? [WHEN[on] ?? on] : []));
+      const outcomes = when.flatMap(([on, then]) =>
+        then === response ? [on.replace(/^on_/, "")] : [],
+      );
       return `when ${outcomes.join(" or ")}${response === "run" ? "" : `: ${response}`}`;
     })
     .join(", ");
 }
 
-const isOutcome = ({ field }: FieldChange): boolean => field in WHEN;
+const isOutcome = ({ field }: FieldChange): boolean => PRECONDITIONS.some((on) => on === field);
 const isBend = ({ field }: FieldChange): boolean => field.startsWith("waypoints/");
 
 function outcomeLine(field: FieldChange, of: string, ends: readonly LinePart[]): EntryLine {
-  const when = text(` when ${WHEN[field.field]}`);
+  const when = text(` ${fieldWords(field.field)}`);
   const [was, is] = [String(field.before), String(field.after)];
   if (was === "ignore") {
     const then = is === "run" ? [] : [text(`: ${is}`)];
@@ -128,8 +112,8 @@ function arrowLines(arrow: ChangedArrow): EntryLine[] {
   return [
     ...arrow.fields.filter(isOutcome).map((field) => outcomeLine(field, of, ends)),
     ...linesOf(others).map((line): EntryLine => {
-      const field = line.name === "required" ? "waits for it" : line.name;
-      const parts = [text("set "), ...ends, text(` ${field}`), ...fromTo(line.before, line.after)];
+      const set = [text("set "), ...ends, text(` ${line.name}`)];
+      const parts = [...set, ...fromTo(line.before, line.after)];
       return { sign: "changed", of, parts };
     }),
   ];
@@ -157,9 +141,6 @@ function graphLines(fields: readonly FieldChange[]): EntryLine[] {
     return { sign, of: null, parts: [words, ...values] };
   });
 }
-
-const counted = (count: number, what: string): string =>
-  `${count} ${what}${count === 1 ? "" : "s"}`;
 
 /** Return one line for changes of looks only, such as positions. */
 function looksLine(
@@ -219,9 +200,7 @@ function overwrittenLines(changes: OverwrittenChanges): EntryLine[] {
   const set = (of: string | null, what: readonly LinePart[], all: readonly FieldChange[]) =>
     linesOf(all).map(({ name: field, before, after }) => {
       const did = text(field === "name" ? "renamed " : "set ");
-      const its =
-        field === "required" ? "waits for it" : plainField(field).replace(/^on /, "when ");
-      const named = field === "name" ? [] : [text(` ${its}`)];
+      const named = field === "name" ? [] : [text(` ${field.replace(/^input /, "")}`)];
       return line(of, did, ...what, ...named, ...wantedAndStayed(before, after));
     });
   const gone = text(", deleted by somebody else at the same time");

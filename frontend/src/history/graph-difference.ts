@@ -5,6 +5,7 @@ import type { ChangeMark, ChangeMarks } from "../canvas/marks/change-marks";
 import { type FieldChange, linesOf } from "../differences/difference-words";
 import { relationId } from "../graph/document-keys";
 import { notesOf, readNote } from "../graph/edit/notes";
+import { endLabel, fieldWords, spokenName } from "../graph/field-words";
 import {
   type Action,
   fullName,
@@ -15,8 +16,8 @@ import {
 } from "../graph/model";
 import { cardRows } from "../graph/parameters/card-rows";
 import { isEqual } from "../graph/values";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
-import { spokenName } from "./entry-words";
 
 export interface ChangedThing {
   readonly key: string;
@@ -39,8 +40,9 @@ export interface GraphChanges {
 type Fields = ReadonlyMap<string, unknown>;
 
 function changedFields(before: Fields, after: Fields): FieldChange[] {
-  const names = [...new Set([...before.keys(), ...after.keys()])].sort();
-  return names.flatMap((field) => {
+  const names = [...new Set([...before.keys(), ...after.keys()])];
+  const inOrder = names.sort((a, b) => (fieldWords(a) < fieldWords(b) ? -1 : 1));
+  return inOrder.flatMap((field) => {
     const [was, is] = [before.get(field) ?? null, after.get(field) ?? null];
     return isEqual(was, is) ? [] : [{ field, before: was, after: is }];
   });
@@ -50,7 +52,7 @@ const actionFields = (action: Action): Fields =>
   new Map<string, unknown>([
     ["name", spokenName(fullName(action))],
     ["type", action.type],
-    ["robot", action.actor],
+    ["actor", action.actor],
     ["description", action.description],
     ...action.inputs.map(({ path, text }) => [`in/${path}`, text] as const),
     ...action.outputs.map(({ path, text }) => [`out/${path}`, text] as const),
@@ -59,8 +61,8 @@ const actionFields = (action: Action): Fields =>
 
 const relationFields = (relation: Relation): Fields =>
   new Map<string, unknown>([
-    ...PRECONDITIONS.map((on) => [`when ${on.slice(3)}`, relation.conditions[on]] as const),
-    ["waits for it", relation.required],
+    ...PRECONDITIONS.map((on) => [on, relation.conditions[on]] as const),
+    ["required", relation.required],
     ...relation.remap.map(({ source, target }) => [`remap/${source}`, target] as const),
   ]);
 
@@ -167,13 +169,10 @@ export function changedRelation(before: Relation, after: Relation): FieldChange[
 }
 
 function namesOf(...graphs: readonly Graph[]): (key: Key) => string {
-  const names = new Map<Key, string>([
-    ["entry", "Entry"],
-    ["exit", "Exit"],
-  ]);
+  const names = new Map<Key, string>();
   for (const graph of graphs)
     for (const action of graph.actions) names.set(action.key, spokenName(fullName(action)));
-  return (key) => names.get(key) ?? "an action";
+  return (key) => endLabel(key) ?? names.get(key) ?? "an action";
 }
 
 const isGone = (pair: BeforeAfter<unknown>): boolean => pair.after === undefined;
@@ -238,9 +237,6 @@ export function changesBetween(
 }
 
 const NO_VALUES: ReadonlyMap<string, string> = new Map();
-
-const counted = (count: number, what: string): string =>
-  `${count} ${what}${count === 1 ? "" : "s"}`;
 
 /** `1 card, 2 arrows`: of one kind of change; "" where there is none. */
 export function countWords(things: readonly ChangedThing[], change: ChangeMark["change"]): string {

@@ -13,6 +13,7 @@ import { CHANGE_SIGNS } from "../canvas/marks/change-marks";
 import { type FieldChange, linesOf } from "../differences/difference-words";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { mapsFrom, relationId } from "../graph/document-keys";
+import { shortText } from "../graph/field-words";
 import type { Action, Graph, Relation } from "../graph/model";
 import { readGraph } from "../graph/read";
 import { useRoom } from "../sync/use-room";
@@ -163,19 +164,10 @@ const MOST = 2; // fields that are told
 
 const ADDED: SinceMark = { change: "added", words: "", fields: [] };
 
-/** Names of fields as the history has them. */
-const FIELDS: ReadonlyMap<string, string> = new Map([
-  ["name", ""],
-  ["robot", "actor"],
-  ["waits for it", "required"],
-]);
-const fieldOf = ({ field }: FieldChange): string =>
-  FIELDS.get(field) ?? field.replace(/^when (true|false|error|stopped)$/, "on_$1");
+/** Return the key of a field as the history has it: there the name of an action has none. */
+const fieldOf = ({ field }: FieldChange): string => (field === "name" ? "" : field);
 
-const short = (text: string | null): string => {
-  if (text === null || text === "") return "nothing";
-  return text.length > 40 ? `${text.slice(0, 40)}…` : text;
-};
+const short = (text: string | null): string => (text ? shortText(text, 40) : "nothing");
 
 function markOf(fields: readonly FieldChange[] | null): SinceMark | null {
   if (fields === null) return null;

@@ -9,6 +9,7 @@ import { type FieldValue, useFieldValues } from "../api/history";
 import { errorText } from "../api/http";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { addParameter, setField, setParameter, setRequired, setResponse } from "../graph/edit";
+import { plainFieldWords } from "../graph/field-words";
 import { memberText } from "../graph/json-members";
 import { PRECONDITIONS, RESPONSES } from "../graph/model";
 import { withValue } from "../graph/parameters/values";
@@ -18,7 +19,6 @@ import { isolated } from "../words/isolated";
 import { useTimeline } from "./timeline";
 import style from "./value-history.module.css";
 import {
-  blamedName,
   factsOf,
   type OverwrittenValue,
   overwrittenOf,
@@ -83,7 +83,7 @@ function ValueTable({ field, spans, overwritten, colorOf, at }: TableProps) {
   const rows = [...spans, ...overwritten].sort((a, b) => b.value.seq - a.value.seq);
   return (
     <table className={style.table}>
-      <caption className="visually-hidden">Values of {isolated(blamedName(field))}</caption>
+      <caption className="visually-hidden">Values of {isolated(plainFieldWords(field))}</caption>
       <thead className="visually-hidden">
         <tr>
           <th scope="col">Value</th>
@@ -144,7 +144,7 @@ interface Props {
 
 function SetBack({ of, field, span }: Props & { span: ValueSpan }) {
   const { doc, lookAt } = useEditorContext();
-  const name = blamedName(field);
+  const name = plainFieldWords(field);
   const set = () => {
     const done = setBack(doc, of, field, span.value.value);
     lookAt(null);
@@ -198,7 +198,7 @@ export function ValueHistory({ of, field }: Props) {
       />
       <ul
         className={style.facts}
-        aria-label={`Runs with each value of ${isolated(blamedName(field))}`}
+        aria-label={`Runs with each value of ${isolated(plainFieldWords(field))}`}
       >
         {factsOf(spans).map(({ text, words }) => (
           <li key={text}>

@@ -3,8 +3,10 @@
 import type { Version } from "../api/graphs";
 import type { FieldBlame, FieldValue } from "../api/history";
 import type { ListedRun } from "../api/review";
-import { fieldWords, plainValue } from "../differences/difference-words";
+import { plainValue } from "../differences/difference-words";
+import { SILENT_FIELDS, shortText } from "../graph/field-words";
 import { runLabel } from "../status/progress";
+import { counted } from "../words/counted";
 
 export interface ValueSpan {
   readonly value: FieldValue;
@@ -116,45 +118,14 @@ export function factsOf(spans: readonly ValueSpan[]): ValueFact[] {
     const told = [...ends]
       .sort(([a], [b]) => rank(a) - rank(b))
       .map(([word, n]) => (runs.length === 1 ? word : `${n} ${word}`));
-    const count = runs.length === 1 ? "1 run" : `${runs.length} runs`;
+    const count = counted(runs.length, "run");
     const took = tookWords(runs);
     const proves = runs.length === 1 ? ". One run proves little." : ".";
     return [{ text, words: `${[count, ...told].join(", ")}${took && `; ${took}`}${proves}` }];
   });
 }
 
-/** Order of things and how a file listed them: changed along with what people change. */
-const SILENT = new Set([
-  "order",
-  "po",
-  "co",
-  "only",
-  "in",
-  "out",
-  "missing",
-  "twin",
-  "schema",
-  "x",
-]);
 const LOOKS = /^(position|waypoints\/.*|direction)$/;
-
-const NAMES: ReadonlyMap<string, string> = new Map([
-  ["", "name"],
-  ["actor", "robot"],
-  ["instance_id", "number"],
-  ["position", "place"],
-  ["required", "waits for it"],
-  ["on_true", "when true"],
-  ["on_false", "when false"],
-  ["on_error", "when error"],
-  ["on_stopped", "when stopped"],
-]);
-
-export function blamedName(field: string): string {
-  if (field.startsWith("in/")) return fieldWords(field).replace(/^input /, "");
-  if (field.startsWith("waypoints/")) return "bends";
-  return NAMES.get(field) ?? fieldWords(field);
-}
 
 export function blamedValue(field: string, value: unknown): string {
   if (value === null || value === undefined) return "nothing";
@@ -162,13 +133,13 @@ export function blamedValue(field: string, value: unknown): string {
   if (typeof value === "boolean") return value ? "yes" : "no";
   const text = plainValue(value);
   if (text === "") return "nothing";
-  return text.length > 80 ? `${text.slice(0, 80)}…` : text;
+  return shortText(text, 80);
 }
 
 /** Return the fields to show: names and values first, those of looks only last. */
 export function toldFields(fields: readonly FieldBlame[]): FieldBlame[] {
   const rank = ({ field }: FieldBlame) => (field === "" ? 0 : LOOKS.test(field) ? 2 : 1);
   return fields
-    .filter(({ field }) => !SILENT.has(field))
+    .filter(({ field }) => !SILENT_FIELDS.has(field) && field !== "x")
     .sort((a, b) => rank(a) - rank(b) || a.field.localeCompare(b.field));
 }

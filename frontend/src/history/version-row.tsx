@@ -11,6 +11,7 @@ import { type Heard, runStatus, useRunStatus } from "../status/run-status";
 import { StateLabel } from "../status/state-label";
 import { day, hourMinute, instant } from "../ui/times";
 import { Tooltip } from "../ui/tooltip";
+import { counted } from "../words/counted";
 import { copied } from "./restoring";
 import style from "./versions.module.css";
 
@@ -181,7 +182,7 @@ function InsideVersion({ version }: { version: Version }) {
   return (
     <>
       <p className={style.quiet}>
-        {graphs.length === 1 ? "1 graph" : `${graphs.length} graphs`} inside
+        {counted(graphs.length, "graph")} inside
         {changed > 0 && `, ${changed} changed since: a new version takes them as they are now`}
       </p>
       <ul className={style.inside} aria-label="Graphs inside of it">

@@ -4,11 +4,12 @@ import { IconRestore } from "@tabler/icons-react";
 import { useState } from "react";
 import { type FieldBlame, useBlame } from "../api/history";
 import { useEditorContext } from "../edit-actions/editor-context";
+import { plainFieldWords } from "../graph/field-words";
 import { usePersonColors, useThrottledLink } from "../sync/use-room";
 import style from "./past-details.module.css";
 import { useGoingBack } from "./restoring";
 import { By, ValueHistory } from "./value-history";
-import { blamedName, blamedValue, toldFields } from "./value-spans";
+import { blamedValue, toldFields } from "./value-spans";
 
 interface BlameRowProps {
   of: string;
@@ -27,7 +28,7 @@ function BlameRow({ of, blame, color }: BlameRowProps) {
         aria-expanded={open}
         onClick={() => setOpen(!open)}
       >
-        <span className={style.name}>{blamedName(field)}</span>
+        <span className={style.name}>{plainFieldWords(field)}</span>
         <code>
           {before !== null && <del>{blamedValue(field, before)}</del>} {blamedValue(field, value)}
         </code>

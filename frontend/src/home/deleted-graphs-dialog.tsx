@@ -15,6 +15,7 @@ import { errorText } from "../api/http";
 import { useDeletedActions } from "../api/library";
 import { useMay } from "../api/people";
 import { ago, instant, useNow } from "../ui/times";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./deleted-graphs-dialog.module.css";
 
@@ -24,8 +25,7 @@ function byDeletion(graphs: readonly GraphSummary[]): GraphSummary[] {
   return [...graphs].sort((a, b) => at(b) - at(a));
 }
 
-const actionsOf = ({ actions = 0 }: GraphSummary) =>
-  actions === 1 ? "1 action" : `${actions} actions`;
+const actionsOf = ({ actions = 0 }: GraphSummary) => counted(actions, "action");
 
 type Kind = "graph" | "action";
 

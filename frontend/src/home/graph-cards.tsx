@@ -15,6 +15,7 @@ import { Empty } from "../ui/empty";
 import { lazyPart, PartBoundary } from "../ui/lazy-part";
 import { colorOfName, initials } from "../ui/name-colors";
 import { ago, instant, useNow } from "../ui/times";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./graph-cards.module.css";
 import { GraphCounts } from "./graph-counts";
@@ -97,8 +98,8 @@ function GraphCard({ graph, names, last }: GraphCardProps) {
             {last && <LastRun run={last} now={now} />}
             <GraphCounts graph={graph} />
             <span>
-              {graph.actions === 1 ? "1 action" : `${graph.actions ?? 0} actions`}
-              {graph.drafts && ` · ${graph.drafts === 1 ? "1 draft" : `${graph.drafts} drafts`}`}
+              {counted(graph.actions ?? 0, "action")}
+              {graph.drafts && ` · ${counted(graph.drafts, "draft")}`}
               {at !== null && ` · changed ${ago(at, now)}`}
             </span>
           </div>

@@ -9,6 +9,7 @@ import { runEndText, type Tone } from "../status/progress";
 import { runStatus } from "../status/run-status";
 import { toneColor } from "../status/state-label";
 import { ago, instant, stopwatch, useNow } from "../ui/times";
+import { counted } from "../words/counted";
 import { GraphCounts } from "./graph-counts";
 import style from "./sidebar.module.css";
 
@@ -16,9 +17,9 @@ function subtitle(graph: GraphSummary, words: string | null, now: number): strin
   if (words !== null) return words;
   const parts: string[] = [];
   if (graph.actions !== undefined) {
-    parts.push(graph.actions === 1 ? "1 action" : `${graph.actions} actions`);
+    parts.push(counted(graph.actions, "action"));
   }
-  if (graph.drafts) parts.push(graph.drafts === 1 ? "1 draft" : `${graph.drafts} drafts`);
+  if (graph.drafts) parts.push(counted(graph.drafts, "draft"));
   const at = instant(graph.updated_at);
   if (at !== null) parts.push(ago(at, now));
   return parts.join(" · ");

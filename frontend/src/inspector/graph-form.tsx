@@ -6,6 +6,7 @@ import { useRenameGraph } from "../edit-actions/rename-graph";
 import { setGraphDescription } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";
 import { useHasFingersOnly } from "../ui/hooks";
+import { counted } from "../words/counted";
 import { SharedField } from "./fields/shared-field";
 import { GraphInterface } from "./graph-interface";
 import style from "./inspector.module.css";
@@ -38,8 +39,7 @@ export function GraphForm() {
       </SharedField>
       <LabelsField />
       <p className={style.hint}>
-        {graph.actions.length === 1 ? "1 action" : `${graph.actions.length} actions`},{" "}
-        {arrows === 1 ? "1 arrow" : `${arrows} arrows`}
+        {counted(graph.actions.length, "action")}, {counted(arrows, "arrow")}
       </p>
       <GraphInterface />
       <section className={style.section}>

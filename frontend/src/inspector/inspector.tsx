@@ -16,6 +16,7 @@ import { EXIT } from "../graph/model";
 import { countsOf } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
 import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { counted } from "../words/counted";
 import { type CheckedGroup, ProblemsContext } from "./fields/field-problems";
 import { SharedField } from "./fields/shared-field";
 import { ViewOnly } from "./fields/view-only";
@@ -45,9 +46,6 @@ interface Props {
   threads: readonly Thread[];
 }
 
-const counted = (count: number, what: string): string | null =>
-  count === 0 ? null : `${count} ${what}${count === 1 ? "" : "s"}`;
-
 const chosenNotes = ({ graph, selection }: EditorContext) =>
   notesOf(graph).filter(({ key }) => selection.has(key));
 
@@ -74,11 +72,12 @@ function Properties() {
   const [relation] = relations;
   const [note] = notes;
   if (actions.length + relations.length + notes.length > 1) {
-    const parts = [
-      counted(actions.length, "action"),
-      counted(relations.length, "arrow"),
-      counted(notes.length, "note"),
-    ].flatMap((part) => part ?? []);
+    const counts: [number, string][] = [
+      [actions.length, "action"],
+      [relations.length, "arrow"],
+      [notes.length, "note"],
+    ];
+    const parts = counts.flatMap(([count, noun]) => (count === 0 ? [] : counted(count, noun)));
     return (
       <p className={style.hint}>
         Selected: {parts.join(", ")}. Drag moves them together, <b>Del</b> deletes them,{" "}

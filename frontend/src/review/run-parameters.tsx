@@ -1,6 +1,7 @@
 /** Values as they were sent beside those that the engine reported, visit by visit. */
 import type { ActionRun, Run } from "../api/runs";
 import { placesOf, wayWords } from "../status/level-places";
+import { counted } from "../words/counted";
 import style from "./run-parameters.module.css";
 
 interface Props {
@@ -67,9 +68,7 @@ function Action(props: { name: string; action: ActionRun; run: Run; onPick: () =
         </div>
       )}
       {found.unseen > 0 && (
-        <p className={style.none}>
-          Of {found.unseen === 1 ? "1 visit" : `${found.unseen} visits`} nobody saw the values.
-        </p>
+        <p className={style.none}>Of {counted(found.unseen, "visit")} nobody saw the values.</p>
       )}
     </section>
   );

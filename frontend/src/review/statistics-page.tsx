@@ -12,6 +12,7 @@ import { INTO } from "../status/level-places";
 import { runLabel } from "../status/progress";
 import { toneColor } from "../status/state-label";
 import { Empty } from "../ui/empty";
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import type { RunBarParts } from "./run-page";
 import style from "./statistics-page.module.css";
@@ -211,8 +212,8 @@ function Found({ found }: { found: Statistics }) {
           )}
           {found.untold > 0 && (
             <p className={style.quiet}>
-              Of {found.untold === 1 ? "1 arrow" : `${found.untold} arrows`} it is not known whether
-              it was ever taken: robots do not report results.
+              Of {counted(found.untold, "arrow")} it is not known whether it was ever taken: robots
+              do not report results.
             </p>
           )}
         </section>

@@ -1,5 +1,6 @@
 /** Says why edits are not saved, in sentences for people. */
 
+import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import type { OtherPerson } from "./indexed-db";
 import type { RefusalReason, RoomLink } from "./room-connection";
@@ -59,5 +60,5 @@ function where(link: RoomLink): string {
 }
 
 function changes(n: number): string {
-  return n === 1 ? "1 change" : `${n} changes`;
+  return counted(n, "change");
 }

@@ -4,6 +4,7 @@ import type { ProblemPlace } from "../../api/graphs";
 import { problemGroups } from "../../graph/problems/problem-groups";
 import { countsOf, countWords } from "../../graph/problems/problem-kinds";
 import { useWatched } from "../../ui/watched";
+import { counted } from "../../words/counted";
 import { type ImportUnderReview, importReviews } from "./import-review";
 import style from "./import-review-dialog.module.css";
 import { dialectWords } from "./take-files";
@@ -40,7 +41,7 @@ function Problems({ waiting }: { waiting: ImportUnderReview }) {
 
 function Body({ waiting }: { waiting: ImportUnderReview }) {
   const { preview, file } = waiting;
-  const count = preview.actions === 1 ? "1 action" : `${preview.actions} actions`;
+  const count = counted(preview.actions, "action");
   return (
     <>
       <Text>

@@ -10,7 +10,8 @@ import {
   rootOf,
   splitKey,
 } from "../document-keys";
-import { ENTRY, EXIT, type Graph, type Key } from "../model";
+import { endLabel } from "../field-words";
+import type { Graph, Key } from "../model";
 import { isEqual } from "../values";
 import { asOneEdit, graphNow } from "./document-writes";
 
@@ -113,8 +114,8 @@ function placeOf(graph: Graph, { root, key, before, after }: DocumentChange): st
   if (root === "meta") return "the graph";
   const ends = endsOf(bundleOfKey(head) ?? head);
   const name = (end: Key) => {
-    if (end === ENTRY) return "Entry";
-    if (end === EXIT) return "Exit";
+    const label = endLabel(end);
+    if (label !== null) return label;
     const action = graph.actions.find((candidate) => candidate.key === end);
     return action ? `${action.name} ${action.instanceId}` : "a new action";
   };

@@ -1,3 +1,5 @@
+import { counted } from "../../words/counted";
+
 /**
  * Sorts problems into what is wrong, what is only not written yet, and what may go wrong: the twin of
  * `umrf/problem_kinds.py`, which counts them for lists of graphs. Pure.
@@ -97,6 +99,6 @@ export function countWords({ wrong, fillIn, warnings }: ProblemCounts): string[]
   return [
     ...(wrong > 0 ? [`${wrong} wrong`] : []),
     ...(fillIn > 0 ? [`${fillIn} to fill in`] : []),
-    ...(warnings > 0 ? [warnings === 1 ? "1 warning" : `${warnings} warnings`] : []),
+    ...(warnings > 0 ? [counted(warnings, "warning")] : []),
   ];
 }

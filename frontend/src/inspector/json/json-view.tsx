@@ -13,6 +13,7 @@ import {
 import { applyChanges, collisions, places } from "../../graph/edit/key-changes";
 import { lazyPart, PartBoundary } from "../../ui/lazy-part";
 import { Tooltip } from "../../ui/tooltip";
+import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
 import type { JsonError } from "./json-editor";
 import { actionAt, rangeOf, rangeOfArrow } from "./json-positions";
@@ -27,8 +28,6 @@ const NO_FAULTS: readonly JsonError[] = [];
 function faultsOf(verdict: Verdict): readonly JsonError[] {
   return verdict.kind === "wrong" ? [verdict.fault] : NO_FAULTS;
 }
-
-const counted = (n: number, word: string) => (n === 1 ? `1 ${word}` : `${n} ${word}s`);
 
 function VerdictWords({ verdict, onShow }: { verdict: Verdict; onShow: readonly string[] }) {
   switch (verdict.kind) {

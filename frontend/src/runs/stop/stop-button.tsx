@@ -5,6 +5,7 @@ import { foreignGraphs, openRuns, unheardRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import type { Run } from "../../api/runs";
 import { useWatched } from "../../ui/watched";
+import { counted } from "../../words/counted";
 import { isolated } from "../../words/isolated";
 import style from "./stop-button.module.css";
 import { drawnStop, graphOnScreen } from "./stop-surroundings";
@@ -14,7 +15,7 @@ export function stopButtonText(link: LiveLink, count: number, unknown = 0): stri
   if (link === "down") return "state unknown";
   if (link === "connecting") return "asking …";
   if (count === 0) return unknown === 0 ? "nothing runs" : `${unknown} unknown`;
-  return count === 1 ? "1 run" : `${count} runs`;
+  return counted(count, "run");
 }
 
 /**

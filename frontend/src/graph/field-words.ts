@@ -1,0 +1,52 @@
+/** Words that people read for the fields of a graph, an action and an arrow. One table for the whole page. Pure. */
+import type { Key } from "./model";
+import { pathWords } from "./value-text";
+
+/** Words by the key of a field in the document; a key that stands for itself is not listed. */
+const WORDS: Readonly<Record<string, string>> = {
+  "": "name",
+  actor: "robot",
+  instance_id: "number",
+  position: "place",
+  required: "waits for it",
+  on_true: "when true",
+  on_false: "when false",
+  on_error: "when error",
+  on_stopped: "when stopped",
+};
+
+/** Fields for the order of things and for how a file listed them: they change along with what people change. */
+export const SILENT_FIELDS: ReadonlySet<string> = new Set([
+  ...["order", "po", "co", "only", "in", "out", "missing", "twin", "schema"],
+]);
+
+/** Return a field as people read it, such as `input pose.x` for `in/pose/x` and `when true` for `on_true`. */
+export function fieldWords(field: string): string {
+  if (field.startsWith("in/")) return `input ${pathWords(field.slice(3))}`;
+  if (field.startsWith("out/")) return `output ${pathWords(field.slice(4))}`;
+  if (field.startsWith("remap/")) return `remap of ${field.slice(6)}`;
+  if (field.startsWith("waypoints/")) return "bends";
+  return WORDS[field] ?? field.replace(/^x\//, "").replaceAll("_", " ");
+}
+
+/** Return a field without the word "input", where it is plain: values that people set are those of inputs. */
+export const plainFieldWords = (field: string): string => fieldWords(field).replace(/^input /, "");
+
+/** Return the full name of an action, such as `Drive_0`, as people say it: with its number if that is not 0. */
+export function spokenName(fullName: string): string {
+  const end = endLabel(fullName);
+  if (end !== null) return end;
+  const [, own, number] = /^(.*)_(\d+)$/s.exec(fullName) ?? [];
+  if (own === undefined) return fullName || "an action";
+  return number === "0" ? own || "an action" : `${own} ${number}`;
+}
+
+/** Return the name of the entry or the exit; null for an action. */
+export function endLabel(key: Key): "Entry" | "Exit" | null {
+  return key === "entry" ? "Entry" : key === "exit" ? "Exit" : null;
+}
+
+/** Return a value as text of at most `longest` characters, with a sign if it was longer. */
+export function shortText(text: string, longest: number): string {
+  return text.length > longest ? `${text.slice(0, longest)}…` : text;
+}
