@@ -94,7 +94,7 @@ def actions(draw: st.DrawFn, key: Key, name: str, instance_id: int) -> Action:
     )
 
 
-#: By response, mostly places, sometimes what some other program wrote there.
+#: Waypoints by response: mostly positions, sometimes the text of another program.
 waypoints = st.dictionaries(
     st.sampled_from(RESPONSES),
     st.sampled_from(["[[12,-40]]", "[[0,0],[36,120]]", "[]", '{"x":1}', "7"]),

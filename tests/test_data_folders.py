@@ -14,7 +14,7 @@ from support.product import TOKEN, Product, running
 from support.used_server import Guest, answers, differences
 
 FOLDERS = sorted(path for path in (Path(__file__).parent / "data" / "folders").glob("2*"))
-#: What is told in other words since: Stop by a person or a program comes first (decision 22).
+#: Answers with other words since: Stop by a person or a program comes first (decision 22).
 REWORDED = {
     "Go had not reported its end when root pressed Stop.": "root sent Stop from a program while Go ran (0.0 s)."
 }

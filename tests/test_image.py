@@ -18,7 +18,7 @@ COMPOSE: dict[str, Any] = yaml.safe_load(TEXT)
 SERVICES: dict[str, dict[str, Any]] = COMPOSE["services"]
 OURS = ("editor", "runner", "simulator", "robot")
 EXAMPLE = (ROOT / ".env.example").read_text()
-#: What a container decides itself: where its data are, and which Python it has.
+#: Settings that a container decides itself: the place of its data, and its Python.
 INSIDE = {"ACTION_ASSISTANT_DATA", "ACTION_ASSISTANT_RUNNER_PYTHON", "ACTION_ASSISTANT_URL"}
 
 

@@ -243,7 +243,7 @@ def test_stop_is_taken_while_a_socket_is_flooded(runner: RunnerProcess, first: i
                 raw.shutdown(socket.SHUT_RDWR)
             pusher.join()
             raw.close()
-    # What the kernel keeps, and what was dealt with before ten Stops.
+    # The bytes that the kernel keeps, and those handled before ten Stops.
     assert taken < 20_000_000
 
 

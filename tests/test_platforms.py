@@ -22,7 +22,7 @@ from support.product import Product, free_ports, running
 
 PACKAGE = Path(__file__).parents[1] / "server" / "action_assistant"
 EXAMPLES = sorted((PACKAGE / "examples").glob("*.json"))
-#: Of the standard library, on POSIX alone.
+#: Modules of the standard library that exist on POSIX alone.
 POSIX = {*elsewhere.LACKS["win32"]["modules"]} - {"posix", "uvloop"}
 
 

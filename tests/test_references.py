@@ -15,7 +15,7 @@ _SKIPPED: Final = frozenset(
     {"node_modules", "dist", "__pycache__", "test-results", "playwright-report"}
 )
 _READ: Final = frozenset({".md", ".py", ".ts", ".tsx", ".toml", ".css"})
-#: Where a path that is written without the folders above it may begin.
+#: Folders in which a path may begin that is written without them.
 _BASES: Final = ("", "server/action_assistant", "frontend/src")
 
 _PATH: Final = re.compile(r"`([\w.-]+(?:/[\w.@-]+)+\.(?:py|tsx?|md|toml|conf|sh|css|service))`")

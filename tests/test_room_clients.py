@@ -20,7 +20,7 @@ from action_assistant.umrf.model import Graph
 from support.page import Page, graph_of, open_page
 from support.product import TOKEN, Product, running
 
-#: How long the idle test is quiet. The issue of silent sockets shows after 30 s.
+#: Seconds for which the idle test is quiet. The fault of silent sockets shows after 30 s.
 IDLE_SECONDS = float(os.environ.get("TEST_IDLE_SECONDS", "2"))
 
 T = TypeVar("T")

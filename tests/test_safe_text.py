@@ -63,7 +63,8 @@ def test_no_name_turns_the_sentence_around_it(graph: str, robot: str) -> None:
     assert shown.endswith(": 2 of 3 are (a) there.")
     assert " waits for " in _ISOLATED.sub("", shown)
     assert sentence(shown) == shown
-    # Nothing is lost: beside isolates, which may be there already, the letters are those as JSON writes them.
+    # No letter is lost: beside isolates, which may be there already, the letters are those as JSON
+    # writes them.
     escaped = re.sub("[\u202a-\u202e\u2066-\u2069]", lambda it: f"\\u{ord(it[0]):04x}", said)
     isolates = re.compile(r"[\u2068\u2069]|\\u206[89]")
     assert isolates.sub("", shown) == isolates.sub("", escaped)

@@ -42,7 +42,7 @@ FIRST: Final = Path(__file__).parent / "data" / "folders" / "first"
 #: The first version that ran.
 COMMIT: Final = "4e338f0e"
 LOG: Final = frozenset({"event", "head"})
-#: Of tests that look at the files alone.
+#: Revisions for tests that look at the files alone.
 OLD = "editor_0001", "runner_0001"
 
 
@@ -84,7 +84,7 @@ def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
     )
 
 
-#: With the first and the last two of each in CI.
+#: The first and the last two revisions of each journal run in CI, the others only in long tests.
 EACH = [
     pytest.param(place, each, marks=() if each in {all_of[0], *all_of[-2:]} else pytest.mark.long)
     for place, all_of in (

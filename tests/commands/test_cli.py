@@ -10,7 +10,7 @@ import pytest
 
 from action_assistant.cli import COMMANDS, main, parser
 
-#: What no command on files needs, and takes long to import.
+#: Modules that no command on files needs, and that take long to import.
 SLOW: Final = frozenset(
     {
         "alembic",

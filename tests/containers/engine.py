@@ -13,9 +13,9 @@ ROOT: Final = Path(__file__).parents[2]
 FOLDER: Final = Path(
     os.environ.get("CONTAINERS_FOLDER", "/var/tmp/action-assistant-containers")
 ).resolve()
-#: Where podman-compose of PyPI is.
+#: The folder of podman-compose from PyPI.
 BIN: Final = ROOT / "build" / "containers" / "bin"
-#: What runs without systemd and with the first control groups as well as elsewhere.
+#: A configuration that also runs without systemd and with the first control groups.
 _CONFIGURATION: Final = """
 [engine]
 runtime = "runc"

@@ -32,7 +32,7 @@ STANDS_IN: Final = {
 VERSION: Final = str(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"])
 EDITOR: Final = f"temoto-action-assistant/editor:{VERSION}"
 RUNNER: Final = f"temoto-action-assistant/runner:{VERSION}"
-#: From which the images are said to be.
+#: The commit from which the images say that they are built.
 COMMIT: Final = run("git", "rev-parse", "HEAD").stdout.strip()
 _CERTIFICATES: Final = Path("/etc/ssl/certs/ca-certificates.crt")
 _FOLDER_IN: Final = re.compile(r"(?:file://)?(/[^\s'\"]+)")

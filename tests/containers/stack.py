@@ -18,7 +18,7 @@ from containers.engine import FOLDER, ROOT, environment, inspect, podman, run
 
 PROJECT: Final = "temoto-action-assistant"
 PROFILES: Final = ("simulator", "robot", "proxy", "backups")
-#: Whose `ipc: host` podman-compose does not read, so that it is said to podman.
+#: Services whose `ipc: host` podman-compose does not read, so it is passed to podman.
 _WITH_ROBOTS: Final = frozenset({"runner", "robot"})
 _WITHOUT_HEALTH_CHECK: Final = frozenset({"robot", "proxy", "backups"})
 _PATIENCE_S: Final = 120.0

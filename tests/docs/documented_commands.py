@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 ROOT: Final = Path(__file__).parents[2]
-#: In the order in which they are tried: a backup is put back last.
+#: The documents, in the order in which they are tried: a backup is restored last.
 DOCUMENTS: Final = (*sorted((ROOT / "docs").glob("*.md")), ROOT / "README.md")
 PROGRAM: Final = "action-assistant"
-#: What begins a line that is a command.
+#: Programs that begin a line with a command.
 PROGRAMS: Final = frozenset(
     f"{PROGRAM} make git source export ros2 docker cp curl pip pipx uv uvx systemctl sudo apt apt-get cd "
     "podman psql rm promtool brew python3 rosdep colcon journalctl install pg_basebackup".split()
@@ -96,7 +96,7 @@ def _lines(text: str) -> Iterator[tuple[int, str]]:
                 pending = pending[:-1]
                 continue
             line, pending = re.sub(r"^\$ ", "", pending), ""
-            # Of a session, what is no command is what one printed.
+            # In a session, a line that is no command is output.
             if line and not line.startswith("#") and (language != "console" or _is_command(line)):
                 yield at, line
 

@@ -4,7 +4,7 @@ import json
 from pathlib import Path
 from typing import Any, Final
 
-#: Of the actions that stand in documents.
+#: An action that documents use.
 _GRIPPER: Final[dict[str, Any]] = {
     "name": "OpenGripper",
     "type": "sync",

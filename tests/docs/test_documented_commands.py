@@ -59,13 +59,13 @@ LISTED: Final = {
     "action-assistant simulate-robot": "needs rclpy: tests/ros and the browser start it",
     ".venv-ros/bin/action-assistant simulate-robot": "needs rclpy: tests/ros and the browser start it",
 }
-#: What goes on until somebody ends it, and what it says when it goes.
+#: Commands that go on until they are interrupted, and their first output.
 LASTING: Final = {
     "serve": "ready",
     "sync": "is the file of",
     "watch": "",
 }
-#: What needs the data to itself, as documents say; the server is ended for it.
+#: Commands that need the data to themselves, as documents say; the server is ended for them.
 ALONE: Final = frozenset({"verify", "restore", "rebuild", "migrate"})
 #: Exit codes other than 0 that a command may have here, since the answer is no.
 MAY_SAY_NO: Final = ("diff", "doctor", "check")

@@ -27,7 +27,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import SqliteSession
 from action_assistant.web.auth.keys import Person
 
-#: Where a process can die, as an edit passes through.
+#: Points at which a process can die while an edit passes through.
 POINTS: Final = (
     "before the edit is applied",
     "before the append",
@@ -151,8 +151,9 @@ async def _speak(pipe: Pipe, member: Member, trap: Trap) -> None:
 
 
 def main(folder: Path) -> None:
-    # From the second commit on, and as often as there are any. They are Final to all but this process,
-    # which is to die in commits on the loop as often as in those of the thread.
+    # Commits count as quick from the second one on, whatever their share of the time. The values
+    # are Final to all but this process, which is to die in commits on the loop as often as in those
+    # of the thread.
     commit_metrics._KNOWN, commit_metrics._SHARE = 1, float("inf")  # type: ignore[misc]
     for line, at_once in zip(sys.stdin, itertools.cycle((False, True)), strict=False):
         stream, count, point = line.rstrip("\n").split(" ", 2)

@@ -40,7 +40,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
 
 SMALL: Final = 20  # actions
 LARGE: Final = 240
-#: What may differ by chance: a task that happens to run meanwhile, another turn of a loop.
+#: A difference by chance: a task that happens to run meanwhile, another turn of a loop.
 SLACK: Final = 1_000
 #: Files of the event loop itself: how often it turns grows with the time that workers take.
 TURNS: Final = re.compile(r"[/\\](asyncio|anyio|sniffio|selectors\.py)\b")
@@ -135,7 +135,7 @@ async def lifespan(app: Any) -> AsyncIterator[None]:
 async def served(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Served]:
     """An editor that counts, with real workers and a real database."""
     monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", TOKEN)
-    # Nothing happens by itself, or what is counted would grow with the time that workers take.
+    # No periodic work runs, or the counts would grow with the time that workers take.
     monkeypatch.setattr(change_index, "_PERIOD", 3600.0)
     monkeypatch.setattr(monitoring, "_TICK_S", 3600.0)
     monkeypatch.setattr(open_rooms, "_SILENCE", 3600.0)
@@ -227,8 +227,8 @@ def values_in(pickled: bytes) -> int:
         sys.setprofile(counting)
 
 
-#: What each operation that takes a graph is asked, by its id. `{g}`: the graph, `{d}`: a draft of it, `{v}`: a version,
-#: `{a}`: the key of one action. None: what is not asked here, and why.
+#: The request of each operation that takes a graph, by its id. `{g}`: the graph, `{d}`: a draft of
+#: it, `{v}`: a version, `{a}`: the key of one action. None: not asked here, and why.
 ASKED: Final[dict[str, tuple[str, str, Any] | None]] = {
     "getGraph": ("GET", "/api/graphs/{g}", None),
     "describeGraph": ("PATCH", "/api/graphs/{g}", {"description": "new"}),
@@ -371,7 +371,7 @@ def is_free(small: Work, large: Work) -> bool:
     )
 
 
-#: Where the file of a graph is sent to.
+#: Routes that take the file of a graph.
 BROUGHT: Final = ("/api/graphs", "/api/graphs?preview=true", "/api/pieces")
 
 

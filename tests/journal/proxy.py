@@ -5,7 +5,7 @@ import contextlib
 from collections.abc import AsyncIterator, Callable
 from typing import Final, Literal, TypeAlias
 
-#: What to do with bytes that a client sends: pass them on; drop them and cut; pass them on and cut
+#: The treatment of bytes that a client sends: pass them on; drop them and cut; pass them on and cut
 #: before any answer; pass them on and fall silent, as a network does that loses everything.
 Verdict: TypeAlias = Literal["pass", "cut before", "cut after", "silence"]
 Judge: TypeAlias = Callable[[bytes], Verdict]

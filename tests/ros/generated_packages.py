@@ -50,7 +50,7 @@ def _choices() -> dict[str, Any]:
 
 
 _POINT: Final = {axis: leaf("number") for axis in "xyz"}
-#: What generators got wrong, what C++ or the engine have for themselves, and what is plain.
+#: Actions that generators got wrong, names that C++ or the engine reserve, and plain actions.
 DESCRIPTIONS: Final[tuple[dict[str, Any], ...]] = (
     {"name": "OpenGripper", "description": "Opens the gripper."},
     {"name": "MoveTCP", "input_parameters": {"tcp": {"position": _POINT, "speed": leaf("number")}}},
@@ -193,7 +193,7 @@ class Workspace:
         assert done.returncode == 0, f"{' '.join(command)}\n{done.stdout}\n{done.stderr}"
 
 
-#: What a developer's own code needs to tell what it does: a line in the file that the engine is given.
+#: Code by which a developer's action reports: a line in the file that the engine is given.
 _NOTE: Final = """#include <cstdlib>
 #include <fstream>
 

@@ -39,7 +39,7 @@ GIVEN = {
     "grid": {"pvf_type": "nav_msgs::msg::OccupancyGrid"},
     "deep": {"deeper": {"number": {"pvf_type": "number"}}},
 }
-#: What a developer writes into `onRun` to give those values, and to tell of them.
+#: Code in a developer's `onRun` that gives those values, and reports them.
 GIVE = r"""
     params_out.string = "é \"quoted\" \\";
     params_out.strings = {"", "two words"};
@@ -126,7 +126,7 @@ NOT_ALLOWED = graph_of(
         "output_parameters": {"answer": {"pvf_type": "string", "pvf_allowed_values": ["yes"]}},
     },
 )
-#: Both in one package.
+#: A graph with both actions, which are in one package.
 TOGETHER = graph_of("together", {"name": "StirPot"}, {"name": "PourCup"})
 _numbers = count()
 

@@ -28,14 +28,15 @@ OURS = ("sub_seq", "sub_error", "sub_fast", "sub_params", "sub_halt", "sub_stop"
 #: Graphs of the engine's own repository: they stand where its files are.
 ENGINES = ("semantics_test_6", "semantics_test_9")
 _ENGINE = CORPUS / "graphs" / "temoto-framework+temoto_action_engine"
-#: Of each kind one, where there is no time for all: with a flat one, without it, and stopped from outside.
+#: Recordings of each kind, when there is no time for all: with a flat graph, without one, and
+#: stopped from outside.
 QUICKLY = {"sub_error", "sub_stop", "semantics_test_9"}
 #: These go on until somebody stops them: a graph inside that is HALTED tells nobody.
 ENDLESS = {"sub_halt", "sub_stop"}
 #: Seconds of a timer that ends a loop, and of each in the loop. As recorded (3.0 and 0.5) the end of the timer
 #: is also that of the third round; so it is in the middle of what runs, and a robot may be 1.5 s late.
 TIMERS = {"semantics_test_9": (6.5, 2.5)}
-#: Why there is no one graph of these that would do the same.
+#: Reasons why no single graph does the same as these.
 REFUSED = {
     "sub_halt": "It can end HALTED",
     "semantics_test_6": "It can be bypassed with on_false",

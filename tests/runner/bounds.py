@@ -76,7 +76,7 @@ def _stuck() -> Graph:
     return msgspec.structs.replace(line, relations=arrows)
 
 
-#: What a robot has indexed: graphs inside of others.
+#: The inner graphs that a robot has indexed.
 INSIDE = (sequence("Sub", 2), _stuck())
 
 

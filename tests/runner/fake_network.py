@@ -239,7 +239,7 @@ class FakeNetwork:
             self._handles.discard(handle)
             work(*given)
 
-        # As what a thread of ROS hands over: in no task, and in no context of one.
+        # A thread of ROS hands over in no task, and in no context of one.
         handle = asyncio.get_running_loop().call_at(when, done, context=Context())
         self._handles.add(handle)
         return handle

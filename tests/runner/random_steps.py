@@ -35,7 +35,7 @@ SCRIPTS: list[dict[str, Any]] = [
     {"Work_0": [{"after_s": 0.1}], "*": [{"after_s": 20, "pauses": False}]},
 ]
 
-#: What an action may take from its trigger until it runs.
+#: Times that an action may take from its trigger until it runs.
 LOADING_MS = (1.0, 5.0, 60.0, 400.0, 900.0, 1_500.0, 3_000.0, 8_000.0)
 
 Step = tuple[str, Any]

@@ -24,9 +24,9 @@ SCRIPT: dict[str, Any] = {
     "other/Work_0": [{"never": True, "ignores_stop": True}],
     "*": [{"never": True}],
 }
-#: Nothing ever obeys.
+#: A script in which no action obeys.
 STUBBORN: dict[str, Any] = {"*": [{"never": True, "ignores_stop": True}]}
-#: What somebody says who has looked.
+#: The words of a person who has looked.
 LOOKED = RestRequest("I stand beside it; nothing moves.")
 
 

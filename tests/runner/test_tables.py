@@ -52,6 +52,6 @@ async def test_the_row_of_a_run_that_is_over_tells_what_the_run_tells(tmp_path: 
         query = queries.listed(queries.Filter(), 9)
         (row,) = await control.history.rows(query)
     assert told.alarms
-    # How long it took is summed up later, by the review.
+    # The review sums up the duration later.
     assert views.summary_of_row(row) == replace(views.summary(told), took=None)
     await journal.close()

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 _INDEX = "share/ament_index/resource_index"
-#: What other packages on PYTHONPATH do when somebody imports them: what an older version would.
+#: Code of other packages on PYTHONPATH that fails on import, as an older version would.
 _HARM = 'raise ImportError(f"{__name__} of the sourced workspace was imported")\n'
 _HARMFUL = ("litestar", "msgspec", "uvicorn", "httpx", "pytest_of_the_workspace")
 _PLUGIN = "[pytest11]\nworkspace = pytest_of_the_workspace\n"

@@ -22,7 +22,7 @@ from typing import Any
 PACKAGE = "action_assistant"
 #: Modules of ours that say why they cannot be imported here: rclpy is not in this environment.
 OF_ROS = ("runner.emulator.node", "runner.links.ros2")
-#: What each system lacks, of what Linux has.
+#: The modules and functions of Linux that each system lacks.
 LACKS: dict[str, dict[str, tuple[str, ...]]] = {
     "win32": {
         "modules": (

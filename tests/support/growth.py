@@ -5,11 +5,11 @@ import time
 from collections.abc import Callable
 from typing import Final
 
-#: So many times as much takes as many times as long, or the square of it: the middle is a bound that a
-#: machine of changing speed does not reach.
+#: Input that is so many times larger takes as many times longer, or the square of it: the middle is
+#: a bound that a machine of changing speed does not reach.
 _TIMES: Final = 16
 _MOST: Final = 64
-#: It may be slower just while the whole is worked on, but not each time.
+#: The machine may be slower just while the whole is worked on, but not each time.
 _TRIES: Final = 5
 
 

@@ -16,7 +16,7 @@ import psutil
 
 TOKEN = "test-token-" + "0123456789abcdef" * 2
 COMMAND = (sys.executable, "-m", "action_assistant")
-#: As it is installed: what people and services start.
+#: The installed program, as people and services start it.
 PROGRAM = (str(Path(sys.executable).with_name("action-assistant")),)
 
 

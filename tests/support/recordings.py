@@ -23,12 +23,13 @@ from pathlib import Path
 from typing import Any
 
 OWN = Path(__file__).parents[1] / "recordings"
-#: What is larger, or not ours to give away: real files of other projects, and runs of their graphs.
+#: Recordings that are larger, or not ours to publish: real files of other projects, and runs of
+#: their graphs.
 SHARED = Path(os.environ.get("UMRF_SHARED", Path(__file__).parents[3] / "shared"))
 CORPUS = SHARED / "umrf" / "corpus"
 NO_CORPUS = "real files of other repositories are not here (UMRF_SHARED)"
 NAMED = os.environ.get("UMRF_RECORDINGS")
-#: For so many calls an action is told what to do at least; after them, what it did in the last.
+#: The least number of calls for which an action has a behaviour; later calls repeat the last one.
 CALLS = 5
 KINDS: dict[type, Any] = {int: (int, float), float: (int, float), str: str}
 

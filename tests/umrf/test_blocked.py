@@ -18,9 +18,9 @@ from action_assistant.umrf.semantics import GraphStateEvent, HazardEvent, NodeSt
 from support.recordings import CORPUS, NO_CORPUS, engine_runs, lines, runs_of
 
 KNOWN: dict[str, Any] = json.loads((Path(__file__).parent / "blocked.json").read_text())
-#: What is in a recording that did not go well.
+#: Events of a recording that did not go well.
 BAD_ENDS = {"crash", "std::terminate", "timeout", "throw", "final_hang", "final_throw"}
-#: What begins so often in a graph that is FINISHED goes on for ever.
+#: An action that begins so often in a FINISHED graph goes on for ever.
 _LAPS = 100
 
 
@@ -114,7 +114,7 @@ def test_recorded_graphs_that_went_well_are_not_blocked() -> None:
         if not refused_by_parser(read(path.read_bytes())) and went_well(folder, name):
             codes = blocked(path)
             found |= {name: codes} if codes else {}
-    # Those of the engine's own graphs are not everywhere (UMRF_SHARED).
+    # Recordings of the engine's own graphs are not everywhere (UMRF_SHARED).
     known = {name: each["codes"] for name, each in KNOWN["recordings"].items() if name in runs}
     assert found == known
 

@@ -68,7 +68,7 @@ def test_what_was_backed_up_while_running_is_there_again(editor: Editor, tmp_pat
     assert "after" not in names(editor)
     editor.end()
     assert epochs(editor) == ["the first", "a backup was restored"]
-    # What was there before the restore has been kept.
+    # The restore has kept the earlier files.
     (aside,) = editor.data.glob("before-restore-*")
     with closing(sqlite3.connect(aside / "editor.db")) as database:
         kept = {name for (name,) in database.execute("SELECT name FROM graph")}

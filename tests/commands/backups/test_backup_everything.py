@@ -186,7 +186,7 @@ def test_a_database_that_cannot_be_reached_makes_no_backup(
     assert made.returncode == 2
     assert "127.0.0.1" in made.stderr
     assert not (tmp_path / "x.zip").exists()
-    # As an older version left it: that there are graphs is known, but not where.
+    # An older version knew that there are graphs, but not in which database.
     (data / "editor.database").unlink()
     made = command("backup", tmp_path / "x.zip", "--data", data)
     assert made.returncode == 2

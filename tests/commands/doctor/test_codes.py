@@ -6,7 +6,7 @@ from pathlib import Path
 from action_assistant.system.diagnostics import CODES
 
 ROOT = Path(__file__).parents[3]
-#: Where there is no way to plant one for real, and why.
+#: Codes that no test can cause for real, and why.
 UNPLANTED: dict[str, str] = {}
 
 

@@ -53,7 +53,7 @@ def test_a_folder_that_somebody_may_not_enter_is_named_with_its_owner(data: Path
         "[print(each.code, each.message, each.remedy) for each in "
         "folder_is_ours(Installation(data=Path(sys.argv[1])))]"
     )
-    # It has to reach the folder, too.
+    # The other user has to reach the folder, too.
     public = Path(f"/var/tmp/aa-doctor-{os.getpid()}")
     shutil.move(data, public)
     try:

@@ -137,7 +137,7 @@ def test_certificates_that_expired_or_are_for_other_names_are_told_apart(
         assert name in found.message or code == "certificate-expired"
 
 
-#: What is taken out of the documented file, and what is put there.
+#: The text that is removed from the documented file, and the text that replaces it.
 MISTAKES = {
     "proxy-sockets": ("    proxy_set_header Upgrade $http_upgrade;\n", ""),
     "proxy-host": ("proxy_set_header Host $http_host", "proxy_set_header Host $proxy_host"),

@@ -17,7 +17,7 @@ from action_assistant.commands.sync.sync import SyncRound
 from action_assistant.errors import CannotStart
 from action_assistant.umrf.files.file_names import ENDING
 
-#: What Python tells of before it asks the system (docs.python.org, "Audit events table").
+#: Calls that Python reports before it asks the system (docs.python.org, "Audit events table").
 _CALLS = frozenset(
     {"open", "os.rename", "os.link", "os.remove", "os.chmod", "os.chown", "os.scandir"}
 )

@@ -373,7 +373,7 @@ def _judge(
         assert b"there" in file.read_bytes()
 
 
-# What a folder may have under the name of a graph, and a state may say, that is not the program's own.
+# Foreign things that a folder may have under the name of a graph, and that a state may name.
 
 
 def _link_to_a_file(place: Path, outside: Path) -> None:

@@ -50,7 +50,8 @@ class Watching:
             env=product.environment,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
-            # Who runs these tests in the background of a shell hands on that Ctrl-C is ignored.
+            # A test run in the background of a shell would otherwise pass on that Ctrl-C is
+            # ignored.
             preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         )
         assert self.process.stdout

@@ -107,6 +107,6 @@ async def test_the_history_shows_both_values_whichever_person_was_offline(editor
         (step,) = await ask("/changes", after=newest, upto=99)
         assert (step["before"], step["after"]) == ("by Mari", "by Mari")
         assert step["overwritten"] == "by Ada"
-        # Who set the value that stands is still who set it.
+        # The author of the value that stands is still its author.
         (field,) = (f for f in await ask("/blame", of=aid) if f["field"] == "description")
         assert (field["author"]["name"], field["value"]) == ("Mari", "by Mari")

@@ -115,7 +115,7 @@ def test_ones_own_answer_to_a_proposal_does_not_count(http: httpx.Client, yes: b
         ann.post(f"/api/drafts/{draft}/proposal", json={})
         refused = ann.post(f"/api/drafts/{draft}/answers", json=said)
         assert (refused.status_code, refused.json()["where"]) == (409, {"path": "/yes"})
-        # The same browser under another name is no second person.
+        # A browser under another name is no second person.
         assert ann.delete("/api/session").is_success
         again = ann.post("/api/session", json={"token": TOKEN, "name": "Eve"}).json()
         assert again["person"]["name"] == "Eve"

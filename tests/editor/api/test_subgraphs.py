@@ -305,7 +305,7 @@ def test_the_graphs_inside_come_as_files_that_an_engine_indexes(client: httpx.Cl
     assert sorted(texts) == [
         "Fetch.umrf.graph.json", "Grip_it.umrf.graph.json", "grip_it-2.umrf.graph.json"
     ]  # fmt: skip
-    # What an engine takes for actions has another ending.
+    # Files that an engine takes for actions have another ending.
     assert all("graph.json" in name and "umrf.json" not in name for name in texts)
     graphs = [codec.read(text).graph for text in texts.values()]
     assert {each.name: digest(each) for each in graphs} == {

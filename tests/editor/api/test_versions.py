@@ -22,7 +22,7 @@ def test_a_version_has_a_name_and_a_note_of_its_author(http: httpx.Client) -> No
     assert http.get(f"/api/versions/{version['id']}").json() == version
     (listed,) = http.get(f"/api/graphs/{graph}/versions").json()
     assert (listed["label"], listed["note"]) == ("gentle", version["note"])
-    # What is said of a moment makes another version of it; nothing said names the newest one.
+    # A note makes another version of a moment; without a note the newest version is answered.
     noted = http.post(f"/api/graphs/{graph}/versions", json={"note": "tried on Monday"})
     assert noted.status_code == 201
     again = http.post(f"/api/graphs/{graph}/versions", json={})

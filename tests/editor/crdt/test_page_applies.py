@@ -22,8 +22,8 @@ from editor.crdt.test_scan_fuzz import base, mutated
 from editor.random_updates import random_update
 from support.page import FRONTEND
 
-#: Where somebody writes several values for one key of a map inside a map, then something between those,
-#: and the map is deleted, pages that are there fail; those that come later do not.
+#: If a person writes several values for one key of a map inside a map, then something between
+#: those, and the map is deleted, pages that are there fail; pages that come later do not.
 COLLECTING: Final = "Error: Unexpected case"
 CASES: Final = int(os.environ.get("TEST_PAGE_CASES", "1500"))
 SEED: Final = int(os.environ.get("TEST_SEED", "13"))
@@ -67,7 +67,7 @@ POISONS: Final = {
     "empty text before a gap": b"\x01\x03\x07\x00\x04\x01\x01t\x01a\x84\x07\x00\x00\x0a\x05\x00",
     "deletes nothing": b"\x00\x01\x07\x01\x03\x00",
 }
-#: As those, or such that Yjs would fail if the library did not.
+#: The poisons, and updates at which Yjs would fail if the library did not.
 REFUSED: Final = POISONS | {
     "texts of JSON": bytes.fromhex("01010700220107616374696f6e73016b01097b6e6f74206a736f6e010000"),
     "texts of sound JSON": in_action(2, b"\x02\x011\x012"),
@@ -81,7 +81,7 @@ REFUSED: Final = POISONS | {
         for value in ("", "{", "NaN", "-Infinity", "undefined", "[" * 5000, "\ufeff1")
     },
 }
-#: What clients do write.
+#: Updates that clients really write.
 HONEST: Final = {
     **{f"type {kind}": in_action(7, bytes((kind,))) for kind in (0, 1, 2, 4, 6)},
     "element": in_action(7, b"\x03\x01p"),

@@ -30,7 +30,7 @@ def beside(kind: int, *ids: int, by: int = 9) -> bytes:
     return b"\x01\x01" + number(by) + b"\x00" + bytes((kind,)) + neighbours + b"\x01x\x00"
 
 
-#: Of a document with "x😀y" by client 7, whose clocks 1 and 2 are one character.
+#: Updates of a document with "x😀y" by client 7, whose clocks 1 and 2 are one character.
 WITHIN = {
     "deletes its beginning": deleted(1, 1),
     "deletes from before it": deleted(0, 2),

@@ -71,7 +71,7 @@ def check_pieces(whole: bytes, size: int) -> int:
         reached = clocks(doc.get_state())  # nothing waits: what the piece brings is there at once
         assert all(reached[client] >= end for client, _, end in stored_outline(piece).brings)
     assert clocks(doc.get_state()) == clocks(expected.get_state())
-    # What is deleted is the same, too; how the library keeps deleted things may differ.
+    # The deletions are equal, too; the library may keep deleted things in another form.
     assert doc.get_update(doc.get_state()) == expected.get_update(expected.get_state())
     assert doc.get("things", type=Map).to_py() == expected.get("things", type=Map).to_py()
     assert str(doc.get("text", type=Text)) == str(expected.get("text", type=Text))

@@ -70,7 +70,7 @@ json_texts = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(words, inner, max_size=3),
     max_leaves=5,
 ).map(json.dumps)
-# What the wire carries: whole numbers are doubles there, and half of a character pair is none.
+# On the wire whole numbers are doubles, and half of a character pair does not exist.
 numbers = st.floats(allow_nan=False, allow_infinity=False, width=32)
 extras = st.dictionaries(words, json_texts, max_size=3).map(lambda found: tuple(found.items()))
 notes = extras.map(lambda found: tuple(sorted(found, key=lambda n: n[0].encode("utf-16-be"))))

@@ -60,7 +60,7 @@ async def test_a_page_that_shows_something_else_is_told_and_it_is_reported(rooms
             await settle(client)
         assert ada.told == eve.told == fingerprint(document.maps_of(ada.doc))
         assert room.comparisons.divergences == 0
-        # Somebody's document came by another way to what the room does not have.
+        # Another document received something that the room does not have.
         other: Doc[Any] = Doc()
         other.apply_update(forged_updates.entry(ada.doc.client_id, 0, "name", "other", root="meta"))
         assert other.get_state() == ada.doc.get_state()

@@ -57,7 +57,7 @@ def test_another_database_than_before_is_refused_unless_told(
     product.start()
     product.end()
     database_location.check(data, url, switch=False)  # told once
-    # The same server by another name has the same log.
+    # Another name of the same server leads to the same log.
     database_location.check(data, url.replace("127.0.0.1", "localhost"), switch=False)
     said = refused(data)
     assert database_location.shown(url) in said

@@ -28,7 +28,7 @@ from umrf.hierarchy.hierarchies import Hierarchy, hierarchies
 VECTORS = json.loads(
     (Path(__file__).parents[2] / "vectors" / "levels.json").read_text(encoding="utf-8")
 )
-#: For graphs and for actions: marks of levels and digits are parts of names.
+#: Names of graphs and actions that contain marks of levels and digits.
 HOSTILE = ["Grip", "Grip_2", "A__B", "A__0", "A__B__0", "0", "_", "__", "A_", "B__0__A", "é ›"]
 RENAMED = ["g", "H0", "I0", "H1", "H2", "A", "B"]
 

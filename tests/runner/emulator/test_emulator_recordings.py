@@ -36,9 +36,9 @@ from support.recordings import calls_of, facts, family, lines
 FACTS = facts("node")
 #: Recordings of one engine whose graphs are stored whole.
 NAMES = FACTS.get("replayed", ())
-#: How far apart the two may be in time: a machine with two cores was recorded.
+#: The largest difference in time: a machine with two cores was recorded.
 SLACK_MS = 120.0
-#: What is closer than this may have come in any order.
+#: Lines closer than this may have come in any order.
 RACE_MS = 15.0
 #: The stop that wakes this engine came after the next action was loaded in one run, and before in
 #: the other, where the action then ran to its end in a graph that was STOPPED.

@@ -62,7 +62,7 @@ TROUBLE = st.one_of(
 #: Much goes on, and now and then something goes wrong.
 STEPS = st.one_of(WAIT, START, WAIT, STOP, WAIT, START, TROUBLE)
 
-#: Somebody else starts a graph of the same name, whose engine calls it finished while it goes on.
+#: A stranger starts a graph of the same name, whose engine calls it finished while it goes on.
 ANOTHER_THAT_DOES_NOT_OBEY: list[tuple[str, Any]] = [
     ("wait", 4.0),
     ("stop all", None),

@@ -177,7 +177,7 @@ def test_a_file_written_at_the_same_time_is_never_lost(tmp_path: Path) -> None:
             write(tmp_path, [NewFile("leg", b'{"n": %d}' % number, mine.name, sha(text))])
     ends.set()
     other.join()
-    # What was saved last is under its name or put aside: nobody's file was written over.
+    # The last saved text is under its name or put aside: no file of a person was overwritten.
     kept = [each.read_bytes() for each in tmp_path.iterdir() if each.name.endswith(".replaced")]
     assert saved[-1] in (mine.read_bytes(), *kept)
     assert not any(each.name.endswith(".new") for each in tmp_path.iterdir())
@@ -260,7 +260,7 @@ def test_a_wish_is_what_was_approved_and_names_what_it_sends(tmp_path: Path) -> 
 # --- whatever stands there --------------------------------------------------------------------------
 
 NAMES = ("leg", "round", "a_b")
-#: What people and strangers call files and graphs; each is a name that a file system takes.
+#: Names that people and strangers give to files and graphs; a file system takes each.
 hostile = st.one_of(
     st.sampled_from(
         ["graph.json", "umrf.json", "leg.umrf.graph.json", "LEG.umrf.graph.json", ".graph.json"]

@@ -32,7 +32,7 @@ from runner.runs.test_runs import REQUESTED
 
 DAY_US: Final = 86_400_000_000
 NOW: Final = 100 * DAY_US
-#: How long each run is; the longest is deleted in several steps.
+#: The number of events of each run; the longest run is deleted in several steps.
 LENGTHS: Final = {"r1": 12, "r2": 2_300, "r3": 12}
 _HOURS: Final = ("1970-03-01T07", "1970-03-01T08", "1970-04-10T23")
 

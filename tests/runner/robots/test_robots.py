@@ -33,7 +33,7 @@ async def test_a_robot_that_answers_says_so_and_what_it_has() -> None:
         assert (robot.state, robot.why, robot.actions, robot.servers) == ("answering", "", 1, 1)
         index = await control.robots.index("David")
         assert list(index.actions) == ["Work"]
-        # As its file says, so that the library can take it over.
+        # The index has the action as its file describes it, so the library can take it over.
         assert index.described["Work"] == codec.read_action(david.known_actions[0]).action
 
 

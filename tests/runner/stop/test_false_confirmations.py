@@ -47,7 +47,7 @@ HISTORIES = int(os.environ.get("TEST_HISTORIES", "10"))
 #: which the emulated robot showed the old actions' states then.
 KNOWN = (601, 621, 3378, 43518, 103804)
 FIRST = int(os.environ.get("TEST_HISTORIES_FROM", "0"))
-#: For how long an engine that comes up later hears starts before it serves its get.
+#: Times for which an engine that comes up later hears starts before it serves its get.
 GAPS_S = (0.0, 0.0, 0.3, 3.0, 8.0)
 #: Ends that say that nothing moves any more.
 STILL: frozenset[State] = ENDED - {"lost"}

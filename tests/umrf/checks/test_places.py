@@ -22,7 +22,7 @@ from support.recordings import CORPUS, NO_CORPUS
 
 OWN = sorted((Path(__file__).parents[1] / "examples").glob("*.json"))
 FILES = sorted(CORPUS.rglob("*.json"))
-#: What the engine takes for an action, since it has a name and a type: a reply of CMake.
+#: A reply of CMake, which the engine takes for an action, since it has a name and a type.
 FOREIGN = ".cmake__api__v1__reply__target-"
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large]
 

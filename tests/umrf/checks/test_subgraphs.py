@@ -121,7 +121,8 @@ def beside(*names: str) -> Graph:
     return read(json.dumps(file)).graph
 
 
-#: What the real node did with these on 2026-11-22, each started as the first graph of its name.
+#: The behaviour of the real node with these on 2026-11-22, each started as the first graph of its
+#: name.
 RESOLVED = [
     (("Seq_0",), True),
     (("Seq_0", "Seq_1"), False),

@@ -17,7 +17,7 @@ from support.recordings import CORPUS, NO_CORPUS, lines
 OWN = Path(__file__).parents[1] / "examples"
 
 
-#: What the engine takes for an action, since it has a name and a type: a reply of CMake.
+#: A reply of CMake, which the engine takes for an action, since it has a name and a type.
 FOREIGN = ".cmake__api__v1__reply__target-"
 
 

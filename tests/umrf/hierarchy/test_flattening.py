@@ -18,7 +18,7 @@ from umrf.hierarchy.hierarchies import Hierarchy, both, hierarchies, outputs_of
 RESULTS = ("on_true", "on_false", "on_error")
 #: Scripts that one flat graph is tried with: all combinations of results where there are no more.
 MOST = 27
-#: How likely a call cannot be loaded, or never ends.
+#: The probability that a call cannot be loaded, or never ends.
 RARELY = 0.03
 
 

@@ -17,7 +17,7 @@ from action_assistant.umrf.model import Action
 
 STUBS: Final = Path(__file__).parent / "stubs"
 NATIVE: Final = ("string", "strings", "number", "numbers", "bool", "bools")
-#: What ends a literal, a comment, an argument or a tag, or begins something else.
+#: Texts that end a literal, a comment, an argument or a tag, or begin something else.
 HOSTILE: Final = (
     '"', "'", "*/", "/*", "//", '*/ system("x"); /*', '")\nexecute_process(COMMAND touch x)',
     "${ENV{HOME}}", "$<1:x>", "@PROJECT_NAME@", "]]>", "]]", "]==]", "<!--", "-->", "<x/>", "&amp;",

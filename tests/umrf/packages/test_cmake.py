@@ -27,7 +27,7 @@ RECORDING = "".join(
     + "endfunction()\n"
     for command in TOLD
 )
-#: What `find_package` finds in place of ROS 2 and the engine.
+#: Files that `find_package` finds in place of ROS 2 and the engine.
 FOUND = {
     "Findament_cmake.cmake": """
         function(ament_package)

@@ -22,7 +22,7 @@ from support.product import TOKEN, Product, running
 KEYS = Keys(TOKEN)
 ROLES: tuple[Role, ...] = get_args(Role)
 PROCESSES = ("editor", "runner")
-#: Nothing that a person may not do is here below an editor, nor robots below an operator.
+#: The least role for each permission: an editor at least for changes, an operator for robots.
 LEAST: dict[Permission, Role] = {
     "see": "viewer",
     "stop": "viewer",

@@ -22,7 +22,7 @@ from support.product import TOKEN, Product, running
 
 MONITORING = Path(__file__).parents[3] / "docs/monitoring"
 SCRAPE = "scrape-" * 6
-#: What Prometheus itself makes.
+#: Series that Prometheus itself makes.
 OF_PROMETHEUS = {"up", "ALERTS"}
 OWNER = {"authorization": f"Bearer {TOKEN}"}
 

@@ -16,7 +16,7 @@ from support.product import TOKEN, Product, running
 
 ORIGIN = "https://robots.example.org"
 BEARER = {"authorization": f"Bearer {TOKEN}"}
-#: As a proxy passes a request of a browser on.
+#: Headers of a browser's request as a proxy passes it on.
 PROXIED = {"host": "robots.example.org", "x-forwarded-for": "203.0.113.9"}
 
 

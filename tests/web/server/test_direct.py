@@ -171,7 +171,7 @@ def test_a_socket_taken_over_receives_sends_and_ends_as_the_usual_one_does(
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(direct, "_IN_A_TURN", in_a_turn)
         assert asyncio.run(directly(pieces, before=before, stops=stops)) == usual
-        # Where nobody takes it over, too.
+        # The same holds for a socket that nobody takes over.
         assert asyncio.run(usually(pieces, DirectSocket)) == usual
 
 
