@@ -74,8 +74,8 @@ def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
             text = msgspec.json.encode({"code": alarm.code, "at": alarm.at, "text": alarm.text})
             more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
             return (change.values(summary=more),)
-        case MovesAgain() as again_:
-            return _open_again(id_, again_)
+        case MovesAgain() as moves:
+            return _open_again(id_, moves)
         case Ended() as end:
             summary = func.json_set(run.c.summary, "$.detail", end.detail)
             if end.at_rest is not None:

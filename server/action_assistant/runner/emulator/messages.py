@@ -53,50 +53,44 @@ class EngineTraits(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 # --- in ---------------------------------------------------------------------------------------------
 
 
-class Start(msgspec.Struct, frozen=True, kw_only=True):
+class _Command(msgspec.Struct, frozen=True, kw_only=True):
+    """A command about a graph, to the engines with these names."""
+
+    graph_name: str
+    targets: tuple[str, ...]
+
+
+class Start(_Command, frozen=True, kw_only=True):
     """A command to start the graph of a text or, where that is empty, the indexed graph of this name."""
 
     topic: ClassVar[str] = "start"
 
-    graph_name: str
-    targets: tuple[str, ...]
     graph_json: str = ""
 
 
-class Stop(msgspec.Struct, frozen=True, kw_only=True):
+class Stop(_Command, frozen=True, kw_only=True):
     """A command to stop a graph."""
 
     topic: ClassVar[str] = "stop"
 
-    graph_name: str
-    targets: tuple[str, ...]
 
-
-class Pause(msgspec.Struct, frozen=True, kw_only=True):
+class Pause(_Command, frozen=True, kw_only=True):
     """A command to pause a graph."""
 
     topic: ClassVar[str] = "pause"
 
-    graph_name: str
-    targets: tuple[str, ...]
 
-
-class Resume(msgspec.Struct, frozen=True, kw_only=True):
+class Resume(_Command, frozen=True, kw_only=True):
     """A command to let a paused graph go on."""
 
     topic: ClassVar[str] = "resume"
 
-    graph_name: str
-    targets: tuple[str, ...]
 
-
-class Modify(msgspec.Struct, frozen=True, kw_only=True):
+class Modify(_Command, frozen=True, kw_only=True):
     """A command to put `modified_graph` in the place of the graph of its name."""
 
     topic: ClassVar[str] = "modify"
 
-    graph_name: str
-    targets: tuple[str, ...]
     modified_graph: str
     continue_from: str = ""
 

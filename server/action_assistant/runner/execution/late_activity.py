@@ -146,7 +146,7 @@ class LateActivity:
             return closed
         while True:
             try:
-                told = await self._robots.robot_log.newest(robot, _TOLD)
+                entries = await self._robots.robot_log.newest(robot, _TOLD)
                 found, seq = await self._history.followed(run)
             except NotFound:
                 return None
@@ -156,7 +156,7 @@ class LateActivity:
                 return None
             else:
                 played = any(
-                    isinstance(each, Commanded) and run_in(each.umrf) == run for _, each in told
+                    isinstance(each, Commanded) and run_in(each.umrf) == run for _, each in entries
                 )
                 return None if played or found is None else (found, seq)
 

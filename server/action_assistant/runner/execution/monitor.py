@@ -293,8 +293,8 @@ class Monitor:
 
         async def compare(run_in_worker: RunInWorker) -> Finding:
             why = await run_in_worker(differs, sent, text)
-            told = f"What {run.engine} shows is not what was sent: {why}"
-            return Finding("echo_differs", told) if why else Finding()
+            sentence = f"What {run.engine} shows is not what was sent: {why}"
+            return Finding("echo_differs", sentence) if why else Finding()
 
         self._jobs.append(compare)
 
@@ -459,9 +459,9 @@ class Monitor:
         self._loading_told_at = max(4.0, 2 * waited_s)
         usual = self._loading_times.usual(run.engine, actions)
         times = [f"{waited_s:.0f} s so far"] * is_same + [usual] * bool(usual)
-        told = f"{why} ({'; '.join(times)})" if times else why
+        sentence = f"{why} ({'; '.join(times)})" if times else why
         places = tuple((each.graph, each.node) for each in actions)
-        changes.tell(Loading(self._clock_us(), told, places))
+        changes.tell(Loading(self._clock_us(), sentence, places))
         if why:
             changes.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {LOOK_AT_IT}")
 
@@ -482,8 +482,8 @@ class Monitor:
         words = self._start.words
         if words:
             return f"{refusals.why_refused(run.engine, words)} It has begun none of it."
-        told = f"{run.engine} holds the graph and has not begun it, without a word why. {self._lacking or ''}"
-        return told.rstrip()
+        sentence = f"{run.engine} holds the graph and has not begun it, without a word why. {self._lacking or ''}"
+        return sentence.rstrip()
 
     async def _find_lacking(self, umrf: str, run_in_worker: RunInWorker) -> Finding:
         self._lacking = await run_in_worker(stall.lacking_in_words, umrf)

@@ -390,16 +390,16 @@ class OpenRun:
     async def _steadily(self, work: Callable[[], Awaitable[None]]) -> None:
         """Run `work` until it returns; run it again after each exception, so that a fault ends no
         task."""
-        told = False
+        is_reported = False
         while True:
             try:
                 await work()
                 return
             except Exception as error:
                 log.exception("run %s: a task failed and is begun again", self.run.id)
-                if not told:
+                if not is_reported:
                     self.alarm("internal", f"The runner has a fault: {error!r}")
-                    told = True
+                    is_reported = True
                 await anyio.sleep(0.2)
 
     async def _publish(self, order: Order, incarnation: str) -> None:

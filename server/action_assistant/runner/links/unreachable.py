@@ -2,19 +2,16 @@
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
-from typing import Final
+from typing import Final, NoReturn
 
 import anyio
 
 from action_assistant.runner.links.port import (
     Answer,
-    Leaves,
     NoAnswer,
     NotSent,
-    Order,
     Report,
     Standing,
-    unwatched,
 )
 
 
@@ -33,25 +30,11 @@ class UnreachableLink:
         """The standing `gone`, with the reason."""
         return Standing(state="gone", why=self._why)
 
-    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Raise NotSent: nobody can be told to start a graph."""
+    async def _refuse(self, *_: object, **__: object) -> NoReturn:
+        """Raise NotSent: nobody can be told to do anything."""
         raise NotSent(self._why)
 
-    async def stop(self, graph_name: str) -> None:
-        """Raise NotSent: nobody can be told to stop a graph."""
-        raise NotSent(self._why)
-
-    async def pause(self, graph_name: str) -> None:
-        """Raise NotSent: nobody can be told to pause a graph."""
-        raise NotSent(self._why)
-
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Raise NotSent: nobody can be told to resume a graph."""
-        raise NotSent(self._why)
-
-    async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Raise NotSent: nobody can be told to change a graph."""
-        raise NotSent(self._why)
+    start = stop = pause = resume = modify = _refuse
 
     async def get(self) -> Answer:
         """Raise NoAnswer: nobody can be asked."""

@@ -65,12 +65,7 @@ class WorkerQueries:
     ) -> T:
         """Return the result of a method of `StoredRuns`, called in a worker. Raise its errors;
         Unavailable or TooMany if no worker can answer."""
-        await self._settled(args)
-        found, snapshots = await self._run_in_worker(
-            answered, self._paths, partial(question, **kw) if kw else question, args
-        )
-        self._keep(snapshots)
-        value: T = found
+        value: T = await self._ask(answered, partial(question, **kw), args)
         return value
 
     async def text(
@@ -80,12 +75,7 @@ class WorkerQueries:
         **kw: P.kwargs,
     ) -> bytes:
         """Return what a method of `StoredRuns` returns, as JSON that the worker encoded."""
-        await self._settled(args)
-        found, snapshots = await self._run_in_worker(
-            encoded, self._paths, partial(question, **kw) if kw else question, args
-        )
-        self._keep(snapshots)
-        text: bytes = found
+        text: bytes = await self._ask(encoded, partial(question, **kw), args)
         return text
 
     async def newest(self, run: str) -> int:
@@ -98,10 +88,20 @@ class WorkerQueries:
         """Return a run that is over, and the seq of its last event, as `history.Past`."""
         return await self.value(StoredRuns.followed, run, robots_too)
 
-    async def _settled(self, args: Sequence[object]) -> None:
+    async def _ask(
+        self,
+        work: Callable[..., tuple[Any, list[StreamSnapshot]]],
+        question: Callable[..., Awaitable[Any]],
+        args: Sequence[Any],
+    ) -> Any:
+        """Return what `work` makes of a question, in a worker that sees all that was shown."""
         for each in args:
             if isinstance(each, str):
                 await self.wait_until_stored(each)
+        found, snapshots = await self._run_in_worker(work, self._paths, question, args)
+        if snapshots:
+            self._tasks.start_soon(self._store, snapshots)
+        return found
 
     async def wait_until_stored(self, run: str) -> None:
         """Wait until the events of an open run that were shown are stored, for two seconds at most."""
@@ -109,10 +109,6 @@ class WorkerQueries:
         if recorder is not None:
             with anyio.move_on_after(_SETTLED_S):
                 await recorder.flushed()
-
-    def _keep(self, snapshots: Sequence[StreamSnapshot]) -> None:
-        if snapshots:
-            self._tasks.start_soon(self._store, snapshots)
 
     async def _store(self, snapshots: Sequence[StreamSnapshot]) -> None:
         """Store snapshots. They are a cache: a failure ends nothing, and they are made again

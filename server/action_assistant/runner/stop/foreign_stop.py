@@ -153,117 +153,119 @@ class ForeignStopLoop:
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
         """Process graphs that an engine shows, in an answer or by feedback; return at once."""
-        for (robot, graph), it in self._going.items():
+        for (robot, graph), wanted in self._going.items():
             if robot != engine.registration.name:
                 continue
             if engine.standing.doubt:
-                it.loading.meddle()
+                wanted.loading.meddle()
             else:
-                it.loading.see(_parts_of(snapshots, graph))
+                wanted.loading.see(_parts_of(snapshots, graph))
 
-    def _begin(self, it: _ForeignStop, engine: KnownEngine | None) -> None:
-        self._going[it.robot, it.graph] = it
-        self._tasks.start_soon(self._stop, it, engine)
+    def _begin(self, wanted: _ForeignStop, engine: KnownEngine | None) -> None:
+        self._going[wanted.robot, wanted.graph] = wanted
+        self._tasks.start_soon(self._stop, wanted, engine)
         self._changed()
 
-    async def _stop(self, it: _ForeignStop, engine: KnownEngine | None) -> None:
+    async def _stop(self, wanted: _ForeignStop, engine: KnownEngine | None) -> None:
         try:
-            with it.patience:
+            with wanted.patience:
                 try:
-                    told = await self._until_proven(it, engine)
+                    outcome = await self._until_proven(wanted, engine)
                 except NotFound:
-                    told = self._unproven(it, _REMOVED)
-            if it.patience.cancelled_caught:
-                told = self._unproven(it, it.why or "no proof has come")
-            self._robots.robot_log.note(it.robot, told, "")
+                    outcome = self._unproven(wanted, _REMOVED)
+            if wanted.patience.cancelled_caught:
+                outcome = self._unproven(wanted, wanted.why or "no proof has come")
+            self._robots.robot_log.note(wanted.robot, outcome, "")
         finally:
-            self._going.pop((it.robot, it.graph), None)
+            self._going.pop((wanted.robot, wanted.graph), None)
             self._changed()
 
-    async def _until_proven(self, it: _ForeignStop, known: KnownEngine | None) -> RobotEvent:
+    async def _until_proven(self, wanted: _ForeignStop, known: KnownEngine | None) -> RobotEvent:
         """Stop a graph until that is proven or impossible to prove; return the event for it.
         `known`: the engine that is known to be the one to stop; after a new link or a restart of
         the runner it has to show that first."""
         began, gap = anyio.current_time(), _GAP_S
         while True:
-            engine = self._robots.present(it.robot)
+            engine = self._robots.present(wanted.robot)
             if engine is None:
-                told: RobotEvent | str = _NO_LINK
+                outcome: RobotEvent | str = _NO_LINK
             elif engine is known:
-                told = await self._steadily(it, engine)
+                outcome = await self._steadily(wanted, engine)
             else:
-                it.rest.forget()
-                told = await self._recognise(it, engine)
-                if not told:
+                wanted.rest.forget()
+                outcome = await self._recognise(wanted, engine)
+                if not outcome:
                     known = engine
                     continue
-            if not isinstance(told, str):
-                return told
-            if anyio.current_time() - began >= _LOUD_S and it.why != told:
-                it.why = told
+            if not isinstance(outcome, str):
+                return outcome
+            if anyio.current_time() - began >= _LOUD_S and wanted.why != outcome:
+                wanted.why = outcome
                 self._changed()
             await anyio.sleep(gap)
             gap = min(1.5 * gap, _SLOWEST_S)
 
-    async def _recognise(self, it: _ForeignStop, engine: KnownEngine) -> StopUnproven | str:
+    async def _recognise(self, wanted: _ForeignStop, engine: KnownEngine) -> StopUnproven | str:
         """Ask an engine, without sending a stop, whether it is the one that was to stop the graph.
         Return "" if it is, why that is unknown, or the event that it is another engine."""
         answer = await _ask(engine)
         if answer is None:
             return engine.why or "the engine does not answer"
-        if not it.life or not answer.incarnation:
-            return self._unproven(it, _UNKNOWN_LIFE)
-        return "" if answer.incarnation == it.life else self._unproven(it, _RESTARTED)
+        if not wanted.life or not answer.incarnation:
+            return self._unproven(wanted, _UNKNOWN_LIFE)
+        return "" if answer.incarnation == wanted.life else self._unproven(wanted, _RESTARTED)
 
-    async def _steadily(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
+    async def _steadily(self, wanted: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
         """Send one stop message and check the answer, as `_once`. An exception is logged, so that
         the stop is sent again."""
         try:
-            return await self._once(it, engine)
+            return await self._once(wanted, engine)
         except Exception as error:
-            log.exception("a stop of %s on %s failed, and is sent again", it.graph, it.robot)
-            it.rest.forget()
+            log.exception(
+                "a stop of %s on %s failed, and is sent again", wanted.graph, wanted.robot
+            )
+            wanted.rest.forget()
             return f"the runner failed: {error!r}"
 
-    async def _once(self, it: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
+    async def _once(self, wanted: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
         """Send one stop message and check the answer; return the event that ends the Stop, or why
         it is not proven yet."""
-        why = await send_stop(engine, it.graph)
+        why = await send_stop(engine, wanted.graph)
         asked = anyio.current_time()
         answer = await _ask(engine)
-        disturbed, it.disturbed = it.disturbed, False
+        disturbed, wanted.disturbed = wanted.disturbed, False
         if disturbed:
-            it.rest.forget()
+            wanted.rest.forget()
         if answer is None:
             return why or engine.why or "the engine does not answer"
-        if len({it.life, answer.incarnation} - {""}) > 1:
-            return self._unproven(it, _RESTARTED)
+        if len({wanted.life, answer.incarnation} - {""}) > 1:
+            return self._unproven(wanted, _RESTARTED)
         if doubt := engine.standing.doubt:
-            it.rest.forget()
+            wanted.rest.forget()
             return doubt
         if disturbed:
             return "somebody has just set it going again"
-        if doubt := it.doubts.look(_shown(answer, it.graph)):
+        if doubt := wanted.doubts.look(_shown(answer, wanted.graph)):
             return doubt
-        if not _at_rest(answer, it.graph, it.rest, asked) or why:
-            return why or f"{it.graph} has not stopped yet"
-        if loading := await self._still_loading(it, answer):
+        if not _at_rest(answer, wanted.graph, wanted.rest, asked) or why:
+            return why or f"{wanted.graph} has not stopped yet"
+        if loading := await self._still_loading(wanted, answer):
             return loading
-        return StopWasProven(at=answer.at, graph=it.graph, asked_at=answer.asked_at)
+        return StopWasProven(at=answer.at, graph=wanted.graph, asked_at=answer.asked_at)
 
-    async def _still_loading(self, it: _ForeignStop, answer: Answer) -> str:
+    async def _still_loading(self, wanted: _ForeignStop, answer: Answer) -> str:
         """Return in words which actions of the graph may still be loading; "" for none. Sub-graphs
         of other starts count, too, since they cannot be distinguished."""
-        shown = _shown(answer, it.graph)
+        shown = _shown(answer, wanted.graph)
         try:
-            unread = it.loading.unread(shown)
-            await it.loading.read(unread, answer.texts, self._run_in_worker)
+            unread = wanted.loading.unread(shown)
+            await wanted.loading.read(unread, answer.texts, self._run_in_worker)
         except Refused:  # no worker is free: every action that has not begun counts then
             pass
-        return in_words(it.loading.actions(shown))
+        return in_words(wanted.loading.actions(shown))
 
-    def _unproven(self, it: _ForeignStop, why: str) -> StopUnproven:
-        return StopUnproven(at=self._clock_us(), graph=it.graph, why=why)
+    def _unproven(self, wanted: _ForeignStop, why: str) -> StopUnproven:
+        return StopUnproven(at=self._clock_us(), graph=wanted.graph, why=why)
 
 
 async def _ask(engine: KnownEngine) -> Answer | None:
