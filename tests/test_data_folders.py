@@ -36,7 +36,7 @@ def told(folder: Path, name: str) -> Any:
     "kind",
     ["SQLite", *(pytest.param(kind, marks=pytest.mark.long) for kind in ("Postgres", "a backup"))],
 )
-def test_what_an_earlier_version_left_is_all_there(
+def test_all_data_of_an_earlier_version_are_there(
     request: pytest.FixtureRequest, tmp_path: Path, folder: Path, kind: str
 ) -> None:
     data, flags = tmp_path / "data", []

@@ -127,7 +127,7 @@ def test_a_changed_line_of_python_builds_nothing_but_the_package(target: str) ->
     assert last[1] == f"--from={target}-package"
 
 
-def test_what_is_copied_exists_and_nothing_else_is_sent() -> None:
+def test_copied_files_exist_and_no_others_are_sent_to_the_build() -> None:
     ignored = (ROOT / ".dockerignore").read_text().split()
     assert ignored[0] == "*"
     for stage in stages().values():
@@ -194,7 +194,7 @@ def test_the_command_line_understands_what_each_service_says(
 
 
 @pytest.mark.parametrize("name", ["runner", "robot"])
-def test_what_speaks_to_robots_stands_where_engines_are(name: str) -> None:
+def test_services_that_speak_to_robots_use_the_hosts_network(name: str) -> None:
     service = SERVICES[name]
     assert (service["network_mode"], service["ipc"]) == ("host", "host")
     assert "depends_on" not in service, "Stop needs neither the editor nor the database"

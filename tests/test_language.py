@@ -29,7 +29,7 @@ def test_docstrings_of_the_server_are_sentences_with_a_subject(kind: str) -> Non
     assert faults == {}
 
 
-def test_what_is_accepted_is_still_there() -> None:
+def test_accepted_exceptions_still_exist() -> None:
     assert set(ACCEPTED) <= {*found("has_no_subject"), *found("is_short")}
 
 

@@ -62,7 +62,7 @@ def test_every_module_can_be_imported(system: str) -> None:
     assert answer.stdout.endswith(", 0 failed\n")
 
 
-def test_what_is_missing_there_is_really_missing() -> None:
+def test_modules_that_the_other_system_lacks_cannot_be_imported() -> None:
     command = [sys.executable, "-c", "import sys; sys.path.insert(0, 'tests')\n"
                "from support.elsewhere import move_to; move_to('win32')\n"
                "import os\n"

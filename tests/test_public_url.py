@@ -50,7 +50,7 @@ def test_an_address_is_read_as_browsers_write_it(text: str, page: str, origin: s
         "http://8.8.8.8/",
     ],
 )
-def test_what_is_no_address_of_a_page_is_one_clear_sentence(text: str) -> None:
+def test_a_wrong_public_address_is_one_clear_sentence(text: str) -> None:
     with pytest.raises(CannotStart, match=r"public address"):
         public_url(text)
 

@@ -99,7 +99,7 @@ def test_a_release_is_one_commit_with_changelog_version_and_tag(clone: Path) -> 
     ("version", "why"),
     [("", "no version"), ("1.2", "no version"), ("v1.2.3", "no version"), ("0.0.1", "older than")],
 )
-def test_what_is_no_next_version_is_refused(clone: Path, version: str, why: str) -> None:
+def test_a_version_that_is_no_next_one_is_refused(clone: Path, version: str, why: str) -> None:
     answer = released(clone, version)
     assert answer.returncode != 0
     assert why in answer.stderr

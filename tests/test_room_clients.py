@@ -109,7 +109,7 @@ async def test_three_kinds_of_clients_see_the_same(
         assert seen(page, "page") == seen(page, "stock") == document.read(doc)
 
 
-def test_what_the_page_calls_saved_is_in_the_log(
+def test_edits_that_the_page_calls_saved_are_in_the_log(
     page: Page, product: Product, graph_id: str
 ) -> None:
     join(page, product, graph_id, "page")

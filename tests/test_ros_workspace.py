@@ -69,7 +69,7 @@ def test_packages_of_a_sourced_environment_never_stand_before_ours(tmp_path: Pat
     assert (shown.returncode, shown.stderr) == (0, "")
 
 
-def test_what_we_start_does_not_see_pythonpath_either(tmp_path: Path) -> None:
+def test_child_processes_do_not_see_pythonpath_either(tmp_path: Path) -> None:
     shown = run(
         "import os, sys; from action_assistant import ros_workspace; ros_workspace.hide();"
         "print(os.environ.get('PYTHONPATH'), any('hostile' in each for each in sys.path))",

@@ -197,7 +197,7 @@ def _try_secrets(product: Product) -> None:
 
 
 @pytest.mark.long
-def test_what_prints_an_address_of_a_database_leaves_out_its_password(tmp_path: Path) -> None:
+def test_printed_addresses_of_databases_have_no_password(tmp_path: Path) -> None:
     for command in ("migrate", "doctor", "verify"):
         for url in ("postgresql://me:hunter2@127.0.0.1:1/x", "postgresql:/me:hunter2@[/x"):
             answer = subprocess.run(

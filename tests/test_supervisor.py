@@ -57,7 +57,7 @@ def test_children_do_not_outlive_a_killed_serve(tmp_path: Path) -> None:
     eventually(lambda: not any(child.is_running() for child in children))
 
 
-def test_what_was_served_before_kill_9_is_served_after_it(tmp_path: Path) -> None:
+def test_graphs_from_before_kill_9_are_served_after_it(tmp_path: Path) -> None:
     product = Product(tmp_path / "data")
     product.start()
     with product.editor() as editor:

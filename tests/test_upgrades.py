@@ -159,7 +159,7 @@ def said_by(product: Product) -> dict[str, Any]:
         return answers(editor, runner)
 
 
-def test_what_the_first_version_wrote_comes_to_this_one_and_back(tmp_path: Path) -> None:
+def test_data_of_the_first_version_come_to_this_one_and_back(tmp_path: Path) -> None:
     data = tmp_path / "data"
     then = of_the_first(data)
     before = {
@@ -311,7 +311,7 @@ def test_damage_that_was_there_is_in_the_copy_and_is_told(
         go_back(tmp_path, None, [copy.path])
 
 
-def test_what_came_after_the_upgrade_is_counted_and_kept_aside(
+def test_events_since_the_upgrade_are_counted_and_kept_aside(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     old(tmp_path).opened()
@@ -325,7 +325,7 @@ def test_what_came_after_the_upgrade_is_counted_and_kept_aside(
     assert inspected(aside)[0] > 12
 
 
-def test_what_is_no_copy_is_not_put_back(tmp_path: Path) -> None:
+def test_a_file_that_is_no_copy_is_not_put_back(tmp_path: Path) -> None:
     old(tmp_path)
     with pytest.raises(CannotStart, match="is no copy from before an upgrade"):
         go_back(tmp_path, None, [tmp_path / "editor.db"])

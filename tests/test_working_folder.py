@@ -116,7 +116,7 @@ def test_started_as_a_module_it_takes_the_folder_off_the_path_before_anything_el
     assert ran(traps) == []
 
 
-def test_what_starts_python_by_itself_says_that_it_wants_nothing_of_it(tmp_path: Path) -> None:
+def test_processes_that_start_python_exclude_the_working_folder(tmp_path: Path) -> None:
     """Whatever a process of ours starts inherits that, also what others write."""
     (tmp_path / "pickle.py").write_text("raise ImportError('a trap')")
     program = (

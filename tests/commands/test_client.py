@@ -72,7 +72,7 @@ def client(
 
 
 @pytest.mark.parametrize("supposed", [True, False])
-def test_what_merely_listens_is_sent_nothing(supposed: bool) -> None:
+def test_a_program_that_merely_listens_gets_no_token(supposed: bool) -> None:
     with listening() as stranger, client(stranger.url, supposed=supposed) as ask:
         with pytest.raises(CannotStart, match="does not know the token"):
             ask()

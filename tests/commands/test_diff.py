@@ -36,7 +36,7 @@ def test_files_are_compared_without_a_server(tmp_path: Path) -> None:
     assert told["fields"] == [{"field": "name", "before": "pair", "after": "duo"}]
 
 
-def test_what_cannot_be_compared_is_neither_same_nor_different(
+def test_an_unreadable_graph_is_neither_same_nor_different(
     tmp_path: Path, product: Product
 ) -> None:
     one = _file(tmp_path, "one", PAIR)

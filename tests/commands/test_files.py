@@ -166,7 +166,7 @@ def test_a_stop_at_a_time_stops(tmp_path: Path) -> None:
         {"actions": [{"name": "A"}]},
     ],
 )
-def test_what_the_engines_parser_refuses_is_not_simulated(
+def test_a_graph_that_the_engines_parser_refuses_is_not_simulated(
     tmp_path: Path, change: dict[str, object]
 ) -> None:
     answer = run("simulate", "--trace", written(tmp_path, {**TWO, **change}))
@@ -186,7 +186,7 @@ def test_a_run_state_in_the_file_is_an_error_and_kills_the_simulated_engine(tmp_
     assert (last["kind"], last["code"]) == ("hazard", "H1")
 
 
-def test_what_is_so_with_nearly_every_graph_is_said_once_last_and_not_as_a_warning(
+def test_a_problem_of_nearly_every_graph_is_one_note_at_the_end(
     tmp_path: Path,
 ) -> None:
     """`on_error` bypasses unless a file says otherwise, in all of these arrows."""
@@ -323,7 +323,9 @@ def test_check_says_line_and_column_in_the_file_also_of_an_old_one(tmp_path: Pat
     assert f"{path}:4:3: The effect" in run("convert", path).stderr
 
 
-def test_what_is_no_json_has_its_line_and_column_also_for_programs(tmp_path: Path) -> None:
+def test_a_file_that_is_no_json_is_refused_with_line_and_column_also_for_programs(
+    tmp_path: Path,
+) -> None:
     (verdict,) = json.loads(run("check", "--json", written(tmp_path, '{"a":\n  oops}')).stdout)
     (problem,) = verdict["problems"]
     assert (problem["where"]["line"], problem["where"]["column"]) == (2, 3)

@@ -71,7 +71,7 @@ def test_json_says_where_each_action_comes_from(tmp_path: Path) -> None:
     assert "team of Grasp_0 left out" in answer.stderr
 
 
-def test_what_would_not_do_the_same_is_refused_with_its_place(tmp_path: Path) -> None:
+def test_a_hierarchy_that_would_not_do_the_same_is_refused_with_its_place(tmp_path: Path) -> None:
     top = written(tmp_path, chain("top", "Grasp"), "top.json")
     middle = written(tmp_path, chain("Grasp", "Open", "Hold"), "grasp.json")
     inner = written(tmp_path, chain("Hold", "Close", ends=["on_error -> ignore"]), "hold.json")
@@ -102,7 +102,7 @@ def test_actions_come_before_graphs_of_their_name(tmp_path: Path) -> None:
     assert [a.name for a in codec.read(answer.stdout).graph.actions] == ["Grasp"]
 
 
-def test_what_cannot_be_read_is_no_answer(tmp_path: Path) -> None:
+def test_an_unreadable_file_is_wrong_use_and_no_answer(tmp_path: Path) -> None:
     top = written(tmp_path, chain("top", "Grasp"), "top.json")
     bad = written(tmp_path, [], "bad.json")
     for arguments in ((bad,), (top, "--with", bad), (top, "--with", tmp_path / "nothing")):

@@ -83,7 +83,7 @@ def test_an_action_that_differs_is_replaced_only_when_that_is_asked_for(
     assert library(product)["Turn"]["inputs"][0]["pvf_type"] == "string"
 
 
-def test_what_cannot_be_read_is_told_with_its_file_and_the_others_come(
+def test_an_unreadable_file_is_named_and_the_others_are_imported(
     product: Product, tmp_path: Path
 ) -> None:
     written(tmp_path, a="{", b=action("AfterAll"), c=action("AfterAll", "string"))

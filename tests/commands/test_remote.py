@@ -75,7 +75,7 @@ def test_a_run_is_waited_for_and_listed(product: Product, files: dict[str, str])
     assert (listed["id"], listed["state"], listed["result"]) == (run, "finished", "on_true")
 
 
-def test_what_is_inside_of_a_graph_runs_with_it(product: Product, files: dict[str, str]) -> None:
+def test_sub_graphs_run_with_their_graph(product: Product, files: dict[str, str]) -> None:
     imported(product, files["graph"])
     end = {"graph_entry": [{"name": "pair"}], "graph_exit": [{"name": "pair"}]}
     outer = {"graph_name": "around", **end, "actions": [{"name": "pair", "type": "sync"}]}

@@ -78,7 +78,7 @@ def test_a_robot_that_is_registered_is_changed_only_when_that_is_said(
         (["remove", "simulator"], 1, "simulator"),
     ],
 )
-def test_what_cannot_be_is_refused_in_one_sentence(
+def test_a_wrong_registration_or_removal_is_refused_in_one_sentence(
     product: Product, words: list[str], code: int, why: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["robots", *words]) == code

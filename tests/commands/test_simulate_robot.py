@@ -23,7 +23,7 @@ def test_without_rclpy_it_says_what_is_missing(capsys: pytest.CaptureFixture[str
 @pytest.mark.parametrize(
     "wrong", [["--quirk", "loss=much"], ["--quirk", "speed=2"], ["--domain", "233"]]
 )
-def test_what_it_cannot_take_is_wrong_use(
+def test_wrong_options_of_simulate_robot_are_wrong_use(
     wrong: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as left:

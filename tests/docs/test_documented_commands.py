@@ -256,9 +256,7 @@ TRIED: Final = [
 @pytest.mark.slow
 @pytest.mark.timeout(240)
 @pytest.mark.parametrize("document", TRIED)
-def test_what_a_document_tells_to_type_works(
-    document: Path, computer: Computer, tmp_path: Path
-) -> None:
+def test_commands_of_a_document_work(document: Path, computer: Computer, tmp_path: Path) -> None:
     scratch.fill(tmp_path, computer.home)
     for command in _runnable(document):
         computer.serve(command.words[1] not in ALONE)

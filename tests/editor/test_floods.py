@@ -131,7 +131,7 @@ async def signed_in(editor: Editor, name: str) -> dict[str, str]:
     return {**origin, "cookie": cookies}
 
 
-async def test_what_kills_the_library_is_refused_while_others_edit(
+async def test_updates_that_kill_the_library_are_refused_while_others_edit(
     unlimited: Editor, calm: str
 ) -> None:
     killers = [

@@ -153,14 +153,14 @@ async def test_a_document_takes_so_many_fields_and_no_more(
         assert ada.durable == ada.sent
 
 
-def test_what_was_taken_can_be_opened_and_edited(http: httpx.Client) -> None:
+def test_a_graph_that_was_accepted_can_be_opened_and_edited(http: httpx.Client) -> None:
     made = http.post("/api/graphs", content=json.dumps(wide(8_000)).encode()).json()
     renamed = http.patch(f"/api/graphs/{made['id']}", json={"name": "other"})
     assert renamed.status_code == 200
     assert (renamed.json()["name"], renamed.json()["seq"]) == ("other", 2)
 
 
-async def test_what_nobody_waits_for_is_not_read_to_its_end(editor: Editor) -> None:
+async def test_abandoned_requests_are_not_finished(editor: Editor) -> None:
     text = json.dumps(arrows(30_000)).encode()
 
     async def pieces(content: bytes, patience: float) -> float:
@@ -261,7 +261,7 @@ def two_edits() -> tuple[bytes, bytes]:
 
 
 @pytest.mark.usefixtures("strict")
-async def test_what_waits_is_looked_at_before_it_is_let_in(rooms: Rooms) -> None:
+async def test_a_waiting_update_is_tried_before_it_is_applied(rooms: Rooms) -> None:
     """The waiting update would be applied together with the small update that it waits for."""
     ada, eve = Client("ada"), Client("eve")
     first, _ = two_edits()
@@ -285,7 +285,7 @@ async def test_what_waits_is_looked_at_before_it_is_let_in(rooms: Rooms) -> None
 
 
 @pytest.mark.usefixtures("strict")
-async def test_what_waits_and_is_harmless_is_let_in(rooms: Rooms) -> None:
+async def test_a_harmless_waiting_update_is_applied(rooms: Rooms) -> None:
     first, second = two_edits()
     large = at_once(1_500, client=11, needs=9)
     async with rooms.enter("graph/g") as room:
@@ -380,7 +380,9 @@ async def test_thousands_of_pages_that_edit_one_graph_are_hardly_ever_tried(
     assert tries < 30
 
 
-async def test_what_waits_for_ever_makes_no_trial_of_every_edit(journal: Journal) -> None:
+async def test_an_update_that_waits_for_ever_causes_no_trial_of_every_edit(
+    journal: Journal,
+) -> None:
     tries = 0
 
     async def counted(work: Callable[..., Any], *values: Any) -> Any:

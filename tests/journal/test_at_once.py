@@ -93,7 +93,7 @@ async def test_the_first_ones_are_the_threads_and_then_the_loops(watched: Watche
     assert not await watched.journal.verify()
 
 
-async def test_what_is_large_or_more_than_an_append_is_the_threads(watched: Watched) -> None:
+async def test_the_thread_commits_large_work_and_other_work_than_appends(watched: Watched) -> None:
     await known(watched)
     await watched.then(LARGE)
     await watched.journal.append("b", [SMALL])
@@ -102,7 +102,7 @@ async def test_what_is_large_or_more_than_an_append_is_the_threads(watched: Watc
     assert watched.here == [False, False, True]
 
 
-async def test_what_comes_while_the_thread_writes_waits_its_turn(watched: Watched) -> None:
+async def test_appends_that_come_while_the_thread_writes_wait_their_turn(watched: Watched) -> None:
     await known(watched)
     watched.delay = 0.2
     slow = asyncio.create_task(watched.journal.append("a", [SMALL]))
@@ -112,7 +112,7 @@ async def test_what_comes_while_the_thread_writes_waits_its_turn(watched: Watche
     assert watched.here == [False, False]
 
 
-async def test_what_the_thread_has_stored_is_told_before_what_the_loop_stores(
+async def test_results_of_the_thread_are_reported_before_those_of_the_loop(
     watched: Watched,
 ) -> None:
     await known(watched)
@@ -136,7 +136,7 @@ async def test_a_slow_disk_is_waited_for_by_the_thread(watched: Watched) -> None
     assert watched.here == [True, False]
 
 
-async def test_what_could_not_be_stored_is_told_and_the_thread_begins_again(
+async def test_a_failed_commit_is_reported_and_the_next_one_is_the_threads(
     watched: Watched,
 ) -> None:
     await known(watched)

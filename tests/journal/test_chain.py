@@ -24,7 +24,7 @@ def columns_of(told: list[tuple[str, str, int, bytes, int]]) -> StoredColumns:
 
 
 @given(EVENTS, st.data())
-def test_what_was_written_is_in_the_chain_from_wherever_it_is_looked_at(
+def test_written_events_are_in_the_chain_from_any_starting_point(
     told: list[Any], data: st.DataObject
 ) -> None:
     whole = columns_of(told)

@@ -95,7 +95,7 @@ async def test_additions_to_several_streams_happen_all_or_none(journal: Journal)
     assert [e.position for e in await journal.read_all()] == [1, 2, 3]
 
 
-async def test_what_was_acknowledged_is_there_after_opening_again(open_journal: Open) -> None:
+async def test_acknowledged_events_are_there_after_opening_again(open_journal: Open) -> None:
     first = await open_journal()
     await first.append("a", [draft("kept")])
     await first.close()

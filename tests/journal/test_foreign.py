@@ -119,7 +119,7 @@ def _migrated(path: Path) -> None:
 
 @pytest.mark.parametrize("step", [_opened, _prepared, _migrated])
 @pytest.mark.parametrize("kind", FOREIGN)
-def test_what_is_not_ours_is_refused_and_left_as_it_is(
+def test_a_foreign_database_is_refused_and_left_as_it_is(
     tmp_path: Path, kind: str, step: Callable[[Path], None]
 ) -> None:
     make, why = FOREIGN[kind]

@@ -239,7 +239,7 @@ async def test_a_server_that_forgets_commits_is_refused(
         ("postgresql://127.0.0.1", "not supported"),
     ],
 )
-async def test_what_cannot_be_opened_is_one_sentence_without_the_password(
+async def test_a_database_that_cannot_be_opened_is_one_sentence_without_the_password(
     postgres: Server, url: str, says: str
 ) -> None:
     with pytest.raises(CannotStart, match=says) as caught:

@@ -94,7 +94,7 @@ def test_the_command_line_counts_before_the_environment() -> None:
         log_settings(None, None, {"ACTION_ASSISTANT_LOG_LEVEL": "loud"})
 
 
-def test_what_nobody_caught_is_json_too() -> None:
+def test_uncaught_errors_are_logged_as_json_too() -> None:
     code = (
         "import warnings, threading; from action_assistant.logs.setup import *;"
         "set_up('editor', LogSettings('json')); warnings.warn('old');"

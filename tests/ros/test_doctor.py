@@ -30,7 +30,7 @@ def registered(folder: Path, robots: list[dict[str, object]]) -> Path:
         return product.data
 
 
-def test_what_is_wrong_with_each_robot_is_told_apart(tmp_path: Path, domains: list[int]) -> None:
+def test_the_faults_of_each_robot_are_told_apart(tmp_path: Path, domains: list[int]) -> None:
     one, two, three, four = domains
     robots: list[dict[str, object]] = [
         {"name": "sound", "domain": one, "get_service": "/sound/umrf_graph_get"},

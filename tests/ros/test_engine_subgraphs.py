@@ -54,7 +54,7 @@ def item_of(runner: httpx.Client, order: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
-def test_what_it_has_indexed_is_compared_and_its_code_runs_inside(tmp_path: Path) -> None:
+def test_indexed_graphs_are_compared_and_their_code_runs_inside(tmp_path: Path) -> None:
     inner = json.loads((INDEXED / f"{INNER}.graph.json").read_text())
     with (
         real_engine(tmp_path, DOMAIN) as events,
@@ -86,7 +86,9 @@ def test_what_it_has_indexed_is_compared_and_its_code_runs_inside(tmp_path: Path
         assert (other["verdict"], other["codes"]) == ("blocked", ["subgraph-differs"])
 
 
-def test_what_it_lacks_is_written_into_its_index_and_its_code_runs_inside(tmp_path: Path) -> None:
+def test_missing_graphs_are_written_into_the_index_and_their_code_runs_inside(
+    tmp_path: Path,
+) -> None:
     name = "WrittenByAssistant"
     inner = json.loads((INDEXED / f"{INNER}.graph.json").read_text()) | {"graph_name": name}
     outer = json.loads(json.dumps(OUTER).replace(INNER, name).replace("around", "around_written"))

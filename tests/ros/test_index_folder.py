@@ -73,7 +73,9 @@ def gives_it_back(
     assert kinds.count("index_written") == 2
 
 
-def test_what_a_robot_lacks_is_written_indexed_and_run_inside(domain: int, tmp_path: Path) -> None:
+def test_a_graph_that_a_robot_lacks_is_written_indexed_and_run_inside(
+    domain: int, tmp_path: Path
+) -> None:
     index = tmp_path / "index"
     action = index / "work" / "work.umrf.json"
     action.parent.mkdir(parents=True)

@@ -62,7 +62,7 @@ async def test_a_busy_engine_takes_its_start_in_before_that_of_another_leaves(do
             await eventually(lambda: runs(eve) == runs(david) == ["david", "eve"])
 
 
-async def test_what_shows_the_run_lets_the_next_start_leave(
+async def test_a_report_of_the_run_lets_the_next_start_leave(
     domain: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(outlets, "TAKEN_S", 3600)

@@ -48,7 +48,9 @@ def epochs(editor: Editor) -> list[str]:
         return [json.loads(body)["why"] for (body,) in rows]
 
 
-def test_what_was_backed_up_while_running_is_there_again(editor: Editor, tmp_path: Path) -> None:
+def test_a_backup_of_a_running_server_restores_all_its_graphs(
+    editor: Editor, tmp_path: Path
+) -> None:
     file = tmp_path / "monday.zip"
     made = run("backup", file, "--data", editor.data)
     assert made.returncode == 0, made.stderr

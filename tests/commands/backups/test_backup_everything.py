@@ -140,9 +140,7 @@ def test_backup_restores_the_whole_server_on_an_empty_machine(
 
 
 @pytest.mark.long
-def test_what_people_do_meanwhile_is_in_it_up_to_one_moment(
-    tmp_path: Path, postgres: Server
-) -> None:
+def test_a_backup_holds_concurrent_edits_up_to_one_moment(tmp_path: Path, postgres: Server) -> None:
     url, data = postgres.new_database(), tmp_path / "data"
     over = threading.Event()
     with running(data, "--database", url) as product:
@@ -195,7 +193,7 @@ def test_a_database_that_cannot_be_reached_makes_no_backup(
 
 
 @pytest.mark.long
-def test_what_is_missing_is_said_and_is_no_success(tmp_path: Path) -> None:
+def test_a_backup_names_missing_parts_and_exits_with_1(tmp_path: Path) -> None:
     data = tmp_path / "data"
     with kept(data) as product:
         asyncio.run(live(product, product.token))

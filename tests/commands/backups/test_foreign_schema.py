@@ -142,6 +142,6 @@ def test_a_backup_leaves_out_what_is_not_ours_and_says_so(
 
 
 @pytest.mark.parametrize("branch", BRANCHES)
-def test_what_sqlite_makes_by_itself_is_not_strange(data: Path, branch: Branch) -> None:
+def test_tables_and_indexes_of_sqlite_itself_are_not_foreign(data: Path, branch: Branch) -> None:
     execute(data / f"{branch}.db", "ANALYZE; VACUUM")
     assert foreign_schema.look(data / f"{branch}.db", branch).sentences() == []

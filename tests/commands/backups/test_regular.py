@@ -209,6 +209,8 @@ def test_a_backup_is_not_repeated_before_its_time(data: Path, tmp_path: Path) ->
         (["--into", "b", "--keep", "some"], "no rule such as"),
     ],
 )
-def test_what_cannot_be_meant_is_refused(data: Path, words: list[str], told: str) -> None:
+def test_wrong_or_contradicting_options_are_refused(
+    data: Path, words: list[str], told: str
+) -> None:
     refused = command("backup", *words, "--data", data)
     assert (refused.returncode, told in refused.stderr) == (2, True)

@@ -75,7 +75,7 @@ def test_a_sound_one_is_proven_and_nothing_is_left(file: Path, tmp_path: Path) -
         ("UPDATE alembic_version SET version_num = 'editor_9999'", "newer version"),
     ],
 )
-def test_what_is_not_sound_is_named_and_written_down(
+def test_an_unsound_backup_is_named_and_recorded(
     file: Path, tmp_path: Path, command_: str, told: str
 ) -> None:
     bad = changed(file, tmp_path / "bad.zip", command_)

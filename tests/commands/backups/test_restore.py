@@ -182,7 +182,7 @@ def test_a_link_in_it_is_not_followed(file: Path, tmp_path: Path) -> None:
         here("restore", file, "--data", tmp_path / "new")
 
 
-def test_what_does_not_fit_on_the_disk_is_refused_before_anything_is_written(
+def test_a_backup_that_does_not_fit_on_the_disk_is_refused_before_anything_is_written(
     file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     usage = shutil.disk_usage(tmp_path)._replace(free=1 << 20)
@@ -191,7 +191,7 @@ def test_what_does_not_fit_on_the_disk_is_refused_before_anything_is_written(
         here("restore", file, "--data", tmp_path / "new")
 
 
-def test_what_can_be_packed_most_tightly_is_no_bomb(tmp_path: Path) -> None:
+def test_an_honest_backup_of_the_highest_packing_ratio_is_restored(tmp_path: Path) -> None:
     filled(tmp_path / "old", "Ada", body=bytes(LARGE))
     assert here("backup", tmp_path / "x.zip", "--data", tmp_path / "old") == 0
     assert (tmp_path / "x.zip").stat().st_size * 100 < LARGE * 2

@@ -67,7 +67,7 @@ def test_the_rule_all_keeps_every_backup() -> None:
 
 
 @pytest.mark.parametrize("rule", ["", "0d", "7", "7x", "d", "7d 4w", "-1d"])
-def test_what_is_no_rule_is_refused(rule: str) -> None:
+def test_a_text_that_is_no_rule_is_refused(rule: str) -> None:
     with pytest.raises(ValueError):
         parse_retention(rule)
 

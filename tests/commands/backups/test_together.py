@@ -80,7 +80,7 @@ def test_two_rehearsals_see_all_that_is_in_the_backup(data: Path, tmp_path: Path
     assert (code, "editor: 4500 events" in told) == (0, True), told
 
 
-def test_what_is_left_of_one_that_was_killed_goes(tmp_path: Path) -> None:
+def test_the_folder_of_a_killed_command_is_removed(tmp_path: Path) -> None:
     left = tmp_path / ".work-left"
     left.mkdir()
     (left / "editor.db").write_bytes(b"")

@@ -97,7 +97,7 @@ def test_another_log_is_not_mixed_in(data: Path, tmp_path: Path, postgres: Serve
 
 
 @pytest.mark.long
-def test_what_comes_is_copied_also_after_the_database_was_away(
+def test_new_runs_are_copied_also_after_the_database_was_away(
     data: Path, tmp_path: Path, postgres: Server
 ) -> None:
     url = postgres.new_database()
@@ -121,7 +121,7 @@ def test_what_comes_is_copied_also_after_the_database_was_away(
             log.close()
 
 
-def test_what_cannot_be_copied_to_is_said(data: Path) -> None:
+def test_a_target_that_runs_cannot_be_copied_to_is_refused_with_the_reason(data: Path) -> None:
     for to, told in (
         ("nonsense", "is not a URL"),
         ("sqlite:///x.db", "is a Postgres database"),

@@ -32,7 +32,7 @@ def test_a_package_is_written_and_every_file_named(
     assert sorted(told) == sorted(str(tmp_path / "out" / path) for path in written)
 
 
-def test_what_is_there_already_is_left_and_not_told(
+def test_existing_files_are_left_and_not_reported(
     package: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     package(ONE)
@@ -117,7 +117,7 @@ def test_a_graph_gives_a_package_for_each_action_or_for_those_named(
         ({**GRAPH, "actions": []}, [], "no action"),
     ],
 )
-def test_what_cannot_be_is_refused_with_place_and_reason_and_nothing_is_written(
+def test_an_impossible_package_is_refused_with_place_and_reason_and_nothing_is_written(
     package: Callable[..., int],
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -155,7 +155,7 @@ def test_no_link_leads_out_of_the_folder(
     assert everything(tmp_path / "out") == {}
 
 
-def test_what_is_no_file_is_neither_waited_for_nor_replaced(
+def test_a_pipe_or_a_file_in_the_wrong_place_is_neither_read_nor_replaced(
     package: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "out/open_gripper").mkdir(parents=True)
@@ -175,7 +175,7 @@ def test_a_folder_that_cannot_be_written_is_told_and_nothing_is_left(
     assert str(tmp_path / "out") in capsys.readouterr().err
 
 
-def test_what_a_description_says_steers_no_terminal(
+def test_text_of_a_description_steers_no_terminal(
     package: Callable[..., int], capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert package({**ONE, "name": "A\x1b[2J\nB"}) == 1

@@ -72,7 +72,7 @@ def test_packages_where_colcon_does_not_look_do_not_count(
 
 
 @pytest.mark.parametrize("there", ["", "file", "package.xml", "COLCON_IGNORE"])
-def test_what_is_no_source_folder_is_wrong_use(
+def test_a_folder_that_is_no_source_folder_is_wrong_use(
     package: Callable[..., int], tmp_path: Path, capsys: pytest.CaptureFixture[str], there: str
 ) -> None:
     place = tmp_path / "ws"

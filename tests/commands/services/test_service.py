@@ -118,7 +118,7 @@ def test_an_upgrade_keeps_the_options_and_writes_what_this_version_would(
     assert "ReadWritePaths=/mnt/eve" in after
 
 
-def test_what_the_shell_says_of_ros_goes_in_and_secrets_do_not(
+def test_the_unit_gets_the_shells_ros_variables_and_no_secrets(
     service: Service, unit: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("AMENT_PREFIX_PATH", "/opt/ros/jazzy:/ws/install")
@@ -171,7 +171,7 @@ def test_the_service_makes_the_requested_backups_and_may_write_to_their_folder(
     assert unit.read_text() == text
 
 
-def test_what_cannot_be_meant_is_refused_before_anything_is_written(
+def test_impossible_options_are_refused_before_anything_is_written(
     service: Service,
     unit: Path,
     capsys: pytest.CaptureFixture[str],

@@ -148,7 +148,7 @@ def test_conflicting_changes_both_stay_until_a_person_decides(place: Place) -> N
     assert json.loads(place.server_text())["graph_description"] == "here"
 
 
-def test_what_is_deleted_on_one_side_stays_on_the_other(place: Place) -> None:
+def test_a_deletion_on_one_side_deletes_nothing_on_the_other(place: Place) -> None:
     file = place.folder / f"pair{ENDING}"
     file.write_bytes(_text())
     place.round()
@@ -408,7 +408,7 @@ _THINGS = (_link_to_a_file, _link_to_nowhere, _link_to_itself, _folder, _fifo, _
 
 @pytest.mark.parametrize("when", ["new", "known", "named by a graph", "copy"])
 @pytest.mark.parametrize("thing", _THINGS, ids=[each.__name__[1:] for each in _THINGS])
-def test_what_is_no_file_is_a_problem_of_its_own_and_everything_else_goes_on(
+def test_a_link_or_folder_in_place_of_a_file_is_reported_and_other_files_go_on(
     place: Place, tmp_path_factory: pytest.TempPathFactory, thing: Callable[..., None], when: str
 ) -> None:
     outside = tmp_path_factory.mktemp("outside") / "secret"
@@ -570,7 +570,7 @@ def test_a_copy_that_somebody_has_under_that_name_stays(place: Place) -> None:
     assert mine.read_bytes() == b"notes about the server"
 
 
-def test_what_an_earlier_version_has_put_aside_comes_back(place: Place) -> None:
+def test_a_file_that_an_earlier_version_put_aside_comes_back(place: Place) -> None:
     file = place.folder / f"pair{ENDING}"
     file.write_bytes(_text())
     place.round()

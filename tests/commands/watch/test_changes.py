@@ -47,7 +47,7 @@ def test_values_of_parameters_are_told_and_cut() -> None:
     assert words == f"action A_0: parameter pose/x added: {'9' * 120}…"
 
 
-def test_what_has_no_words_of_its_own_is_told_as_well() -> None:
+def test_a_change_without_words_of_its_own_is_reported_as_well() -> None:
     assert said(PAIR, replace(PAIR, actions=(B, A))) == ["the graph changed"]
     assert said(PAIR, PAIR) == []
     (comment,) = changes(ShownGraph(PAIR, {}), ShownGraph(PAIR, {"1/1": "hello"}))

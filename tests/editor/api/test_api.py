@@ -249,7 +249,7 @@ def test_a_difference_names_fields_and_arrows(http: httpx.Client) -> None:
         ("POST", "/api/graphs/none/restore", 400),
     ],
 )
-def test_whatever_is_wrong_is_said_in_one_shape(
+def test_every_refusal_has_the_same_shape(
     http: httpx.Client, method: str, path: str, status: int
 ) -> None:
     assert_problem(http.request(method, path, content=b"{"), status)
@@ -332,12 +332,12 @@ def direction_of(http: httpx.Client, graph: dict[str, Any]) -> str | None:
     return found
 
 
-def test_what_nobody_has_laid_out_yet_goes_to_the_right(http: httpx.Client) -> None:
+def test_a_graph_without_positions_goes_to_the_right(http: httpx.Client) -> None:
     blank = http.post("/api/graphs", json={"name": "blank"}).json()
     assert direction_of(http, blank) == direction_of(http, imported(http)) == "right"
 
 
-def test_what_is_laid_out_keeps_its_direction(http: httpx.Client) -> None:
+def test_a_graph_with_positions_keeps_its_direction(http: httpx.Client) -> None:
     placed = {"gui_attributes": {"position": {"x": 0, "y": 160}}}
     actions = [{**NAV["actions"][0], **placed}, NAV["actions"][1]]
     assert direction_of(http, imported(http, actions=actions)) is None
@@ -347,7 +347,7 @@ def test_what_is_laid_out_keeps_its_direction(http: httpx.Client) -> None:
         assert direction_of(http, graph) == kept
 
 
-def test_what_a_preview_says_has_its_place_in_the_file_that_was_sent(http: httpx.Client) -> None:
+def test_problems_of_a_preview_have_places_in_the_sent_file(http: httpx.Client) -> None:
     go = '{"name": "Go", "id": 7, "effect": "synchronous", "parents": [5, {"name": "No", "id": 0}]}'
     text = '{"graph_name": "old",\n "umrf_actions": [5,\n  ' + go + "]}"
     found = http.post("/api/graphs", params={"preview": "true"}, content=text.encode()).json()

@@ -63,7 +63,7 @@ def test_a_draft_is_merged_told_of_and_taken_back(http: httpx.Client) -> None:
     assert http.get(f"/api/graphs/{graph}/umrf").json()["graph_name"] == "pair"
 
 
-def test_what_both_changed_waits_for_a_choice(http: httpx.Client) -> None:
+def test_a_key_that_both_sides_changed_needs_a_choice(http: httpx.Client) -> None:
     graph = _imported(http)
     draft = _draft(http, graph)["id"]
     http.patch(f"/api/graphs/{draft}", json={"name": "one"})
@@ -145,7 +145,7 @@ def test_an_answer_is_to_the_change_that_is_there_and_to_no_other(
     assert answer["seq"] == 2
 
 
-def test_what_is_no_draft_is_not_found(http: httpx.Client) -> None:
+def test_a_graph_that_is_no_draft_is_not_found(http: httpx.Client) -> None:
     graph = _imported(http)
     assert http.get(f"/api/drafts/{graph}").status_code == 404
     assert http.post(f"/api/drafts/{graph}/preview", json={}).status_code == 404

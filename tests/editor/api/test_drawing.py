@@ -76,7 +76,7 @@ def test_a_rehearsal_without_end_is_cut(editor: Editor) -> None:
         assert len(played["trace"]) == 4_000
 
 
-def test_what_cannot_be_rehearsed_says_why(editor: Editor) -> None:
+def test_a_refused_rehearsal_says_why(editor: Editor) -> None:
     with editor.client() as http:
         graph = imported(http)
         path = f"/api/graphs/{graph['id']}/rehearsal"
@@ -89,7 +89,7 @@ def test_what_cannot_be_rehearsed_says_why(editor: Editor) -> None:
         assert_problem(http.post("/api/graphs/nowhere/rehearsal", json={}), 404)
 
 
-def test_what_the_engine_refuses_is_not_played(editor: Editor) -> None:
+def test_a_graph_that_the_engine_refuses_is_not_played(editor: Editor) -> None:
     ghost = json.loads(json.dumps(NAV))
     ghost["graph_entry"] = [{"name": "Nobody", "instance_id": 0}]
     with editor.client() as http:

@@ -85,7 +85,7 @@ def test_the_values_of_a_field_are_told_newest_first(http: httpx.Client) -> None
     assert (value["value"], value["before"], value["seq"]) == ("to the dock", None, 2)
 
 
-def test_what_was_done_is_taken_back_and_history_says_so(http: httpx.Client) -> None:
+def test_a_sitting_is_taken_back_and_the_history_says_so(http: httpx.Client) -> None:
     graph = _imported(http)
     http.patch(f"/api/graphs/{graph}", json={"name": "later"})
     edits = {"author": "local", "from_seq": 2, "seq": 2}

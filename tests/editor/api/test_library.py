@@ -101,7 +101,7 @@ def test_each_file_is_told_the_way_where_it_belongs(http: httpx.Client, name: st
 
 
 @pytest.mark.parametrize("body", [b"", b"{", b"[]", b'"x"', b"\xff", b"{}", b'{"name": 5}'])
-def test_what_is_no_action_is_refused_with_a_reason(http: httpx.Client, body: bytes) -> None:
+def test_a_file_that_is_no_action_is_refused_with_a_reason(http: httpx.Client, body: bytes) -> None:
     refused = http.post("/api/actions", content=body)
     assert refused.status_code in {400, 422}, refused.text
     assert refused.json()["detail"]
@@ -123,9 +123,7 @@ def test_a_second_action_of_one_name_is_refused_and_names_the_first(
     assert {first, second} <= set(both)
 
 
-def test_what_graphs_know_of_an_action_can_be_taken_into_the_library(
-    http: httpx.Client, name: str
-) -> None:
+def test_an_action_of_a_graph_can_be_taken_into_the_library(http: httpx.Client, name: str) -> None:
     graph(http, "one", action(name, at=leaf("string", pvf_value="door")))
     graph(http, "two", action(name, at=leaf("string"), long=leaf("number", pvf_value=3)))
     made = http.post("/api/actions", json={"name": name, "from_graphs": True})
@@ -259,7 +257,7 @@ def test_an_action_can_be_made_what_a_file_says_and_back(http: httpx.Client, nam
     assert http.put(f"/api/actions/{document}/umrf", content=b"{").status_code == 400
 
 
-def test_what_a_file_would_change_is_told_and_nothing_is_stored(
+def test_a_preview_of_a_file_lists_its_changes_and_stores_nothing(
     http: httpx.Client, name: str
 ) -> None:
     document = brought(http, action(name, **TAKES))

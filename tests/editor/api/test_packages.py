@@ -61,7 +61,7 @@ def test_a_graph_tells_its_packages_and_why_some_actions_have_none(
     assert found["seq"] == 1
 
 
-def test_what_is_shown_of_a_package_is_what_the_command_writes(
+def test_the_shown_files_of_a_package_are_those_that_the_command_writes(
     http: httpx.Client, kitchen: str
 ) -> None:
     shown = http.get(f"/api/graphs/{kitchen}/packages/open_lid").json()

@@ -99,7 +99,7 @@ async def test_a_message_in_pieces_is_one(either: Editor) -> None:
     ("first", "payload", "code"),
     [(0x81, b"text", 1003), (0x81, b"\xff", 1007), (0x82, b"", 1007), (0xC2, b"packed", 1002)],
 )
-async def test_what_cannot_be_read_is_answered_with_the_code(
+async def test_an_unreadable_message_closes_the_socket_with_its_code(
     either: Editor, first: int, payload: bytes, code: int
 ) -> None:
     raw = upgraded(either, new_graph(either))

@@ -76,7 +76,7 @@ async def test_stock_clients_converge(editor: Editor, http: httpx.Client, graph:
     assert (view["name"], view["description"], view["seq"]) == ("renamed by one", "by two", 3)
 
 
-async def test_what_a_program_does_over_http_reaches_those_in_the_room(
+async def test_an_edit_over_http_reaches_the_people_in_the_room(
     editor: Editor, http: httpx.Client, graph: str
 ) -> None:
     doc: Doc[Any] = Doc()
@@ -168,7 +168,7 @@ async def test_a_forbidden_client_is_refused_before_the_upgrade(
         (wire.change(bytes(wire.UPDATE_LIMIT + 1)), wire.TOO_BIG),
     ],
 )
-async def test_what_is_not_our_protocol_ends_the_socket(
+async def test_a_message_outside_the_protocol_ends_the_socket(
     editor: Editor, http: httpx.Client, graph: str, frame: str | bytes, code: int
 ) -> None:
     async with editor.socket(graph) as session:

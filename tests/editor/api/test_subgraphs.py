@@ -267,7 +267,7 @@ def test_one_of_several_people_who_make_a_graph_of_one_name_at_once_succeeds(
         assert sorted(people.map(make, tasks)) == [201, 409, 409, 409]
 
 
-def test_what_is_no_sub_graph_or_has_a_name_twice_is_refused(client: httpx.Client) -> None:
+def test_an_impossible_selection_or_a_used_name_is_refused(client: httpx.Client) -> None:
     made(client, "Inner", "Step")
     outer = client.post("/api/graphs", json=line("Task", "A", "B", "C")).json()["id"]
     known = keys(client, outer)

@@ -71,7 +71,7 @@ def admitted_by_runner(version: dict[str, Any]) -> Admitted:
 
 
 @pytest.mark.parametrize("beyond", [False, True])
-def test_what_is_published_is_what_the_runner_takes_for_its_size(
+def test_the_editor_publishes_exactly_the_sizes_that_the_runner_starts(
     http: httpx.Client, beyond: bool
 ) -> None:
     characters = 100_000 + MOST_BYTES if beyond else MOST_BYTES - 100_000

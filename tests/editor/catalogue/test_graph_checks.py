@@ -83,7 +83,7 @@ async def told(services: EditorServices, graph: str) -> tuple[int, int]:
     return counts.error, counts.warning
 
 
-async def test_what_is_wrong_with_a_graph_follows_the_graph_inside_of_it(tmp_path: Path) -> None:
+async def test_problems_of_a_graph_follow_edits_of_its_sub_graph(tmp_path: Path) -> None:
     async with editor(tmp_path) as services:
         outer = await made(services, "Outer", "Inner")
         assert (await codes(services, outer), await told(services, outer)) == ([], (0, 0))
@@ -280,7 +280,7 @@ async def raced(seed: int) -> None:
 
 @settings(max_examples=examples(20), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(st.integers(0, 10_000))
-def test_what_is_remembered_is_what_is_so_after_any_steps(seed: int) -> None:
+def test_cached_checks_are_right_after_any_steps(seed: int) -> None:
     asyncio.run(raced(seed))
 
 

@@ -43,7 +43,7 @@ def counts(view: dict[str, Any]) -> tuple[int, int]:
     return view["wrong"], view["to_fill_in"]
 
 
-def test_what_is_wrong_is_counted_apart_from_what_is_to_fill_in(http: httpx.Client) -> None:
+def test_faults_and_missing_values_are_counted_apart(http: httpx.Client) -> None:
     point = {"at": {axis: {"pvf_type": "number"} for axis in "xyz"}}
     first, *others = NAV["actions"]
     made = http.post(

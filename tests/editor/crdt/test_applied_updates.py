@@ -29,7 +29,7 @@ def test_an_item_does_not_go_on_from_what_was_collected() -> None:
     assert replica.doc.get_update() == before
 
 
-def test_what_is_known_may_come_again_with_what_follows() -> None:
+def test_a_known_update_may_come_again_with_later_edits() -> None:
     replica = Replica()
     replica.take(update(structs(7, 0, COLLECTED)), "eve")
     again = update(structs(7, 0, COLLECTED, WORD))

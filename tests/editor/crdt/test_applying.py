@@ -72,7 +72,7 @@ def test_many_together_are_one_transaction_as_with_the_library(
 
 
 @pytest.mark.parametrize("broken", [b"", b"\x01", b"\x01\x01\xff", b"\x00\x01\x05"])
-def test_what_cannot_be_read_is_told_and_the_document_goes_on(broken: bytes) -> None:
+def test_an_unreadable_update_is_refused_and_the_document_goes_on(broken: bytes) -> None:
     doc, _ = watched()
     (update,) = updates([("a", "1")])
     with pytest.raises(Malformed), applying():

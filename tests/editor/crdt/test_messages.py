@@ -71,13 +71,15 @@ one_word = st.builds(
 
 
 @given(one_word | data.map(lambda content: b"\x01" + content), st.binary(max_size=3))
-def test_what_one_client_says_is_read_quickly_and_just_the_same(cut: bytes, more: bytes) -> None:
+def test_the_short_way_reads_one_presence_entry_as_the_long_way_does(
+    cut: bytes, more: bytes
+) -> None:
     quick = wire._one_entry(cut + more) if cut else None
     if quick is not None:
         assert (quick,) == tuple(wire._entries(ByteReader(cut[1:] + more).text()))
 
 
-def test_what_one_client_says_is_read_quickly() -> None:
+def test_one_presence_entry_is_read_by_the_short_way() -> None:
     said = PresenceEntry(2**32 - 1, 300, b'{"cursor":[1,2]}')
     assert wire._one_entry(wire.presence([said])) == said
 

@@ -54,7 +54,7 @@ def test_a_value_that_is_written_again_and_again_makes_no_doubt() -> None:
     assert asked < 100
 
 
-def test_what_came_while_an_older_measurement_went_on_stays_counted() -> None:
+def test_updates_that_came_during_an_older_measurement_stay_counted() -> None:
     """A newer one was faster: the older one tells nothing of what came after it."""
     opening = OpeningTime()
     opening.took(2_000)

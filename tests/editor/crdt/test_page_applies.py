@@ -151,7 +151,7 @@ def given_out(replica: Replica) -> Case:
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_fails_in_a_page_is_refused(name: str) -> None:
+def test_updates_that_fail_in_a_page_are_refused(name: str) -> None:
     update = REFUSED[name]
     assert small_outline(update) is None
     with pytest.raises(Malformed):
@@ -243,5 +243,5 @@ def test_a_page_applies_whatever_a_room_takes() -> None:
 
 
 @pytest.mark.parametrize("name", POISONS)
-def test_what_rooms_took_before_is_read_all_the_same(name: str) -> None:
+def test_updates_that_rooms_stored_before_are_still_read(name: str) -> None:
     assert stored_outline(POISONS[name]).structs == POISONS[name][1] * (POISONS[name][0] != 0)

@@ -125,7 +125,7 @@ def test_a_text_is_not_begun_within_a_character() -> None:
         replica.take(written("😀"), "eve")
 
 
-def test_what_waited_is_looked_at_when_it_comes() -> None:
+def test_a_waiting_update_is_checked_when_it_is_released() -> None:
     replica = Replica()
     assert replica.take(deleted(1, 1), "eve") is UpdateEffect.WAITS
     assert replica.take(written("x😀y"), "ada") is UpdateEffect.NEWS
@@ -153,7 +153,7 @@ def test_the_memory_for_paired_texts_is_bounded() -> None:
     assert replica.take(written("plain", clock=clock), "eve") is UpdateEffect.NEWS
 
 
-def test_what_people_write_in_texts_is_taken() -> None:
+def test_honest_edits_of_texts_are_accepted() -> None:
     doc, replica = Doc[Any](), Replica()
     words = doc.get("text", type=Text)
     subscription = doc.observe(lambda event: replica.take(event.update, "ada"))

@@ -77,7 +77,7 @@ def test_a_large_graph_is_within_the_bounds() -> None:
 
 
 @given(st.integers(0, 5), st.integers(0, 5))
-def test_what_lacks_something_before_it_is_not_ready(first: int, second: int) -> None:
+def test_an_update_that_lacks_an_earlier_one_is_not_ready(first: int, second: int) -> None:
     doc: Doc[Any] = Doc()
     things = doc.get("things", type=Map)
 
@@ -134,7 +134,7 @@ def test_counts_that_the_bytes_cannot_hold_are_refused(update: bytes) -> None:
         outline(update)
 
 
-def test_what_the_scanner_passes_never_makes_the_library_do_worse_than_refuse() -> None:
+def test_an_accepted_update_never_makes_the_library_do_worse_than_refuse() -> None:
     doc: Doc[Any] = Doc()
     things, text = doc.get("things", type=Map), doc.get("text", type=Text)
 

@@ -100,7 +100,7 @@ def drags() -> list[bytes]:
     return made(doc, edit)
 
 
-def test_what_people_do_takes_the_short_cut() -> None:
+def test_edits_of_people_take_the_short_cut() -> None:
     for update in drags():
         assert small_outline(update) == scanned(update) == outline(update)
 

@@ -88,7 +88,7 @@ def held(loaded: Loaded) -> tuple[Any, ...]:
 
 
 @pytest.mark.parametrize("change", CHANGES.values(), ids=CHANGES)
-async def test_whatever_became_of_the_snapshot_the_document_is_the_same(
+async def test_the_document_is_the_same_with_any_or_no_snapshot(
     change: Change, tmp_path: Path
 ) -> None:
     path = tmp_path / "editor.db"
@@ -122,7 +122,7 @@ def later_edits(count: int) -> list[bytes]:
     return made
 
 
-async def test_what_waits_for_ever_does_not_stop_snapshots(tmp_path: Path) -> None:
+async def test_an_update_that_waits_for_ever_does_not_stop_snapshots(tmp_path: Path) -> None:
     first, second, third = later_edits(3)
     path = f"sqlite:///{tmp_path / 'editor.db'}"
     journal = await Journal.open(path, branch="editor", fold=nothing)

@@ -154,7 +154,7 @@ def test_a_document_knows_the_same(seed: int, nested: bool, late: bool, spoilt: 
             assert known(fold_sound(begun.document, later)) == known(whole)
 
 
-def test_what_lacks_something_is_read_as_a_whole() -> None:
+def test_an_update_that_lacks_an_earlier_one_is_read_as_a_whole() -> None:
     updates = [forged_updates.entry(1, clock, f"a{clock}", "b") for clock in range(3)]
     rows = [(UPDATED, "ada", updates[0]), (UPDATED, "ada", updates[2])]  # as no room tells it
     found = known(fold_sound(b"", columns(rows)))
@@ -172,7 +172,7 @@ def test_what_lacks_something_is_read_as_a_whole() -> None:
         (True, forged_updates.nested_types(2).replace(b"\x27\x00\x07\x00", b"\x27\x80\x80\x00\x07\x00")),
     ],
 )  # fmt: skip
-def test_what_lies_deep_is_noticed_however_it_is_written(deep: bool, update: bytes) -> None:
+def test_nested_values_are_noticed_however_they_are_written(deep: bool, update: bytes) -> None:
     assert lies_deep([b"\0\0", update]) == deep
 
 
@@ -242,7 +242,7 @@ async def test_a_long_log_reads_the_same_in_one_piece_or_in_many(
 @pytest.mark.parametrize(
     "change", ["at = at + 1", "at = 'then'", "author = x'616461'", "body = 'text'"]
 )
-async def test_what_is_not_as_it_was_written_ends_a_long_log_there(
+async def test_a_long_log_ends_at_the_first_changed_event(
     tmp_path: Path, seq: int, change: str
 ) -> None:
     url = f"sqlite:///{tmp_path / 'editor.db'}"

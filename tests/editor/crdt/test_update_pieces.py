@@ -81,7 +81,9 @@ def check_pieces(whole: bytes, size: int) -> int:
 @settings(deadline=None)
 @given(st.integers(0, 2**32), st.integers(1, 120), st.integers(1, 200))
 @example(1, 120, 1)
-def test_what_several_people_wrote_is_the_same_in_pieces(seed: int, steps: int, size: int) -> None:
+def test_a_document_of_several_people_is_the_same_in_pieces(
+    seed: int, steps: int, size: int
+) -> None:
     check_pieces(written(seed, steps), size)
 
 

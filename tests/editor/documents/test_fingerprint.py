@@ -38,7 +38,9 @@ def test_the_fingerprint_is_what_the_page_makes() -> None:
         {},
     ],
 )
-def test_what_differs_has_another_fingerprint(other: dict[str, dict[str, object]]) -> None:
+def test_different_documents_have_different_fingerprints(
+    other: dict[str, dict[str, object]],
+) -> None:
     assert fingerprint(other) != fingerprint({"meta": {"name": "a"}})
 
 

@@ -189,7 +189,7 @@ async def test_the_index_follows_the_log_without_any_question(
             assert found[False] < 5000
 
 
-async def test_what_is_being_edited_is_left_until_it_rests(
+async def test_a_graph_under_edit_is_indexed_once_it_rests(
     journal: Journal, rooms: Rooms, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Unless there is too much of it; whoever asks has it at once."""

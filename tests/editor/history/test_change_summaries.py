@@ -33,7 +33,7 @@ def _touched(changes: list[LoggedChange]) -> set[str]:
 
 
 @pytest.mark.parametrize("seed", range(examples(12) // 2))
-async def test_what_one_person_did_alone_is_the_difference_of_the_whole_graphs(
+async def test_the_summary_of_a_lone_editor_is_the_difference_of_the_whole_graphs(
     journal: Journal, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("editor.history.random_edits.PEOPLE", PEOPLE[:1])

@@ -132,7 +132,7 @@ def test_every_change_of_the_course_is_named() -> None:
     assert (found.exact, found.same) == (True, False)
 
 
-def test_what_changed_and_changed_back_is_no_other_course() -> None:
+def test_a_course_that_changed_and_changed_back_is_the_same_course() -> None:
     past = Past()
     past.answer("ignore", 2)
     past.answer("run", 2)

@@ -76,7 +76,9 @@ def _overwritten(events: list[Event], step: int = 1000) -> list[tuple[Any, ...]]
 
 
 @pytest.mark.parametrize("step", [1, 1000])
-def test_what_came_back_and_lost_is_found_with_its_author_and_what_stands(step: int) -> None:
+def test_a_value_that_returned_and_lost_is_found_with_its_author_and_the_value_that_stands(
+    step: int,
+) -> None:
     ada, mari = Page("ada", 1), Page("mari", 2)
     ada.set("meta", "description", "before")
     mari.hear(*ada.made)

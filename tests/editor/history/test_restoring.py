@@ -48,7 +48,7 @@ async def test_a_graph_goes_back_and_taking_that_back_leaves_no_trace(
 
 
 @pytest.mark.parametrize("seed", range(examples(12) // 2))
-async def test_what_the_last_one_did_goes_as_if_it_had_never_been(
+async def test_taking_back_the_last_sitting_leaves_no_trace(
     going_back: Restoring, rooms: Rooms, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("editor.history.random_edits.PEOPLE", PEOPLE[:1])
@@ -97,7 +97,9 @@ async def _edit(rooms: Rooms, who: str, root: str, **values: object) -> int:
         return await room.submit(difference(state, edit), who)
 
 
-async def test_what_others_built_on_stays_and_is_named(going_back: Restoring, rooms: Rooms) -> None:
+async def test_things_that_others_built_on_stay_and_are_named(
+    going_back: Restoring, rooms: Rooms
+) -> None:
     dock, charge, lift = "Dock" * 3, "Char" * 3, "Lift" * 3
     await _edit(rooms, "ada", "meta", name="g")
     first = await _edit(rooms, "mari", "actions", **{dock: "Dock", charge: "Charge", lift: "Lift"})
@@ -109,7 +111,7 @@ async def test_what_others_built_on_stays_and_is_named(going_back: Restoring, ro
     assert now["actions"] == {dock: "Dock", f"{dock}|in/speed": '{"pvf_value":2}'}
 
 
-async def test_what_an_arrow_of_others_leads_to_stays(going_back: Restoring, rooms: Rooms) -> None:
+async def test_an_action_with_an_arrow_of_others_stays(going_back: Restoring, rooms: Rooms) -> None:
     dock, charge = "Dock" * 3, "Char" * 3
     await _edit(rooms, "ada", "actions", **{dock: "Dock"})
     seq = await _edit(rooms, "mari", "actions", **{charge: "Charge"})

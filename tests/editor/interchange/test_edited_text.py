@@ -46,7 +46,7 @@ def test_a_text_that_was_not_edited_changes_nothing(graph: Graph) -> None:
 
 
 @given(graphs(), graphs())
-def test_whatever_the_text_becomes_the_graph_says_it_afterwards(old: Graph, new: Graph) -> None:
+def test_the_graph_equals_the_edited_text_afterwards(old: Graph, new: Graph) -> None:
     moment = moment_of(old)
     wanted = codec.write(moment_of(new).graph)
     assert codec.write(applied(moment.maps, text_edit(moment, wanted.encode()))) == wanted
@@ -130,7 +130,7 @@ def test_an_unknown_field_is_kept_and_can_be_edited() -> None:
         ('"graph_exit": [', '"graph_exit": [5, ', "/graph_exit/0"),
     ],
 )
-def test_what_an_import_would_mend_or_leave_out_is_refused(
+def test_text_that_an_import_would_mend_or_leave_out_is_refused(
     old: str, new: str, path: str | None
 ) -> None:
     moment, _ = nav()

@@ -58,7 +58,7 @@ async def test_an_action_of_two_graphs_is_known_once(settings: EditorSettings) -
         assert [each.path for each in go.outputs] == ["place/x"]
 
 
-async def test_what_a_graph_does_not_use_any_more_is_not_known_any_more(
+async def test_an_action_that_no_graph_uses_any_more_is_not_listed(
     settings: EditorSettings,
 ) -> None:
     async with open_services(settings) as services:

@@ -81,7 +81,7 @@ def test_a_folder_without_graphs_takes_any_database(tmp_path: Path, postgres: Se
     database_location.check(tmp_path, postgres.new_database(), switch=False)
 
 
-def test_what_an_older_version_did_not_write_down_is_asked_for(
+def test_a_database_that_an_older_version_did_not_record_is_asked_for(
     tmp_path: Path, postgres: Server
 ) -> None:
     url = postgres.new_database()
@@ -97,7 +97,7 @@ def test_what_an_older_version_did_not_write_down_is_asked_for(
     database_location.check(tmp_path / "data", url, switch=False)
 
 
-def test_what_the_folder_remembers_is_no_secret(tmp_path: Path) -> None:
+def test_the_folder_keeps_no_password(tmp_path: Path) -> None:
     url = "postgresql://ann:secret@db:5433/graphs?ssl=require&sslpassword=hidden"
     database_location.remember(tmp_path, url)
     kept = (tmp_path / database_location.FILE).read_text()

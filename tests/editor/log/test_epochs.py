@@ -44,7 +44,7 @@ async def test_a_client_that_knows_another_one_is_sent_away(
 
 
 @pytest.mark.parametrize("query", ["seq=x", "seq=-1", "seq=" + "9" * 30, "seq=", "seq=٣"])
-async def test_what_is_no_number_says_nothing(editor: Editor, graph: str, query: str) -> None:
+async def test_a_seq_that_is_no_number_is_ignored(editor: Editor, graph: str, query: str) -> None:
     _, code = await entered(editor, graph, f"acks=1&lives&{query}")
     assert code is None
 

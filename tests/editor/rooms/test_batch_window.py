@@ -8,7 +8,7 @@ import pytest
 from action_assistant.editor.rooms.batch_window import BatchWindow, TurnEnd
 
 
-async def test_what_comes_at_the_same_time_is_done_in_one_window() -> None:
+async def test_edits_that_come_together_are_handled_in_one_window() -> None:
     window, done, both = BatchWindow(), list[str](), asyncio.Event()
     window.when_open(lambda: done.append("a"))
     await asyncio.sleep(0)

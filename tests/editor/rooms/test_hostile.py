@@ -150,7 +150,7 @@ async def test_viewers_change_nothing_and_are_not_asked(rooms: Rooms) -> None:
         assert room.seq == 1
 
 
-async def test_whatever_two_bytes_a_viewer_begins_with_nothing_changes(rooms: Rooms) -> None:
+async def test_no_two_first_bytes_of_a_viewer_change_anything(rooms: Rooms) -> None:
     ada = Client("ada")
     async with rooms.enter(STREAM) as room:
         ada.join(room)
@@ -222,7 +222,7 @@ def test_ordinary_nesting_is_taken() -> None:
         assert replica.doc.get("things", type=Map).to_py() == things.to_py()
 
 
-async def test_what_never_comes_is_not_waited_for_without_end(rooms: Rooms) -> None:
+async def test_waiting_updates_of_a_person_are_bounded(rooms: Rooms) -> None:
     eve, ada = Client("eve"), Client("ada")
     async with rooms.enter(STREAM) as room:
         eve.join(room)

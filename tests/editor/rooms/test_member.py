@@ -42,7 +42,7 @@ async def test_an_acknowledgement_never_overtakes_what_waits() -> None:
     assert member.gather() == [messages.BEAT, messages.change(b"\x00\x00"), messages.acks(0, 7)]
 
 
-async def test_what_could_not_be_written_is_not_taken_for_said() -> None:
+async def test_news_that_could_not_be_written_is_sent_later() -> None:
     member, _ = writing()
     member.write_now = lambda _: False
     assert not member.send_now(NEWS, 7)

@@ -88,7 +88,7 @@ def test_a_client_that_removes_its_entry_is_gone_and_may_come_back() -> None:
     assert len(room.update(ada, (entry(1, 3),))) == 1
 
 
-def test_what_is_no_state_is_not_passed_on() -> None:
+def test_an_entry_that_is_no_state_is_not_passed_on() -> None:
     room = RoomPresence()
     wrong = [b"", b"5", b"[]", b"{", b'{"a": ' + b"[" * 5000, b"\xff", b'"x"']
     wrong.append(json.dumps({"a": "x" * STATE_LIMIT}).encode())
@@ -98,7 +98,7 @@ def test_what_is_no_state_is_not_passed_on() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 5), st.booleans()), max_size=40))
-def test_whatever_is_said_entries_belong_to_seats_that_said_them(
+def test_entries_belong_to_the_sockets_that_sent_them(
     words: list[tuple[int, int, bool]],
 ) -> None:
     room = RoomPresence()
@@ -197,7 +197,7 @@ def test_numbers_that_a_page_cannot_read_are_not_passed_on() -> None:
         b'{"a":' + b"[" * 10_000 + b"]" * 10_000 + b"}",
     ],
 )
-def test_what_a_page_could_not_read_as_json_is_not_passed_on(state: bytes) -> None:
+def test_an_entry_that_a_page_cannot_read_as_json_is_not_passed_on(state: bytes) -> None:
     room = RoomPresence()
     assert room.update(owner("eve"), (PresenceEntry(1, 1, state),)) == []
     assert room.everyone() == ()

@@ -13,7 +13,7 @@ from action_assistant.journal.journal import Journal
 from editor.client import STREAM, Client, bodies, settle, updates
 
 
-async def test_what_is_no_update_ends_its_sender_and_nobody_else(
+async def test_a_malformed_update_closes_its_sender_and_nobody_else(
     journal: Journal, rooms: Rooms
 ) -> None:
     ada, eve = Client("ada"), Client("eve")

@@ -28,7 +28,7 @@ def test_the_state_of_a_folder_without_backups_is_empty(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", [b"{", b'{"failed":{"at":1,"why":"\xff"}}', b'{"x":' + b"[" * 99_999]
 )
-def test_what_cannot_be_read_is_not_the_same_as_nothing(tmp_path: Path, text: bytes) -> None:
+def test_an_unreadable_state_is_not_an_empty_one(tmp_path: Path, text: bytes) -> None:
     (tmp_path / known.FILE).write_bytes(text)
     assert backup_state(tmp_path) is None
     known.made(tmp_path, MONDAY)

@@ -87,7 +87,7 @@ async def test_a_copy_has_every_event_and_every_row(ways: tuple[str, str]) -> No
     assert before[1] == after[1]
 
 
-async def test_what_is_written_meanwhile_is_in_the_copy_wholly_or_not_at_all(
+async def test_each_concurrent_transaction_is_in_the_copy_wholly_or_not_at_all(
     ways: tuple[str, str],
 ) -> None:
     source, target = ways

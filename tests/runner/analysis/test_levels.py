@@ -104,7 +104,7 @@ CALLS = st.lists(CALL, max_size=4).map(tuple)
 
 @settings(suppress_health_check=[HealthCheck.too_slow, HealthCheck.filter_too_much])
 @given(renamed(), st.dictionaries(st.sampled_from([*HOSTILE, "*"]), CALLS, max_size=3))
-def test_whatever_runs_inside_is_placed_where_it_runs(
+def test_actions_of_sub_graphs_are_placed_where_they_run(
     drawn: Hierarchy, calls: dict[str, tuple[Behaviour, ...]]
 ) -> None:
     engine = Watched(Script({k: v for k, v in calls.items() if v}), drawn.graphs)

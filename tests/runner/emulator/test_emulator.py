@@ -227,7 +227,7 @@ def test_refusals_are_known_to_the_log_only(message: Start, words: str) -> None:
         assert asked(david, 3000) == {}
 
 
-def test_what_it_shows_is_what_the_engine_gives_back_and_carries_the_identity_of_the_run() -> None:
+def test_the_shown_graph_is_the_echo_of_the_engine_and_carries_the_identity_of_the_run() -> None:
     sent = sequence("patrol")
     for drops in (True, False):
         david = robot(
@@ -342,7 +342,7 @@ def test_a_pause_that_an_action_does_not_handle_locks_it_for_ever() -> None:
     assert david.moving == ("patrol",)
 
 
-def test_what_it_indexes_later_can_be_inside_of_what_is_started_later() -> None:
+def test_a_graph_indexed_later_can_be_inside_of_a_graph_started_later() -> None:
     whole = json.loads(codec.write(sequence("tour", 1)))
     text = json.dumps(whole).replace("Work", "leg")
     david = robot(index=index_of([WORK], []))

@@ -167,7 +167,9 @@ def test_a_restart_builds_nothing_if_the_sub_graph_comes_first_in_the_file() -> 
         (PLAIN, chain("g", "Work_0", "BadLib_0"), False),
     ],
 )
-def test_what_a_name_that_is_held_survives(first: str, second: str, lives: bool) -> None:
+def test_a_second_start_of_a_held_name_ends_as_on_the_real_node(
+    first: str, second: str, lives: bool
+) -> None:
     life = Life().start(first).start(second)
     assert life.alive == lives
     assert life.lines == (FINISHED if lives else ["map::at"])
@@ -194,7 +196,7 @@ def test_a_graph_that_is_started_by_name_is_looked_up_each_time_but_not_by_its_t
         ),
     ],
 )  # fmt: skip
-def test_what_a_first_start_survives(text: str, lives: bool, lines: list[str]) -> None:
+def test_a_first_start_ends_as_on_the_real_node(text: str, lives: bool, lines: list[str]) -> None:
     life = Life().start(text)
     assert (life.alive, life.lines) == (lives, lines)
 

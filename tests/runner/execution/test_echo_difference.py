@@ -9,7 +9,7 @@ from action_assistant.umrf.model import Parameter
 from runner.harness import sequence
 
 
-def test_what_differs_is_told_and_nothing_else() -> None:
+def test_only_real_differences_are_named() -> None:
     sent = sequence()
     first, *others = sent.actions
     assert difference(sent, codec.write(sent)) == ""

@@ -239,7 +239,7 @@ async def test_a_run_that_cannot_be_summed_up_is_left_out_and_the_next_one_is_no
 
 
 @virtual
-async def test_what_an_answer_shows_is_told_even_if_a_fault_ends_the_conclusions(
+async def test_an_answers_states_are_shown_even_if_a_fault_ends_the_conclusions(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def fails(*_: object) -> None:

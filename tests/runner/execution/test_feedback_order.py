@@ -75,7 +75,7 @@ def test_however_batches_and_an_answer_cross_every_action_has_one_visit(
     assert all(len(action.visits) <= 1 for action in run.actions.values())
 
 
-def test_what_goes_on_after_the_answer_is_news() -> None:
+def test_feedback_of_later_changes_than_the_answer_counts() -> None:
     told, run = history(), begun()
     run = follow(run, Observed(5, (told[2],)))
     assert newer_than_answers(run, told[:4]) == (told[3],)

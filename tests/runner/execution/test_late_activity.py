@@ -274,7 +274,7 @@ async def test_a_second_name_of_which_nothing_can_be_read_holds_nothing_up() -> 
 
 
 @virtual
-async def test_what_another_robot_shows_takes_no_end_back_that_is_not_recorded_yet() -> None:
+async def test_another_robots_graph_takes_back_no_end_that_is_not_recorded_yet() -> None:
     david, eve = Open(NEVER), Open(NEVER)
     harness = Harness()
     async with fleet(harness, David=david, Eve=eve) as control:

@@ -41,7 +41,7 @@ async def test_a_simulated_run_goes_through_its_actions_to_the_end() -> None:
 
 
 @virtual
-async def test_what_was_shown_last_is_what_the_history_tells() -> None:
+async def test_the_last_shown_state_is_that_of_the_history() -> None:
     harness = Harness()
     async with harness.runner() as control:
         started = await control.start(order(sequence(), script={"Work_1": [{"never": True}]}), ANN)
@@ -188,7 +188,7 @@ async def test_a_robot_nobody_knows_and_one_without_a_link_are_refused() -> None
 
 
 @virtual
-async def test_what_the_engine_refuses_is_told_as_refused() -> None:
+async def test_a_start_that_the_engine_refuses_is_shown_as_refused() -> None:
     class Contested(Robot):
         async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
             """Start after a stranger's graph has started."""

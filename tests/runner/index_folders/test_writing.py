@@ -294,7 +294,7 @@ def shown(folder: Path) -> dict[str, bytes | str]:
     files=st.dictionaries(paths, contents, max_size=6), link=st.booleans(), replaces=st.booleans()
 )
 @settings(max_examples=examples(60), deadline=None)
-def test_whatever_stands_there_others_keep_every_byte(
+def test_foreign_files_in_the_folder_keep_every_byte(
     files: dict[str, bytes], link: bool, replaces: bool
 ) -> None:
     above = Path(tempfile.mkdtemp())
@@ -334,9 +334,7 @@ def test_whatever_stands_there_others_keep_every_byte(
 
 @given(st.text(max_size=300), st.integers(1, 50))
 @settings(max_examples=examples(300), deadline=None)
-def test_whatever_a_graph_is_called_its_file_is_one_of_a_graph_and_of_nothing_else(
-    name: str, number: int
-) -> None:
+def test_any_graph_name_gives_a_plain_file_name_of_a_graph(name: str, number: int) -> None:
     file = graph_file_name(name, number)
     assert file.isascii()
     assert not set(file) & set("/\\\0%:\n ")

@@ -109,7 +109,7 @@ async def test_the_incarnation_names_one_life_of_one_engine() -> None:
 
 
 @virtual
-async def test_what_came_before_an_answer_is_heard_before_it() -> None:
+async def test_reports_from_before_an_answer_are_heard_before_it() -> None:
     heard: list[Report] = []
     async with alive(engine({"*": [{"after_s": 0.1}]})) as link:
         with link.listen(heard.append):

@@ -31,7 +31,7 @@ def test_a_graph_is_ours_only_if_every_action_carries_the_same_run() -> None:
     assert run() is None
 
 
-def test_what_others_keep_beside_a_node_hinders_nothing() -> None:
+def test_foreign_fields_beside_a_node_are_ignored() -> None:
     odd = node(gui_attributes="theirs", runtime={"messages": 5})
     found = snapshot(
         text(odd, node(number=1, runtime={"messages": ["a", "b"]})), at=1, source="get"
@@ -66,7 +66,7 @@ def test_values_are_those_of_actions_that_move() -> None:
         '{"graph_name": "\ud800"}',
     ],
 )
-def test_what_cannot_prove_anything_is_refused(hostile: str) -> None:
+def test_texts_that_prove_nothing_are_refused(hostile: str) -> None:
     with pytest.raises(NotAGraph):
         snapshot(hostile, at=1, source="get")
 

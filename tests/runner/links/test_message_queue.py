@@ -9,7 +9,7 @@ def command(graph: str) -> OverheardCommand:
     return OverheardCommand(command="stop", graph=graph, umrf="", targets=("David",), sender="")
 
 
-def test_what_comes_is_taken_in_order_and_only_the_first_needs_somebody_to_take_it() -> None:
+def test_messages_are_taken_in_order_and_only_the_first_wakes_the_reader() -> None:
     queue = MessageQueue()
     values: list[RosValue] = [LogLine("a", "1"), command("x"), LogLine("a", "2"), command("y")]
     assert [queue.add(each) for each in values] == [True, False, False, False]

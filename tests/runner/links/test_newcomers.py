@@ -55,7 +55,7 @@ def test_a_node_that_came_back_is_another_one() -> None:
     assert seen.at(12, echo) == ("_ros2cli_17",)
 
 
-def test_what_serves_another_path_publishes_starts_or_hears_feedback_is_something_else() -> None:
+def test_a_node_that_serves_another_path_publishes_starts_or_hears_feedback_is_no_engine() -> None:
     seen = Seen("two")
     assert seen.at(0, end("one"), end("two")) == ()
     seen.others = frozenset()  # it was shown once

@@ -320,7 +320,7 @@ async def test_feedback_that_says_how_a_graph_ended_takes_nothing_away() -> None
 
 
 @virtual
-async def test_what_an_engine_showed_that_stood_beside_it_for_a_moment_proves_nothing() -> None:
+async def test_states_shown_by_a_second_engine_for_a_moment_prove_nothing() -> None:
     """Both engines were told to start. Discovery shows the second one late, so its words looked
     like those of the only engine."""
     here = scene(12.0, {"*": [{"after_s": 1.0}]})

@@ -47,7 +47,7 @@ async def test_a_graph_that_one_look_did_not_show_is_looked_for_again() -> None:
 
 
 @virtual
-async def test_what_begins_again_by_itself_is_looked_at_for_longer() -> None:
+async def test_a_graph_that_begins_again_by_itself_is_observed_for_longer() -> None:
     for spontaneous, proven in (((), True), (("Work_0",), False)):
         over = Snapshot(
             at=0,

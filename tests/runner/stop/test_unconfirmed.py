@@ -159,7 +159,9 @@ async def test_an_action_that_had_thrown_by_itself_does_not_keep_a_confirmed_run
 
 
 @virtual
-async def test_what_a_stranger_s_graph_left_blocks_a_start_until_somebody_answers_for_it() -> None:
+async def test_a_strangers_disobedient_action_blocks_a_start_until_somebody_answers_for_it() -> (
+    None
+):
     scene = RobotsInNetwork(
         5, script=STUBBORN | {"patrol/Work_0": [{"after_s": 1}]}, quirks=EngineTraits(loss=0.0)
     )
@@ -229,7 +231,7 @@ async def test_an_action_that_threw_by_itself_is_over() -> None:
 
 
 @virtual
-async def test_what_answers_show_moving_cannot_be_confirmed_away() -> None:
+async def test_rest_cannot_be_confirmed_while_answers_show_movement() -> None:
     scene = RobotsInNetwork(5)
     async with scene.played() as control:
         run = (await control.start(asked(), ANN)).run.id

@@ -216,7 +216,7 @@ def test_a_cookie_without_an_origin_changes_nothing(client: httpx.Client, port: 
     assert client.post("/api/runs", json={"n": 1}, headers=own).text == "starting 1"
 
 
-def test_what_nobody_decided_about_is_for_owners(client: httpx.Client, port: int) -> None:
+def test_routes_without_a_declared_right_are_for_owners(client: httpx.Client, port: int) -> None:
     origin = {"origin": f"http://127.0.0.1:{port}"}
     for role, status in (("owner", 200), ("operator", 403), ("viewer", 403)):
         headers = {**cookie(port, expires=1e12, role=role), **origin}

@@ -245,7 +245,9 @@ def test_nobody_is_put_out_when_the_disk_is_gone(tmp_path: Path) -> None:
     assert not revoked.ended(other)
 
 
-def test_what_cannot_be_noted_fails_nothing_and_what_is_over_is_forgotten(tmp_path: Path) -> None:
+def test_a_session_that_cannot_be_noted_fails_nothing_and_ended_ones_are_forgotten(
+    tmp_path: Path,
+) -> None:
     revoked = Revocations(tmp_path)
     browsers = SessionFiles(tmp_path, revoked)
     lasting, over = KEYS.new_session("Ada"), Session("s" * 16, KEYS.new_session("Eve").person, 1.0)

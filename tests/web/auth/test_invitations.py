@@ -388,7 +388,7 @@ def test_an_address_is_forgiven_with_time_and_others_do_not_pay() -> None:
 
 
 @pytest.mark.parametrize("name", ["../token", "a/b", "", "x" * 41, "ü", "."])
-def test_what_is_no_id_marks_nothing(tmp_path: Path, name: str) -> None:
+def test_a_text_that_is_no_id_marks_nothing(tmp_path: Path, name: str) -> None:
     with pytest.raises(ValueError, match="no id"):
         Revocations(tmp_path).add(name)
     assert Revocations(tmp_path).holds(name)

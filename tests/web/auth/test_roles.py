@@ -127,7 +127,7 @@ def ask(client: httpx.Client, method: str, path: str, headers: dict[str, str]) -
         ("get", "/api/graphs", "see"),
     ],
 )
-def test_what_routes_were_decided_to_need(
+def test_routes_need_the_decided_rights(
     product: Product, method: str, path: str, permission: Permission
 ) -> None:
     found = [each for process in PROCESSES for each in operations(product, process)]

@@ -67,7 +67,7 @@ def test_without_its_slash_it_leads_there_below_whatever_path(folder: Path) -> N
     assert (status, headers["location"]) == (308, "help/")
 
 
-def test_what_is_not_there_is_said_with_a_way_back(folder: Path) -> None:
+def test_a_missing_page_says_so_with_a_way_back(folder: Path) -> None:
     status, headers, body = asked(HelpSite(_nobody, folder), "/help/api/nothing.html")
     assert status == 404
     assert 'href=".././"' in body

@@ -59,6 +59,6 @@ def test_a_browser_asks_each_time_whether_the_worker_is_another(page: Page) -> N
     assert "immutable" in asked(page, "/assets/index-abc.js")[1]["cache-control"]
 
 
-def test_what_the_build_notes_for_itself_is_not_served(page: Page) -> None:
+def test_the_manifest_of_the_build_is_not_served(page: Page) -> None:
     assert not page.knows("/.vite/manifest.json", accepts_html=False)
     assert asked(page, "/.vite/manifest.json")[0] == 404

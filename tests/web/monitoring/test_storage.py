@@ -20,7 +20,7 @@ async def until(seen: Callable[[], bool]) -> None:
     raise AssertionError("it was never so")
 
 
-async def test_whatever_goes_wrong_it_looks_again_and_shows_nothing_old(
+async def test_a_failed_check_is_repeated_and_shows_no_old_values(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     monkeypatch.setattr(storage, "_LOOK_S", 0.01)

@@ -75,7 +75,7 @@ def test_the_authority_signs_for_this_network_only(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damaged", ["ca.pem", "ca-key.pem", "server.pem"])
-def test_what_is_damaged_is_made_again(tmp_path: Path, damaged: str) -> None:
+def test_a_damaged_certificate_is_made_again(tmp_path: Path, damaged: str) -> None:
     certificate = Certificate(tmp_path)
     certificate.renew(NAMES)
     (tmp_path / "tls" / damaged).write_bytes(b"not a certificate")

@@ -73,7 +73,7 @@ def test_the_page_finds_what_is_beside_it_at_every_address_of_its_own(product: P
     assert (slash.status_code, slash.headers["location"]) == (308, "/temoto/")
 
 
-def test_what_was_made_is_said_to_be_where_the_proxy_shows_it(product: Product) -> None:
+def test_locations_of_new_graphs_are_below_the_public_path(product: Product) -> None:
     made = ask(f"{product.url}/temoto/api/graphs", "POST", headers=BEARER, json={"name": "patrol"})
     assert made.headers["location"] == f"/temoto/api/graphs/{made.json()['id']}"
     with product.editor() as direct:

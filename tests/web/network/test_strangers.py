@@ -114,7 +114,7 @@ UNFINISHED = (
 NO_TEXT = b"\x81\x82\0\0\0\0\xff\xff"
 
 
-def test_what_a_peer_does_not_finish_or_spells_wrongly_is_no_failure_of_ours(
+def test_unfinished_or_wrong_messages_of_a_peer_log_no_traceback(
     tmp_path: Path,
 ) -> None:
     """Each would write a traceback of dozens of lines, as often as anybody likes."""

@@ -272,6 +272,6 @@ def test_pieces_beyond_the_limit_are_refused_by_the_head_of_the_last() -> None:
 
 
 @pytest.mark.parametrize("size", [0, 1, 125, 126, 65_535, 65_536])
-def test_what_is_written_is_one_message(size: int) -> None:
+def test_each_written_frame_is_one_message(size: int) -> None:
     message = os.urandom(size)
     assert framed(message) == frame(0x82, message, b"", masked=False)

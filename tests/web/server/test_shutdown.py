@@ -152,7 +152,7 @@ async def test_an_idle_connection_is_closed() -> None:
     assert (wire.is_closing(), wire.is_cut_off) == (True, False)
 
 
-async def test_what_goes_wrong_at_the_end_of_one_connection_stays_there(
+async def test_a_fault_at_the_end_of_one_connection_affects_no_other(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     protocol, wire = spoken(b"GET / HTTP/1.1\r\n")

@@ -122,7 +122,7 @@ async def test_an_upgrade_that_the_parser_has_refused_is_ended_as_well(kind: typ
 
 
 @EITHER
-async def test_what_goes_wrong_at_the_end_of_one_socket_stays_there(
+async def test_a_fault_at_the_end_of_one_socket_affects_no_other(
     kind: type[Any], caplog: pytest.LogCaptureFixture
 ) -> None:
     protocol, wire = await opened(kind, silent)

@@ -179,7 +179,7 @@ async def test_a_draft_begins_as_its_origin_was_and_is_listed_under_it(editor: E
     assert [view.id for view in await editor.catalogue.all(deleted=True)] == [made.id]
 
 
-async def test_what_was_done_is_rebuilt_from_the_log(editor: Editor) -> None:
+async def test_drafts_are_rebuilt_from_the_log(editor: Editor) -> None:
     dice = random.Random(2)
     await editor.edit(editor.origin, "ada", dice, 6)
     made = await _draft(editor)
@@ -244,7 +244,9 @@ async def test_a_merge_that_is_taken_back_leaves_the_origin_as_it_was(
 
 
 @pytest.mark.parametrize("seed", range(examples(10)))
-async def test_what_is_merged_either_way_is_the_same(editor: Editor, seed: int) -> None:
+async def test_both_sides_are_equal_after_merges_in_both_directions(
+    editor: Editor, seed: int
+) -> None:
     dice = random.Random(seed)
     await editor.edit(editor.origin, "ada", dice, 10)
     made = await _draft(editor)
@@ -375,7 +377,7 @@ async def test_a_proposal_is_answered_and_ends_with_the_merge(editor: Editor) ->
     assert (await editor.drafts.withdraw(made.id, "ben")).state == "open"
 
 
-async def test_what_is_no_draft_is_not_found(editor: Editor) -> None:
+async def test_a_graph_that_is_no_draft_is_not_found(editor: Editor) -> None:
     with pytest.raises(NotFound, match="no draft"):
         await editor.drafts.get(editor.origin)
     with pytest.raises(BadInput, match="200 characters"):

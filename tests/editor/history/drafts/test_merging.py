@@ -142,7 +142,7 @@ def _with(base: Places, after: Places, owners: set[str]) -> dict[Place, Any]:
 # --- cases with names ------------------------------------------------------------------------------
 
 
-def test_what_one_removed_and_the_other_changed_is_asked_once() -> None:
+def test_a_removal_against_a_change_is_one_conflict() -> None:
     ours = _without(PAIR, DOCK)
     theirs = PAIR | {("actions", f"{DOCK}|in/speed"): '{"pvf_value":2}'}
     found = merged(PAIR, ours, theirs, {})
@@ -199,7 +199,7 @@ def test_nobody_is_asked_where_a_card_stands() -> None:
     assert found == KeyMerge({}, ())
 
 
-def test_what_people_said_stays_where_it_was_said() -> None:
+def test_comments_stay_in_the_graph_in_which_they_were_written() -> None:
     said: dict[Place, Any] = PAIR | {("comments", "t/m"): '"look"'}
     assert merged(PAIR, PAIR, said, {}) == KeyMerge({}, ())
     assert merged(said, said, PAIR, {}) == KeyMerge({}, ())

@@ -108,7 +108,7 @@ def test_files_beyond_its_bound_are_an_error_of_its_own(bench: Bench) -> None:
     assert "Too many open files" in returned.message
 
 
-def test_what_it_prints_can_be_taken_for_no_answer(bench: Bench) -> None:
+def test_printed_text_of_a_behaviour_is_never_taken_for_its_answer(bench: Bench) -> None:
     returned = bench.came_of("""
         import os, sys
         def run(action):
@@ -132,7 +132,9 @@ def test_what_it_prints_can_be_taken_for_no_answer(bench: Bench) -> None:
         ("def run(action):\n  action.outputs['x'] = 'y' * (2 << 20)", "more than 1 MB in one line"),
     ],
 )
-def test_what_is_wrong_with_it_is_said(bench: Bench, source: str, why: str) -> None:
+def test_a_faulty_behaviour_is_an_error_with_the_reason(
+    bench: Bench, source: str, why: str
+) -> None:
     returned = bench.came_of(source)
     assert returned.result == "on_error"
     assert returned.message is not None

@@ -22,7 +22,7 @@ def test_the_file_of_an_action_is_its_name_in_snake_case(tmp_path: Path) -> None
 
 
 @given(st.one_of(st.text(), st.text(alphabet="./\\aZ_%\0~ -\n", max_size=20)))
-def test_whatever_a_name_is_its_file_is_a_plain_name(name: str) -> None:
+def test_any_action_name_gives_a_plain_file_name(name: str) -> None:
     file = file_of(name)
     if file is not None:
         assert Path(file).name == file
@@ -65,7 +65,7 @@ def test_a_link_is_no_behaviour_wherever_it_leads(tmp_path: Path, inside: bool) 
         folder.source("Linked")
 
 
-def test_what_is_no_readable_text_is_refused_with_the_reason(tmp_path: Path) -> None:
+def test_an_unreadable_file_is_refused_with_the_reason(tmp_path: Path) -> None:
     place = write(tmp_path / "b")
     (place / "a_folder.py").mkdir()
     os.mkfifo(place / "a_pipe.py")  # would keep whoever opens it

@@ -21,7 +21,7 @@ from runner.process import over, started
 pytestmark = pytest.mark.skipif(not hasattr(os, "pidfd_open"), reason="behaviours need Linux")
 
 
-def test_what_a_behaviour_returns_is_the_result_of_its_action(
+def test_the_return_value_of_a_behaviour_is_the_result_of_its_action(
     client: httpx.Client, folder: Path
 ) -> None:
     write(
@@ -102,7 +102,7 @@ def test_values_of_every_native_type_come_in_and_go_on_to_the_next_action(
         ("hold = [bytearray(1 << 20) for _ in range(10**6)]", "it may have 512 MB"),
     ],
 )
-def test_what_a_behaviour_may_not_do_ends_its_action_with_an_error_that_says_so(
+def test_a_forbidden_act_of_a_behaviour_ends_its_action_with_an_error_that_says_so(
     client: httpx.Client, folder: Path, line: str, why: str
 ) -> None:
     write(folder, odd=f"def run(action):\n    {line}\n    action.sleep(3600)\n")

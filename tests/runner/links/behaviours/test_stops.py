@@ -115,7 +115,9 @@ def test_a_behaviour_that_floods_leaves_the_runner_and_other_runs_alone(
         assert len(said) < 100_000
 
 
-def test_whatever_it_has_started_is_killed_with_it(client: httpx.Client, folder: Path) -> None:
+def test_processes_that_a_behaviour_started_are_killed_with_it(
+    client: httpx.Client, folder: Path
+) -> None:
     write(
         folder,
         parent="""
