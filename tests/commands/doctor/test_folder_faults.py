@@ -47,7 +47,7 @@ def test_a_folder_that_somebody_may_not_enter_is_named_with_its_owner(data: Path
     # Root may enter everything: somebody else looks.
     look = (
         "import os, sys; from pathlib import Path;"
-        "from action_assistant.commands.doctor.folder_checks import folder_is_ours;"
+        "from action_assistant.commands.doctor.machine_checks import folder_is_ours;"
         "from action_assistant.commands.doctor.installation import Installation;"
         f"os.chdir('/'); os.setgroups([]); os.setgid({NOBODY}); os.setuid({NOBODY});"
         "[print(each.code, each.message, each.remedy) for each in "

@@ -19,7 +19,6 @@ from action_assistant import paths as places
 from action_assistant import settings
 from action_assistant.commands.doctor import (
     database_checks,
-    folder_checks,
     machine_checks,
     process_checks,
 )
@@ -42,12 +41,12 @@ CHECKS: Final[tuple[Check, ...]] = (
     machine_checks.program,
     machine_checks.settings_mean_something,
     machine_checks.page_is_built,
-    folder_checks.folder_is_ours,
-    folder_checks.token_is_there,
-    folder_checks.nothing_was_interrupted,
-    folder_checks.archive_is_usable,
-    folder_checks.disk_has_room,
-    folder_checks.backups_are_made,
+    machine_checks.folder_is_ours,
+    machine_checks.token_is_there,
+    machine_checks.nothing_was_interrupted,
+    machine_checks.archive_is_usable,
+    machine_checks.disk_has_room,
+    machine_checks.backups_are_made,
     database_checks.graphs_are_there,
     database_checks.runs_are_there,
     process_checks.processes_fit,
