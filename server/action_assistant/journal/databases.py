@@ -8,7 +8,7 @@ from sqlalchemy import Connection, make_url
 from sqlalchemy.exc import ArgumentError
 
 from action_assistant.errors import CannotStart, Unavailable
-from action_assistant.journal.database import Before, Branch, Database, cause_of, no_copy
+from action_assistant.journal.database import Branch, Database, cause_of
 from action_assistant.journal.migrate import recognize, upgrade_to
 
 T = TypeVar("T")
@@ -33,7 +33,7 @@ def database_of(url: str) -> Database:
     raise CannotStart(f"Databases of the kind {parsed.drivername!r} are not supported.")
 
 
-def migrate(url: str, branch: Branch, revision: str = "head", *, before: Before = no_copy) -> str:
+def migrate(url: str, branch: Branch, revision: str = "head") -> str:
     """Upgrade the database and return its revision. Raise CannotStart if it cannot be used or
     belongs to another process.
 
@@ -41,7 +41,7 @@ def migrate(url: str, branch: Branch, revision: str = "head", *, before: Before 
     """
     database = database_of(url)
     database.look(recognize)
-    return database.migrate(upgrade_to(branch, revision, before=before))
+    return database.migrate(upgrade_to(branch, revision))
 
 
 def ask_once(url: str, question: Callable[[Connection], T]) -> T:

@@ -383,7 +383,7 @@ def _readable(path: Path) -> Iterator[Path]:
         yield copy
 
 
-def inspected(path: Path, tell: Callable[[int], None] = lambda _: None) -> tuple[int, list[Damage]]:
+def inspected(path: Path) -> tuple[int, list[Damage]]:
     """Return the number of events in a file and their damages, at any revision of its tables.
 
     The file is not changed. Raise sqlite3.Error.
@@ -397,7 +397,6 @@ def inspected(path: Path, tell: Callable[[int], None] = lambda _: None) -> tuple
             for row in rows:
                 inspector.see(row[:8])
             after = rows[-1][8]
-            tell(inspector.seen)
         ends = database.execute("SELECT stream, seq, chain FROM head").fetchall()
     return inspector.seen, inspector.findings(ends)
 

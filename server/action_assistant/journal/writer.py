@@ -16,7 +16,7 @@ from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.commit_metrics import CommitMetrics
 from action_assistant.journal.database import Database, WriterSession, cause_of
 from action_assistant.journal.events import Addition, Event, Fold
-from action_assistant.kit.clock import ClockUs, utc_us
+from action_assistant.kit.clock import utc_us
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
@@ -61,10 +61,9 @@ class Transaction:
     a savepoint, so that a failed job does not affect the others.
     """
 
-    def __init__(self, session: WriterSession, fold: Fold, clock: ClockUs) -> None:
+    def __init__(self, session: WriterSession, fold: Fold) -> None:
         self.fold: Final = fold
         self._session = session
-        self._clock = clock
         self._position: int = session.connection.execute(_LAST).scalar_one()
         self._heads: dict[str, Head] = {}
         self._before: dict[str, Head] = {}  # ends of streams before the job that is under way
@@ -104,7 +103,7 @@ class Transaction:
         head = self._head(stream)
         if addition.expected is not None and addition.expected != head.seq:
             raise Conflict(f"{stream} has gone on to {head.seq}; {addition.expected} was expected.")
-        at, seq, chain = self._clock(), head.seq, head.chain
+        at, seq, chain = utc_us(), head.seq, head.chain
         for draft in addition.drafts:
             seq += 1
             self._position += 1
@@ -203,13 +202,11 @@ class Writer:
         session: WriterSession | None,
         fold: Fold,
         tell: Callable[[JobOutcomes], None],
-        clock: ClockUs = utc_us,
     ) -> None:
         self._database = database
         self._session = session
         self._fold = fold
         self._tell = tell
-        self._clock = clock
         self.metrics: Final = CommitMetrics()
         self._transaction: Transaction | None = None
         self._jobs: queue.SimpleQueue[Sequence[Job[Any]] | None] = queue.SimpleQueue()
@@ -334,7 +331,7 @@ class Writer:
             self._disconnect()
             session = self._session = self._database.connect()
         if self._transaction is None:
-            self._transaction = session.run(lambda: Transaction(session, self._fold, self._clock))
+            self._transaction = session.run(lambda: Transaction(session, self._fold))
         return session, self._transaction
 
     def _disconnect(self) -> None:

@@ -6,6 +6,8 @@ from typing import Final
 
 Clock = Callable[[], float]
 
+_REMEMBERED: Final = 1000  # keys; beyond them buckets that are certainly full are dropped
+
 
 class TokenBucket:
     """Holds up to `capacity` tokens and gains `rate` of them a second. It may be overdrawn, and is
@@ -55,7 +57,7 @@ class TokenBucket:
 
 
 class TokenBuckets:
-    """A token bucket for each key, such as a person or an address. Beyond `remembered` keys it
+    """A token bucket for each key, such as a person or an address. Beyond `_REMEMBERED` keys it
     drops buckets that are certainly full again."""
 
     def __init__(
@@ -63,13 +65,10 @@ class TokenBuckets:
         capacity: float,
         rate: float,
         clock: Clock = time.monotonic,
-        *,
-        remembered: int = 1000,
     ) -> None:
         self._capacity: Final = capacity
         self._rate: Final = rate
         self._clock: Final = clock
-        self._remembered: Final = remembered
         self._buckets: dict[str, TokenBucket] = {}
 
     def __len__(self) -> int:
@@ -80,7 +79,7 @@ class TokenBuckets:
         bucket = self._buckets.get(key)
         if bucket is None:
             bucket = self._buckets[key] = TokenBucket(self._capacity, self._rate, self._clock)
-            if len(self._buckets) > self._remembered:
+            if len(self._buckets) > _REMEMBERED:
                 self._forget_full(key)
         return bucket
 
