@@ -1,5 +1,6 @@
 """Graphs of several actors: the performers change nothing of a course, and the check names what robots could not do."""
 
+from itertools import pairwise
 from typing import Any
 
 import msgspec
@@ -244,6 +245,7 @@ def same_but_for_actors(graph: Graph, plain: Graph, graphs: Any = None, bare: An
     assert told == check(plain, facts=SIMULATED, graphs=bare)
 
 
+@pytest.mark.timeout(900)
 @given(st.data(), busy_graphs(), scripts(), st.none() | st.integers(1, 5_000))
 @settings(max_examples=examples(150), deadline=None, suppress_health_check=list(HealthCheck))
 def test_performers_change_nothing_of_a_course(
@@ -258,6 +260,7 @@ def test_performers_change_nothing_of_a_course(
     same_but_for_actors(graph, plain)
 
 
+@pytest.mark.timeout(900)
 @given(st.data(), hierarchies(wired=True), scripts())
 @settings(max_examples=examples(100), deadline=None, suppress_health_check=list(HealthCheck))
 def test_performers_change_nothing_of_a_hierarchy_and_stay_in_the_flat_graph(
@@ -295,3 +298,15 @@ def test_each_event_of_an_action_names_its_actor() -> None:
     }
     assert found == {("A_0", "Carrier"), ("S_0", "Scout"), ("X_0", "Scout"), ("Y_0", "Arm")}
     assert not any(b"actor" in msgspec.json.encode(trace) for trace in simulate(CHAIN))
+
+
+def test_a_graph_of_many_spontaneous_actions_is_looked_at_for_a_moment_only() -> None:
+    names = [f"A{n}" for n in range(300)]
+    graph = graph_of(
+        "entry>A0", *(f"{one}>{two}" for one, two in pairwise(names)), f"{names[-1]}>exit"
+    )
+    kinds = (replace(a, type="spontaneous", actor=f"R{n % 3}") for n, a in enumerate(graph.actions))
+    found = check(replace(graph, actions=tuple(kinds)))
+    across = [p for p in found if p.code == "spontaneous-across"]
+    assert len(across) == 299
+    assert max(len(problem.also) for problem in found if problem.code in KINDS) == 20

@@ -5,6 +5,7 @@ See docs/umrf-and-the-engine.md 2.11 and docs/decisions/112-several-actors.md.
 """
 
 from collections.abc import Container, Iterable, Mapping
+from itertools import islice
 from typing import Final, NamedTuple, TypeAlias
 
 import msgspec
@@ -13,6 +14,7 @@ from action_assistant.umrf.checks.concurrency import Concurrency
 from action_assistant.umrf.checks.flow import Reachability
 from action_assistant.umrf.checks.places import Subject, joined, more
 from action_assistant.umrf.checks.subgraphs import SubGraphs, at_action, place_inside
+from action_assistant.umrf.components import Mask, nodes_in, reachable
 from action_assistant.umrf.laps import repeated
 from action_assistant.umrf.model import (
     ENTRY,
@@ -32,6 +34,7 @@ _INSIDE: Final = 20
 #: The most levels of sub-graphs that are looked into. Deeper ones cannot become flat either.
 _DEEPEST: Final = 32
 _NAMED: Final = 3  # names in one sentence
+_ALSO: Final = 20  # further places of one problem
 
 _Reports: TypeAlias = Mapping[Key, set[Precondition]]
 
@@ -123,7 +126,7 @@ class _LedGraph:
     def _of_action(self, action: Action, around: str) -> _Performers:
         actor = action.actor or around
         inner = self._performers.get(action.name)
-        if inner is None:
+        if inner is None or not inner.every:
             return _Performers(*[frozenset({actor})] * 3)
         return _Performers(*(frozenset(each or actor for each in side) for side in inner))
 
@@ -181,6 +184,7 @@ def _check_at_once(
 ) -> None:
     """Report each action that may run at the same time as later ones of its actor. If too many pairs
     of actions may run at once to be known, only the first action of each actor is reported."""
+    place = {action.key: number for number, action in enumerate(subject.real)}
     members: dict[str, list[Key]] = {}
     for action in subject.real:
         for actor in sorted(performers[action.key].every) if action.key in runs else ():
@@ -189,7 +193,7 @@ def _check_at_once(
         left = set(keys)
         for key in keys if concurrency.known else keys[:1]:
             left.discard(key)
-            beside = [each for each in keys if each in left & concurrency.beside(key)]
+            beside = sorted(left & concurrency.beside(key), key=place.__getitem__)
             if not beside:
                 continue
             names = joined({subject.name(each) for each in beside[:_NAMED]})
@@ -199,7 +203,7 @@ def _check_at_once(
                 "graph after the other: on a robot that is led, a Stop reaches the second action up to "
                 f"5 s later.{more(len(beside) - _NAMED, 'action', 'actions')}"
             )
-            also = [subject.actions[each] for each in beside]
+            also = [subject.actions[each] for each in beside[:_ALSO]]
             subject.report(
                 "two-at-once", "warning", message, action=subject.actions[key], also=also
             )
@@ -220,37 +224,35 @@ def _check_repeated(subject: Subject, runs: Container[Key], nested: Container[st
 
 
 def _check_spontaneous(subject: Subject, performers: _ByKey, runs: Container[Key]) -> None:
-    """Report spontaneous actions that lead to actions of other actors."""
-    for action in subject.real:
-        if action.type != "spontaneous" or action.key not in runs:
-            continue
-        own = performers[action.key].every
-        others = [
-            key for key in _after(subject, action.key) if len(own | performers[key].every) > 1
+    """Report spontaneous actions from which arrows lead to actions of other actors."""
+    place = {action.key: number for number, action in enumerate(subject.real)}
+    lively = [a for a in subject.real if a.type == "spontaneous" and a.key in runs]
+    after = reachable(
+        [
+            [place[r.child] for r in subject.outgoing.get(key, []) if r.child != EXIT]
+            for key in (place if lively else ())
         ]
-        if others:
-            names = joined({subject.name(key) for key in others[:_NAMED]})
-            message = (
-                f"{_with_actor(subject, action.key, own)} is spontaneous: each time it ends, all that comes "
-                f"after it is stopped, also {names} of another actor. A runner that leads the robots "
-                f"cannot do that.{more(len(others) - _NAMED, 'action', 'actions')}"
-            )
-            subject.report(
-                "spontaneous-across", "warning", message, action=action, member="/type",
-                also=[subject.actions[key] for key in others],
-            )  # fmt: skip
-
-
-def _after(subject: Subject, key: Key) -> list[Key]:
-    """Return the actions to which paths of arrows lead from an action, without itself, in the order
-    of the file."""
-    seen, stack = {key}, [key]
-    while stack:
-        for relation in subject.outgoing.get(stack.pop(), []):
-            if relation.child not in seen and relation.child != EXIT:
-                seen.add(relation.child)
-                stack.append(relation.child)
-    return [action.key for action in subject.real if action.key in seen - {key}]
+    )
+    alike: dict[frozenset[str], Mask] = {}
+    for key, number in place.items():
+        every = performers[key].every
+        alike[every] = alike.get(every, 0) | 1 << number
+    for action in lively:
+        own = performers[action.key].every
+        same = alike[own] if len(own) == 1 else 1 << place[action.key]
+        others = after[place[action.key]] & ~same
+        if not others:
+            continue
+        first = [subject.real[number] for number in islice(nodes_in(others), _ALSO)]
+        message = (
+            f"{_with_actor(subject, action.key, own)} is spontaneous: each time it ends, all that comes "
+            f"after it is stopped, also {joined({each.full_name for each in first[:_NAMED]})} of another "
+            "actor. A runner that leads the robots cannot do that."
+            f"{more(others.bit_count() - _NAMED, 'action', 'actions')}"
+        )
+        subject.report(
+            "spontaneous-across", "warning", message, action=action, member="/type", also=first
+        )
 
 
 def _with_actor(subject: Subject, key: Key, actors: Iterable[str]) -> str:
