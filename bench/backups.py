@@ -27,7 +27,7 @@ from action_assistant.runner.runs.events import (
     Observed,
     Published,
     Requested,
-    encode,
+    draft_of,
 )
 from action_assistant.runner.runs.recorder import stream_of
 
@@ -147,9 +147,7 @@ def _run(number: int) -> Addition:
         actions={f"Work_{i}": f"a{i}" for i in range(12)},
         umrf="{}",
     )
-    return Addition(
-        stream_of(asked.run), tuple(Draft(e.kind, "ann", encode(e)) for e in [asked, *_course(at)])
-    )
+    return Addition(stream_of(asked.run), tuple(draft_of(e, "ann") for e in [asked, *_course(at)]))
 
 
 def _course(at: int) -> list[Any]:

@@ -37,7 +37,7 @@ from action_assistant.runner.runs.events import (
     Observed,
     Published,
     Requested,
-    encode,
+    draft_of,
 )
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
@@ -377,7 +377,7 @@ async def _opened(folder: Path) -> Journal:
 
 
 def _drafts(events: Sequence[Any]) -> tuple[Draft, ...]:
-    return tuple(Draft(each.kind, "ann", encode(each)) for each in events)
+    return tuple(draft_of(each, "ann") for each in events)
 
 
 async def _took(work: Callable[[], Awaitable[Any]]) -> str:

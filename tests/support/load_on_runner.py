@@ -18,7 +18,7 @@ import msgspec
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
 from action_assistant.runner.links.observations import GraphState, NodeState
-from action_assistant.runner.runs.events import Ended, Observed, Published, Requested, encode
+from action_assistant.runner.runs.events import Ended, Observed, Published, Requested, draft_of
 from action_assistant.runner.runs.fold import RunEvent
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.umrf.digest import digest
@@ -37,7 +37,6 @@ def long_run(data: Path, events: int) -> None:
 
 
 async def _stored(data: Path, count: int) -> None:
-    from action_assistant.journal.events import Draft
     from runner.harness import ANN, sequence
 
     url = f"sqlite:///{data / 'runner.db'}"
@@ -54,9 +53,7 @@ async def _stored(data: Path, count: int) -> None:
         told = [begun, Published(_BEGAN + 1, "life"), *_shown(list(names), count)]
         told.append(Ended(_BEGAN + (count + 5) * 10_000, "finished", "on_true"))
         for start in range(0, len(told), 500):
-            drafts = [
-                Draft(each.kind, "simulator", encode(each)) for each in told[start : start + 500]
-            ]
+            drafts = [draft_of(each, "simulator") for each in told[start : start + 500]]
             await journal.append(stream_of(LONG), drafts)
     finally:
         await journal.close()

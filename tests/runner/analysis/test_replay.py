@@ -8,7 +8,6 @@ import msgspec
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from action_assistant.journal.events import Draft
 from action_assistant.runner.analysis.keyframes import APART, KeyframeStore
 from action_assistant.runner.analysis.replay import ReplayFrame, RunReplay, run_replay
 from action_assistant.runner.links.observations import NodeResult, NodeState, Seen, Snapshot
@@ -19,7 +18,7 @@ from action_assistant.runner.runs.events import (
     Observed,
     RunEvent,
     StopRequested,
-    encode,
+    draft_of,
 )
 from action_assistant.runner.runs.fold import replay
 from runner.harness import MemoryJournal, virtual
@@ -64,7 +63,7 @@ def told(drawn: Sequence[Sequence[Any]]) -> list[RunEvent]:
 
 async def stored(events: Sequence[RunEvent]) -> MemoryJournal:
     journal = MemoryJournal()
-    drafts = [Draft(each.kind, "x", encode(each)) for each in events]
+    drafts = [draft_of(each, "x") for each in events]
     await journal.append("run/r1", drafts)
     return journal
 
@@ -169,7 +168,7 @@ async def test_keyframes_of_an_open_run_are_stored_at_each_multiple_and_continue
     assert not journal.snapshots  # nothing worth it yet
     for upto, kept in ((APART + 5, APART + 5), (2 * APART - 1, APART + 5), (2 * APART, 2 * APART)):
         there = await journal.newest("run/r1")
-        rest = [Draft(each.kind, "x", encode(each)) for each in events[there:upto]]
+        rest = [draft_of(each, "x") for each in events[there:upto]]
         await journal.append("run/r1", rest)
         await followed.keyframes("r1")
         assert journal.snapshots["run/r1"].seq == kept
@@ -184,7 +183,7 @@ async def test_keyframes_stand_at_whole_multiples_however_many_events_are_read_a
     journal = await stored(events[:700])
     keyframe_store = KeyframeStore(journal)
     await keyframe_store.keyframes("r1")
-    rest = [Draft(each.kind, "x", encode(each)) for each in events[700:]]
+    rest = [draft_of(each, "x") for each in events[700:]]
     await journal.append("run/r1", rest)
     keys = (await keyframe_store.keyframes("r1")).keys
     assert [key.seq for key in keys] == [*range(APART, len(events), APART), len(events)]
@@ -199,7 +198,7 @@ async def test_keyframes_that_were_made_early_go_on_with_the_run() -> None:
     keyframe_store = KeyframeStore(journal)
     early = await keyframe_store.keyframes("r1")
     assert early.keys[-1].seq == APART // 2
-    rest = [Draft(each.kind, "x", encode(each)) for each in events[APART // 2 :]]
+    rest = [draft_of(each, "x") for each in events[APART // 2 :]]
     await journal.append("run/r1", rest)
     late = await keyframe_store.keyframes("r1")
     assert late.keys[-1].run == replay(events)

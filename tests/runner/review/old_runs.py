@@ -15,7 +15,7 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.journal import sqlite as sqlite_journal
-from action_assistant.journal.events import Draft, Event
+from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
 from action_assistant.runner.analysis import annotations
@@ -24,7 +24,7 @@ from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.links.observations import NodeState
 from action_assistant.runner.robots.recordings import Recordings
-from action_assistant.runner.runs.events import Ended, Observed, Published, encode
+from action_assistant.runner.runs.events import Ended, Observed, Published, draft_of
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.settings import Keep
@@ -65,7 +65,7 @@ async def add_run(journal: Journal, run: str, number: int, length: int, ended_at
         at = 2_000 + i
         events.append(Observed(at, (NodeState(at, "patrol", "Go_0", states[i % 2]),)))
     events.append(Ended(ended_at, "finished", "on_true"))
-    drafts = [Draft(each.kind, "ann", encode(each)) for each in events]
+    drafts = [draft_of(each, "ann") for each in events]
     for i in range(0, len(drafts), 500):
         await journal.append(stream_of(run), drafts[i : i + 500])
     told = replay(events)

@@ -31,7 +31,7 @@ from action_assistant.runner.runs.events import (
     StopSent,
     Unknown,
     decode,
-    encode,
+    draft_of,
 )
 from action_assistant.runner.runs.fold import begin, follow, replay
 from action_assistant.runner.runs.run import Run
@@ -392,4 +392,4 @@ def test_visits_never_overlap_and_never_claim_more_than_their_bounds(
 
 @given(EVENTS)
 def test_events_are_read_as_they_were_written(event: RunEvent) -> None:
-    assert decode(event.kind, encode(event)) == event
+    assert decode(event.kind, draft_of(event).body) == event

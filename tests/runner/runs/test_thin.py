@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from action_assistant.runner.links.observations import NodeState, Seen, Snapshot
 from action_assistant.runner.runs import views
-from action_assistant.runner.runs.events import Observed, encode
+from action_assistant.runner.runs.events import Observed, draft_of
 from action_assistant.runner.runs.fold import follow, replay, thin
 from action_assistant.runner.runs.run import Run
 from runner.runs.test_runs import REQUESTED, STARTED, run_of
@@ -79,7 +79,7 @@ def test_the_stored_size_of_a_run_grows_with_its_events_not_its_graph() -> None:
                 at = 2_000 + 10 * (2 * i + j)
                 whole = Snapshot(at=at, graph="patrol", state="RUNNING", nodes=states, run="r1")
                 event = Observed(at, thin(run, (whole,)))
-                run, total = follow(run, event), total + len(encode(event))
+                run, total = follow(run, event), total + len(draft_of(event).body)
         return total
 
     assert stored(200) < 2.5 * stored(100)

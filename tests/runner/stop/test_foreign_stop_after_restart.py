@@ -15,9 +15,9 @@ from action_assistant.runner.robots.robot_events import (
     StopAsked,
     StopUnproven,
     StopWasProven,
-    draft_of,
     stream_of_robot,
 )
+from action_assistant.runner.runs.events import draft_of
 from runner.harness import ANN, BEN, Harness, clock_us, engine, order, sequence, until, virtual
 from runner.registered_robots import NEVER, Open, fleet
 

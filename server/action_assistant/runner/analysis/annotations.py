@@ -17,7 +17,7 @@ from action_assistant.runner.analysis.cause_texts import cause_sentence
 from action_assistant.runner.analysis.causes import causes
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import DurationBounds, duration_bounds, of_run, of_visit
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
 from action_assistant.runner.runs.word_index import holds, will_be_indexed
@@ -113,7 +113,7 @@ def is_about(stream: str) -> bool:
 def draft(event: Marked | SummedUp | RunArchived) -> Draft:
     """Encode an annotation for the journal."""
     author = event.author.id if isinstance(event, Marked) else ""
-    return Draft(event.kind, author, msgspec.json.encode(event))
+    return draft_of(event, author)
 
 
 def sum_of(run: Run, graph: Graph | None, at: int, said: Iterable[str] = ()) -> SummedUp:

@@ -13,7 +13,7 @@ import msgspec
 
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner.runs.events import Requested, decode, encode
+from action_assistant.runner.runs.events import Requested, decode, draft_of
 
 ENDING: Final = ".run.jsonl"
 #: The label that examples carry.
@@ -52,7 +52,7 @@ def numbered(first: Requested, number: int) -> Draft:
     here = msgspec.structs.replace(
         first, number=number, simulated=True, graph=None, request_id=f"example/{first.run}"
     )
-    return Draft(here.kind, here.author.id, encode(here))
+    return draft_of(here, here.author.id)
 
 
 def shipped(folder: Path) -> Sequence[bytes]:

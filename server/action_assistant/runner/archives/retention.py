@@ -18,7 +18,7 @@ import msgspec
 from sqlalchemy import Row, Select, exists, literal, or_, select
 
 from action_assistant.errors import Conflict, Refused
-from action_assistant.journal.events import Addition, Draft
+from action_assistant.journal.events import Addition
 from action_assistant.journal.removal import StreamRemoved
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations
@@ -27,6 +27,7 @@ from action_assistant.runner.archives.archive_store import Journaled
 from action_assistant.runner.archives.raw_messages import RawArchived, stream_of_raw
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import views
+from action_assistant.runner.runs.events import draft_of
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import review, run, runner_event
 from action_assistant.settings import Keep
@@ -191,8 +192,7 @@ class Retention:
         size = (await anyio.Path(path).stat()).st_size
         digest = await self._run_in_worker(lambda: archive_file.put(path, target))
         archived = RawArchived(self._clock_us(), robot, path.name, file, size, digest)
-        draft = Draft(archived.kind, "", msgspec.json.encode(archived))
-        await self._journal.append(stream_of_raw(robot), [draft])
+        await self._journal.append(stream_of_raw(robot), [draft_of(archived)])
         await self._run_in_worker(path.unlink)
 
 

@@ -7,7 +7,6 @@ import msgspec
 from sqlalchemy import select
 
 from action_assistant.errors import NotFound
-from action_assistant.journal.events import Draft
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.archives import examples
@@ -15,7 +14,7 @@ from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.review.background_loops import KeyframeLoop, SumUpLoop
 from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.review.worker_queries import WorkerQueries
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.recorder import RunRecorder, stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.schema.runner_tables import expectation, review, run_label
@@ -107,8 +106,7 @@ class ReviewService:
         now = self._clock_us()
         await self._queries.wait_until_stored(wanted.run)
         saved = await self._queries.value(StoredRuns.expected, wanted, name, author, now)
-        draft = Draft(saved.kind, author.id, msgspec.json.encode(saved))
-        await self._journal.append(expected_runs.STREAM, [draft])
+        await self._journal.append(expected_runs.STREAM, [draft_of(saved, author.id)])
         return expected_runs.expectation_view(saved)
 
     async def retire(self, name: str, author: Author) -> None:
@@ -116,5 +114,4 @@ class ReviewService:
         if not await self._journal.query(select(expectation).where(expectation.c.name == name)):
             raise NotFound(f"Nothing is expected under the name {name!r}.")
         retired = expected_runs.Retired(self._clock_us(), name, author)
-        draft = Draft(retired.kind, author.id, msgspec.json.encode(retired))
-        await self._journal.append(expected_runs.STREAM, [draft])
+        await self._journal.append(expected_runs.STREAM, [draft_of(retired, author.id)])

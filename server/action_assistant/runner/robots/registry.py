@@ -8,7 +8,6 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound
-from action_assistant.journal.events import Draft
 from action_assistant.logs.context import begin
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
@@ -36,7 +35,7 @@ from action_assistant.runner.robots.robot_events import (
     EngineBecame,
     RobotLog,
 )
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runtime import Runtime
 from action_assistant.umrf.facts import PINNED, BadProfile, EngineFacts, facts_of
 
@@ -100,8 +99,7 @@ class Robots:
         check_registration(registration)
         runtime, listeners = self._while_open()
         body = RobotRegistered(at=runtime.clock_us(), **msgspec.structs.asdict(registration))
-        draft = Draft(body.kind, author.id, msgspec.json.encode(body))
-        await runtime.journal.append(STREAM, [draft])
+        await runtime.journal.append(STREAM, [draft_of(body, author.id)])
         self.add(registration)
         listeners.changed()
         return self.robot(registration.name)
@@ -112,8 +110,7 @@ class Robots:
         self.registration(name)
         runtime, listeners = self._while_open()
         body = RobotRemoved(at=runtime.clock_us(), name=name)
-        draft = Draft(body.kind, author.id, msgspec.json.encode(body))
-        await runtime.journal.append(STREAM, [draft])
+        await runtime.journal.append(STREAM, [draft_of(body, author.id)])
         self._close(name)
         del self._registered[name]
         listeners.changed()

@@ -12,9 +12,9 @@ import anyio
 import msgspec
 
 from action_assistant.errors import NotFound, Unavailable
-from action_assistant.journal.events import Draft, Event
+from action_assistant.journal.events import Event
 from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import StreamAppender
 from action_assistant.web.auth.caller import BackgroundTasks
@@ -177,11 +177,6 @@ def alarm_of(command: ForeignCommand, robot: str, graph: str) -> tuple[str, str]
             f"Somebody else started {command.graph} on {robot}, beside this run.",
         )
     return None
-
-
-def draft_of(event: RobotEvent, author: str) -> Draft:
-    """Encode an event for the journal."""
-    return Draft(event.kind, author, msgspec.json.encode(event))
 
 
 def event_of(stored: Event) -> RobotEvent | None:

@@ -6,11 +6,11 @@ taken when the thing happened, which may be before it was stored.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, ClassVar, Final, Literal, TypeAlias
+from typing import Any, ClassVar, Final, Literal, Protocol, TypeAlias
 
 import msgspec
 
-from action_assistant.journal.events import BareEvent
+from action_assistant.journal.events import BareEvent, Draft
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import Seen
 from action_assistant.umrf.laps import Laps
@@ -330,9 +330,16 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
 }
 
 
-def encode(event: RunEvent) -> bytes:
-    """Return the body of an event as JSON."""
-    return msgspec.json.encode(event)
+class StoredKind(Protocol):
+    """An event whose body is JSON and whose kind stands beside it."""
+
+    kind: ClassVar[str]
+
+
+def draft_of(event: StoredKind, author: str = "") -> Draft:
+    """Encode an event for the journal. `author` is the id of a person or the name of a robot, "" for
+    the runner itself."""
+    return Draft(event.kind, author, msgspec.json.encode(event))
 
 
 def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:

@@ -13,7 +13,7 @@ import anyio
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Draft, Event
-from action_assistant.runner.runs.events import RunEvent, encode
+from action_assistant.runner.runs.events import RunEvent, draft_of
 
 log: Final = logging.getLogger(__name__)
 
@@ -168,4 +168,4 @@ class RunRecorder(StreamAppender):
 
     def put(self, event: RunEvent, author: str) -> None:
         """Queue an event of the run for storing."""
-        self.add(Draft(event.kind, author, encode(event)))
+        self.add(draft_of(event, author))

@@ -12,10 +12,9 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.journal.events import Draft
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.links.port import Registration
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.start.preflight import Item
 from action_assistant.umrf.facts import SECOND_PERSON
@@ -80,8 +79,7 @@ class Approvals:
             note=request.note.strip(),
             device=caller.device(),
         )
-        draft = Draft(given.kind, author.id, msgspec.json.encode(given))
-        await self._journal.append(STREAM, [draft])
+        await self._journal.append(STREAM, [draft_of(given, author.id)])
         return given
 
     async def given_for(self, digest: str) -> tuple[ApprovalGiven, ...]:

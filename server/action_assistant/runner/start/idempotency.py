@@ -7,10 +7,9 @@ from weakref import WeakValueDictionary
 import anyio
 
 from action_assistant.errors import Conflict, Refused, Unavailable
-from action_assistant.journal.events import Draft
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.runs import queries
-from action_assistant.runner.runs.events import Author, Ended, Requested, encode
+from action_assistant.runner.runs.events import Author, Ended, Requested, draft_of
 from action_assistant.runner.runs.fold import begin
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
@@ -84,7 +83,7 @@ class IdempotentStarts:
         """Append a start to the journal, and return its run. Raise Unavailable if the start cannot
         be stored; the caller then sends nothing."""
         stream = stream_of(requested.run)
-        draft = Draft(requested.kind, requested.author.id, encode(requested))
+        draft = draft_of(requested, requested.author.id)
         try:
             await self._journal.append(stream, [draft], expected=0)
         except Refused as refused:
@@ -103,7 +102,7 @@ class IdempotentStarts:
             try:
                 seq = await self._journal.newest(stream)
                 if seq:
-                    await self._journal.append(stream, [Draft(end.kind, "", encode(end))])
+                    await self._journal.append(stream, [draft_of(end)])
                 return
             except Refused:
                 await anyio.sleep(1)
