@@ -2,7 +2,7 @@
 
 import pytest
 
-from action_assistant.umrf.facts import PINNED, BadProfile, facts_of
+from action_assistant.umrf.facts import PINNED, SIMULATED, BadProfile, facts_of
 
 
 def test_a_profile_that_says_nothing_is_the_pinned_engine() -> None:
@@ -14,6 +14,12 @@ def test_a_profile_changes_what_it_names_and_nothing_else() -> None:
     assert facts.pauses_safely
     assert facts.hazards == frozenset({"H3", "H5"})
     assert (facts.stop_topic, facts.stop_timeout_ms) == (PINNED.stop_topic, PINNED.stop_timeout_ms)
+
+
+def test_a_robot_synchronises_only_if_its_profile_says_so() -> None:
+    assert not facts_of({"commit": "simulator"}).synchronises
+    assert facts_of({"commit": "simulator", "synchronises": True}).synchronises
+    assert SIMULATED.synchronises
 
 
 def test_a_commit_that_nobody_measured_keeps_its_name() -> None:

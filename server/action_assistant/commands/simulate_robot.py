@@ -24,7 +24,7 @@ from action_assistant.runner.emulator.messages import (
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
 from action_assistant.safe_text import one_line
-from action_assistant.umrf.facts import PINNED, facts_for
+from action_assistant.umrf.facts import facts_of
 from action_assistant.umrf.semantics import Script, script_from
 
 _DEEP: Final = 2  # folders below --actions in which an engine looks
@@ -117,7 +117,7 @@ def _simulate_robot(options: argparse.Namespace) -> int:
         raise CannotStart(missing)
     from action_assistant.runner.emulator.node import EmulatorNode
 
-    facts = facts_for(options.facts) if options.facts else PINNED
+    facts = facts_of({"commit": options.facts} if options.facts else {})
     quirks = msgspec.convert(dict(options.quirk), EngineTraits)
     script, folder = _script(options.script), options.actions
     index = EmulatedIndex() if folder is None else _index(folder)

@@ -85,7 +85,8 @@ SECOND_PERSON: Final = "second_person"
 def facts_of(profile: Mapping[str, object]) -> EngineFacts:
     """Return the facts of a robot's engine: those of the `commit` in its profile, or of the pinned
     engine if the profile has none. Other fields of the profile, named as in `EngineFacts`,
-    replace these facts. Raises `BadProfile` if a field is unknown or has a wrong type or value."""
+    replace these facts. A robot synchronises only if its profile says so, whatever the commit.
+    Raises `BadProfile` if a field is unknown or has a wrong type or value."""
     if not isinstance(profile.get(SECOND_PERSON, False), bool):
         raise BadProfile(f"{SECOND_PERSON} is true or false.", f"/{SECOND_PERSON}")
     profile = {key: value for key, value in profile.items() if key != SECOND_PERSON}
@@ -98,7 +99,7 @@ def facts_of(profile: Mapping[str, object]) -> EngineFacts:
     given = {key: _profile_value(key, value) for key, value in profile.items()}
     commit = given.pop("commit", None)
     base = facts_for(commit if isinstance(commit, str) else None)
-    return msgspec.structs.replace(base, **given)
+    return msgspec.structs.replace(base, **{"synchronises": False, **given})
 
 
 def _profile_value(key: str, value: object) -> object:

@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from action_assistant.umrf.check import blocking, check
+from action_assistant.umrf.courses.expected import check_expected
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
 from action_assistant.umrf.model import Conditions, Graph, Problem
 from action_assistant.umrf.semantics import Behaviour, Script, simulate
+from action_assistant.umrf.semantics.steps import steps_of
 from support.doses import examples
 from umrf.drawn import busy_graphs
 from umrf.hierarchy.hierarchies import Hierarchy, hierarchies, leaf
@@ -206,6 +208,15 @@ def test_levels_that_double_are_looked_at_for_a_moment_only() -> None:
     }  # fmt: skip
     found = check(graph_of("entry>L0", "L0>R0", "R0>exit"), graphs=library)
     assert "actors" in {problem.code for problem in found}
+
+
+def test_an_expected_course_holds_whoever_performs() -> None:
+    shared, alone = owned(VALUES, A="Carrier", B="Scout"), owned(VALUES, A="Scout", B="Scout")
+    steps = steps_of(simulate(shared))
+    assert ("result", "on_true") in {(step.what, step.how) for step in steps if step.node == "B_0"}
+    script = Script({})
+    for was, now in ((shared, shared), (shared, alone), (alone, shared)):
+        assert check_expected(was, steps, script, now).apart is None
 
 
 # Any graph
