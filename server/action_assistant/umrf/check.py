@@ -5,8 +5,8 @@ See docs/umrf-and-the-engine.md 3.
 
 from collections.abc import Collection, Mapping
 
+from action_assistant.umrf.checks.actors import check_actors
 from action_assistant.umrf.checks.flow import check_flow
-from action_assistant.umrf.checks.performers import check_performers
 from action_assistant.umrf.checks.places import Subject
 from action_assistant.umrf.checks.structure import check_structure
 from action_assistant.umrf.checks.subgraphs import (
@@ -55,7 +55,7 @@ def check(
     check_flow(subject, set(graphs or ()) - set(library or ()))
     check_values(subject, library, graphs or {})
     inside = check_subgraphs(subject, graphs or {}, library or {}, resolution)
-    check_performers(subject, inside)
+    check_actors(subject, inside)
     check_scenarios(subject)
     return sorted(subject.problems, key=rank)
 

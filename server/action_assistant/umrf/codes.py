@@ -167,7 +167,7 @@ CODES: Final[dict[str, Code]] = {
     ),
     "values-across-robots": Code("hazard", _WARNING, "an arrow that hands an output to an action of another actor", "a runner that leads the robots cannot hand values on"),
     "two-at-once": Code("hazard", _WARNING, "two actions of one actor that may run at the same time", "on a robot that is led, a Stop reaches the second one up to 5 s later"),
-    "loaded-anew": Code("hazard", _WARNING, "an action that can run more than once", "on a robot that is led, it is loaded anew each time and forgets what it remembers"),
+    "loaded-anew": Code("hazard", _WARNING, "an action that may run more than once", "on a robot that is led, it is loaded anew each time and forgets what it remembers"),
     "spontaneous-across": Code("hazard", _WARNING, "a spontaneous action that leads to an action of another actor", "a runner that leads the robots cannot stop what comes after it at each of its ends"),
     "stop-across": Code("hazard", _WARNING, "an arrow that stops an action of another actor", "the stop is a message of the runner that leads the robots, and does not come without it"),
     # The rest

@@ -67,7 +67,7 @@ class Clock:
         graph.count(node.state, -1)
         graph.count(state, 1)
         node.state = state
-        event = NodeStateEvent(self._t(), graph.name, node.full_name, state, graph.performer(node))
+        event = NodeStateEvent(self._t(), graph.name, node.full_name, state, graph.actor_of(node))
         self._out.append(event)
         if state not in ACTIVE or state in HELD:
             self._touched.add(graph)

@@ -148,8 +148,8 @@ class Core(Clock):
         if child is graph.exit:
             self._finish(graph, node, result)
             return "done"
-        performer = graph.performer(child)
-        self._out.append(Dispatch(self._t(), graph.name, child.full_name, response, performer))
+        actor = graph.actor_of(child)
+        self._out.append(Dispatch(self._t(), graph.name, child.full_name, response, actor))
         match response:
             case "run":
                 self._run(graph, child)
@@ -375,9 +375,9 @@ class Core(Clock):
     def _result(self, graph: Running, node: Node, result: str) -> None:
         scripted = node.execution is None or not node.execution.number
         said = node.call.message if result != "on_stopped" or not scripted else None
-        performer = graph.performer(node)
+        actor = graph.actor_of(node)
         self._out.append(
-            NodeResultEvent(self._t(), graph.name, node.full_name, result, said, performer)
+            NodeResultEvent(self._t(), graph.name, node.full_name, result, said, actor)
         )
 
     # Stop and pause of one action

@@ -201,12 +201,12 @@ class Running:
         self.blocked: Node | None = None  # the node whose thread hangs while it ends the graph
         self.linked: dict[Node, list[Node] | None] = {}
 
-    def performer(self, node: Node) -> str:
+    def actor_of(self, node: Node) -> str:
         """Return the actor that performs an action of this graph: its own, or else that of the
         action for which this graph stands; "" if nobody is named."""
         if node.actor or self.above is None or self.home is None:
             return node.actor
-        return self.home.performer(self.above)
+        return self.home.actor_of(self.above)
 
     def own_names(self) -> set[str]:
         """Return the names that sub-graphs of this graph cannot have: the names of this graph and

@@ -1,4 +1,4 @@
-"""Graphs of several actors: the performers change nothing of a course, and the check names what robots could not do."""
+"""Graphs of several actors: the actors change nothing of a course, and the check names what robots could not do."""
 
 from itertools import pairwise
 from typing import Any
@@ -115,7 +115,7 @@ def test_an_arrow_that_hands_no_value_to_another_actor_is_not_named(graph: Graph
     assert "values-across-robots" not in {code for code, _ in told(graph)}
 
 
-def test_actions_without_an_actor_are_a_performer_of_their_own_beside_several() -> None:
+def test_actions_without_an_actor_are_like_one_more_actor_beside_several() -> None:
     graph = graph_of("entry>A", "A>B", "B>C", "C>exit")
     graph = with_values(graph, A=({}, {"p": TEXT}), B=({"p": TEXT}, {}))
     graph = owned(graph, A="Carrier", C="Scout")
@@ -210,7 +210,7 @@ def test_levels_that_double_are_looked_at_for_a_moment_only() -> None:
     assert "actors" in {problem.code for problem in found}
 
 
-def test_an_expected_course_holds_whoever_performs() -> None:
+def test_an_expected_course_holds_for_any_actors() -> None:
     shared, alone = owned(VALUES, A="Carrier", B="Scout"), owned(VALUES, A="Scout", B="Scout")
     steps = steps_of(simulate(shared))
     assert ("result", "on_true") in {(step.what, step.how) for step in steps if step.node == "B_0"}
@@ -259,7 +259,7 @@ def same_but_for_actors(graph: Graph, plain: Graph, graphs: Any = None, bare: An
 @pytest.mark.timeout(900)
 @given(st.data(), busy_graphs(), scripts(), st.none() | st.integers(1, 5_000))
 @settings(max_examples=examples(150), deadline=None, suppress_health_check=list(HealthCheck))
-def test_performers_change_nothing_of_a_course(
+def test_actors_change_nothing_of_a_course(
     data: st.DataObject, plain: Graph, script: Script, stop_ms: int | None
 ) -> None:
     lively = data.draw(st.sets(st.sampled_from([a.key for a in plain.actions]), max_size=1))
@@ -274,7 +274,7 @@ def test_performers_change_nothing_of_a_course(
 @pytest.mark.timeout(900)
 @given(st.data(), hierarchies(wired=True), scripts())
 @settings(max_examples=examples(100), deadline=None, suppress_health_check=list(HealthCheck))
-def test_performers_change_nothing_of_a_hierarchy_and_stay_in_the_flat_graph(
+def test_actors_change_nothing_of_a_hierarchy_and_stay_in_the_flat_graph(
     data: st.DataObject, hierarchy: Hierarchy, script: Script
 ) -> None:
     plain, bare = hierarchy.graph, hierarchy.graphs

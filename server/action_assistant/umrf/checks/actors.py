@@ -1,4 +1,4 @@
-"""Checks graphs whose actions belong to several actors: which of their parts a runner that leads
+"""Checks graphs whose actions belong to several actors: names the parts that a runner which leads
 several robots would refuse, or ask people about.
 
 See docs/umrf-and-the-engine.md 2.11 and docs/decisions/112-several-actors.md.
@@ -39,7 +39,7 @@ _ALSO: Final = 20  # further places of one problem
 _Reports: TypeAlias = Mapping[Key, set[Precondition]]
 
 
-class _Performers(NamedTuple):
+class _Actors(NamedTuple):
     """The actors that perform an action, or the actions of a sub-graph: all of them (`every`), those
     of its first actions and those of its last ones. "" is no actor; in a sub-graph it stands for the
     actor of the action around."""
@@ -49,10 +49,10 @@ class _Performers(NamedTuple):
     last: frozenset[str]
 
 
-_ByKey: TypeAlias = Mapping[Key, _Performers]
+_ByKey: TypeAlias = Mapping[Key, _Actors]
 
 
-def check_performers(subject: Subject, graphs: SubGraphs) -> None:
+def check_actors(subject: Subject, graphs: SubGraphs) -> None:
     """Report what a graph with several actors means on robots. A graph has several actors if its
     actions and those of its sub-graphs, at any depth, name more than one.
 
@@ -87,26 +87,26 @@ class _LedGraph:
 
     def __init__(self, graphs: SubGraphs) -> None:
         self._graphs = graphs
-        self._performers: dict[str, _Performers] = {}
-        self._found: dict[tuple[str, str], tuple[PlaceInside, ...]] = {}
+        self._actors: dict[str, _Actors] = {}
+        self._found: dict[tuple[str, str], tuple[PlaceInside, ...]] = {}  # by name and actor around
         for name in graphs.found:  # the innermost graphs first
-            self._performers[name] = self._of_graph(graphs.by_name[name])
+            self._actors[name] = self._of_graph(graphs.by_name[name])
 
     def check(self, subject: Subject, around: str, depth: int) -> None:
         """Report the problems of one graph. `around`: the actor of the action for which the graph
         stands; `depth`: the number of graphs around it."""
-        performers = {a.key: self._of_action(a, around) for a in subject.real}
+        actors_of = {a.key: self._of_action(a, around) for a in subject.real}
         flow = Reachability(subject)
         concurrency = Concurrency(subject, flow.runs, flow.reports)
         for relation in sorted(subject.sound, key=subject.place):
             is_end = relation.parent == ENTRY or relation.child == EXIT
             if not is_end and not relation.listing:
-                _check_arrow(subject, relation, performers, flow.reports)
-        _check_at_once(subject, performers, flow.runs, concurrency)
-        _check_repeated(subject, flow.runs, self._performers)
-        _check_spontaneous(subject, performers, flow.runs)
+                _check_arrow(subject, relation, actors_of, flow.reports)
+        _check_at_once(subject, actors_of, flow.runs, concurrency)
+        _check_repeated(subject, flow.runs, self._actors)
+        _check_spontaneous(subject, actors_of, flow.runs)
         for action in subject.real:
-            if len(performers[action.key].every) > 1 and depth < _DEEPEST:
+            if len(actors_of[action.key].every) > 1 and depth < _DEEPEST:
                 self._check_inside(subject, action, action.actor or around, depth)
 
     def _check_inside(self, subject: Subject, action: Action, actor: str, depth: int) -> None:
@@ -123,19 +123,19 @@ class _LedGraph:
                 place.code, "warning", message, action=action, member="/name", inside=place
             )
 
-    def _of_action(self, action: Action, around: str) -> _Performers:
+    def _of_action(self, action: Action, around: str) -> _Actors:
         actor = action.actor or around
-        inner = self._performers.get(action.name)
+        inner = self._actors.get(action.name)
         if inner is None or not inner.every:
-            return _Performers(*[frozenset({actor})] * 3)
-        return _Performers(*(frozenset(each or actor for each in side) for side in inner))
+            return _Actors(*[frozenset({actor})] * 3)
+        return _Actors(*(frozenset(each or actor for each in side) for side in inner))
 
-    def _of_graph(self, graph: Graph) -> _Performers:
+    def _of_graph(self, graph: Graph) -> _Actors:
         own = {a.key: self._of_action(a, "") for a in graph.actions if not a.missing}
         children = [own[r.child] for r in graph.relations if r.parent == ENTRY and r.child in own]
         parents = [own[r.parent] for r in graph.relations if r.child == EXIT and r.parent in own]
         none = frozenset[str]()
-        return _Performers(
+        return _Actors(
             none.union(*(each.every for each in own.values())),
             none.union(*(each.first for each in children)),
             none.union(*(each.last for each in parents)),
@@ -143,10 +143,10 @@ class _LedGraph:
 
 
 def _check_arrow(
-    subject: Subject, relation: Relation, performers: _ByKey, reports: _Reports
+    subject: Subject, relation: Relation, actors_of: _ByKey, reports: _Reports
 ) -> None:
     """Report an arrow that stops an action of another actor, or hands values to one."""
-    parent, child = performers[relation.parent], performers[relation.child]
+    parent, child = actors_of[relation.parent], actors_of[relation.child]
     reported = reports.get(relation.parent, set())
     answers = {
         relation.conditions.answer(outcome) for outcome in PRECONDITIONS if outcome in reported
@@ -180,14 +180,14 @@ def _handed_over(subject: Subject, relation: Relation) -> set[str]:
 
 
 def _check_at_once(
-    subject: Subject, performers: _ByKey, runs: Container[Key], concurrency: Concurrency
+    subject: Subject, actors_of: _ByKey, runs: Container[Key], concurrency: Concurrency
 ) -> None:
     """Report each action that may run at the same time as later ones of its actor. If too many pairs
     of actions may run at once to be known, only the first action of each actor is reported."""
     place = {action.key: number for number, action in enumerate(subject.real)}
     members: dict[str, list[Key]] = {}
     for action in subject.real:
-        for actor in sorted(performers[action.key].every) if action.key in runs else ():
+        for actor in sorted(actors_of[action.key].every) if action.key in runs else ():
             members.setdefault(actor, []).append(action.key)
     for actor, keys in members.items():
         left = set(keys)
@@ -217,13 +217,13 @@ def _check_repeated(subject: Subject, runs: Container[Key], nested: Container[st
     for action in subject.real:
         if action.key in again and action.key in runs and action.name not in nested:
             message = (
-                f"{action.full_name} can run more than once. On a robot that is led it is loaded anew each "
+                f"{action.full_name} may run more than once. On a robot that is led it is loaded anew each "
                 "time: what it remembers in itself is forgotten."
             )
             subject.report("loaded-anew", "warning", message, action=action)
 
 
-def _check_spontaneous(subject: Subject, performers: _ByKey, runs: Container[Key]) -> None:
+def _check_spontaneous(subject: Subject, actors_of: _ByKey, runs: Container[Key]) -> None:
     """Report spontaneous actions from which arrows lead to actions of other actors."""
     place = {action.key: number for number, action in enumerate(subject.real)}
     lively = [a for a in subject.real if a.type == "spontaneous" and a.key in runs]
@@ -235,10 +235,10 @@ def _check_spontaneous(subject: Subject, performers: _ByKey, runs: Container[Key
     )
     alike: dict[frozenset[str], Mask] = {}
     for key, number in place.items():
-        every = performers[key].every
+        every = actors_of[key].every
         alike[every] = alike.get(every, 0) | 1 << number
     for action in lively:
-        own = performers[action.key].every
+        own = actors_of[action.key].every
         same = alike[own] if len(own) == 1 else 1 << place[action.key]
         others = after[place[action.key]] & ~same
         if not others:
