@@ -75,7 +75,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "export": CommandEntry("remote", "print a graph as UMRF", described=True),
     "graphs": CommandEntry("remote", "list the graphs", described=True),
     "drafts": CommandEntry("drafts", "drafts of a graph: list, new, merge", described=True),
-    "runs": CommandEntry("remote", "list the runs, newest first", described=True),
+    "runs": CommandEntry("runs", "list the runs, newest first", described=True),
     "run": CommandEntry(
         "remote",
         "publish a graph as it is now, start it and wait for its end; exit 1 if it does not "

@@ -1,4 +1,4 @@
-"""Commands that talk to a running server: export, graphs, runs, run, stop."""
+"""Commands that talk to a running server: export, graphs, run, stop."""
 
 import argparse
 import sys
@@ -12,13 +12,10 @@ import msgspec
 from action_assistant.commands.client import (
     Server,
     add_server,
-    command,
     decoded,
     print_json,
     running,
 )
-from action_assistant.commands.databases import runs_copy
-from action_assistant.commands.runs import add_archives, add_since
 from action_assistant.errors import CannotStart
 from action_assistant.safe_text import one_line, told
 
@@ -47,45 +44,6 @@ def _add_graphs(graphs: argparse.ArgumentParser) -> None:
     graphs.set_defaults(handler=_graphs)
 
 
-def _add_runs(runs: argparse.ArgumentParser) -> None:
-    add_server(runs, "--graph patrol")
-    runs.add_argument("--graph", metavar="GRAPH", help="id or name")
-    runs.add_argument("--json", action="store_true", help="as JSON, for programs")
-    runs.set_defaults(handler=_runs)
-    more = runs.add_subparsers(
-        metavar="at-rest | since | verify | archive | restore | copy | examples"
-    )
-    rests = command(
-        more,
-        "at-rest",
-        "confirm that a run is at rest which no answer of its engine can prove so: after you looked",
-        'RUN --how "I stand beside it; nothing moves."',
-    )
-    rests.add_argument("run", metavar="RUN", help="id of the run")
-    rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
-    rests.set_defaults(handler=_at_rest)
-    add_archives(more)
-    runs_copy.add_to(more)
-    add_since(more)
-    brought = command(
-        more,
-        "examples",
-        "take in recorded runs that failed, to see how causes are found; each is there once",
-        "",
-    )
-    brought.set_defaults(handler=_examples)
-    again = command(
-        more,
-        "verify",
-        "simulate every expected course again, with the graph as it was and as it is now; exit 1 if "
-        "any goes another way",
-        "--graph patrol",
-    )
-    again.add_argument("--graph", metavar="GRAPH", help="id or name; only what is expected of it")
-    again.add_argument("--json", action="store_true", help="as JSON, for programs")
-    again.set_defaults(handler=_verify)
-
-
 def _add_run(run: argparse.ArgumentParser) -> None:
     add_server(run, "patrol --script fast.json")
     run.add_argument("graph", metavar="GRAPH", help="id or name")
@@ -108,7 +66,6 @@ def _add_stop(stop: argparse.ArgumentParser) -> None:
 COMMANDS: Final = {
     "export": _add_export,
     "graphs": _add_graphs,
-    "runs": _add_runs,
     "run": _add_run,
     "stop": _add_stop,
 }
@@ -133,35 +90,6 @@ def _graphs(options: argparse.Namespace) -> int:
 
     for graph in decoded(answer, list[GraphView]):
         print(one_line(f"{graph.id}  {graph.updated_at:{_TIME}}  {graph.name}"))
-    return 0
-
-
-def _verify(options: argparse.Namespace) -> int:
-    from action_assistant.commands.verify_runs import verify
-
-    return verify(options)
-
-
-def _examples(options: argparse.Namespace) -> int:
-    with running(options) as server:
-        taken = decoded(server.runner("POST", "/api/examples"), list[str])
-    print(f"{len(taken)} examples are there, with the label “example”.")
-    return 0
-
-
-def _runs(options: argparse.Namespace) -> int:
-    with running(options) as server:
-        query = {"graph": server.graph_id(options.graph)} if options.graph else {}
-        answer = server.runner("GET", "/api/runs", params=query)
-    if options.json:
-        print_json(answer.json())
-        return 0
-    from action_assistant.runner.runs.views import Listed
-
-    for run in decoded(answer, list[Listed]):
-        what = run.state + (f" ({run.result})" if run.result else "")
-        when = f"{run.started_at:{_TIME}}" if run.started_at else ""
-        print(one_line(f"{run.id}  {when}  {run.graph_name}  {run.engine}  {what}"))
     return 0
 
 
@@ -221,18 +149,6 @@ def _is_at_rest(run: Run) -> bool:
 def _why(run: Run) -> str:
     said = run["unconfirmed"] or run["detail"]
     return f"{said.rstrip('.')}. " if said else ""
-
-
-def _at_rest(options: argparse.Namespace) -> int:
-    """Record a person's word that a run is at rest, where no engine can prove it."""
-    with running(options) as server:
-        path = f"/api/runs/{options.run}/at_rest"
-        answer = server.runner("POST", path, json={"how": options.how})
-    from action_assistant.runner.runs.views import RunShown
-
-    run = decoded(answer, RunShown)
-    print(one_line(f"run {run.number} of {run.graph_name} is over: {run.state}"))
-    return 0
 
 
 def verdict(run: "RunShown") -> tuple[int, str]:

@@ -1,12 +1,21 @@
-"""Commands for archives of runs: `runs archive`, `runs restore`."""
+"""The command `runs` with its own commands: at rest, since, examples, verify, archive and restore."""
 
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from action_assistant import paths, settings
-from action_assistant.commands.client import Server, command, decoded, print_json, refused, running
+from action_assistant.commands.client import (
+    Server,
+    add_server,
+    command,
+    decoded,
+    print_json,
+    refused,
+    running,
+)
+from action_assistant.commands.databases import runs_copy
 from action_assistant.commands.drafts import changes_lines
 from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.safe_text import one_line
@@ -17,7 +26,93 @@ if TYPE_CHECKING:  # slow to load, and most calls do not need it
     from action_assistant.editor.history.course_search import SinceWhen
 
 
-def add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+_TIME: Final = "%Y-%m-%dT%H:%M:%S"
+
+
+def _add_runs(runs: argparse.ArgumentParser) -> None:
+    add_server(runs, "--graph patrol")
+    runs.add_argument("--graph", metavar="GRAPH", help="id or name")
+    runs.add_argument("--json", action="store_true", help="as JSON, for programs")
+    runs.set_defaults(handler=_runs)
+    more = runs.add_subparsers(
+        metavar="at-rest | since | verify | archive | restore | copy | examples"
+    )
+    rests = command(
+        more,
+        "at-rest",
+        "confirm that a run is at rest which no answer of its engine can prove so: after you looked",
+        'RUN --how "I stand beside it; nothing moves."',
+    )
+    rests.add_argument("run", metavar="RUN", help="id of the run")
+    rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
+    rests.set_defaults(handler=_at_rest)
+    _add_archives(more)
+    runs_copy.add_to(more)
+    _add_since(more)
+    brought = command(
+        more,
+        "examples",
+        "take in recorded runs that failed, to see how causes are found; each is there once",
+        "",
+    )
+    brought.set_defaults(handler=_examples)
+    again = command(
+        more,
+        "verify",
+        "simulate every expected course again, with the graph as it was and as it is now; exit 1 if "
+        "any goes another way",
+        "--graph patrol",
+    )
+    again.add_argument("--graph", metavar="GRAPH", help="id or name; only what is expected of it")
+    again.add_argument("--json", action="store_true", help="as JSON, for programs")
+    again.set_defaults(handler=_verify)
+
+
+COMMANDS: Final = {"runs": _add_runs}
+
+
+def _runs(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        query = {"graph": server.graph_id(options.graph)} if options.graph else {}
+        answer = server.runner("GET", "/api/runs", params=query)
+    if options.json:
+        print_json(answer.json())
+        return 0
+    from action_assistant.runner.runs.views import Listed
+
+    for run in decoded(answer, list[Listed]):
+        what = run.state + (f" ({run.result})" if run.result else "")
+        when = f"{run.started_at:{_TIME}}" if run.started_at else ""
+        print(one_line(f"{run.id}  {when}  {run.graph_name}  {run.engine}  {what}"))
+    return 0
+
+
+def _at_rest(options: argparse.Namespace) -> int:
+    """Record a person's word that a run is at rest, where no engine can prove it."""
+    with running(options) as server:
+        path = f"/api/runs/{options.run}/at_rest"
+        answer = server.runner("POST", path, json={"how": options.how})
+    from action_assistant.runner.runs.views import RunShown
+
+    run = decoded(answer, RunShown)
+    print(one_line(f"run {run.number} of {run.graph_name} is over: {run.state}"))
+    return 0
+
+
+def _examples(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        taken = decoded(server.runner("POST", "/api/examples"), list[str])
+    print(f"{len(taken)} examples are there, with the label “example”.")
+    return 0
+
+
+def _verify(options: argparse.Namespace) -> int:
+    from action_assistant.commands.verify_runs import verify
+
+    return verify(options)
+
+
+def _add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the command `runs since`."""
     since = command(
         runs,
@@ -95,7 +190,7 @@ def _print_partings(found: "SinceWhen", difference: Difference) -> None:
         print(f"Only {found.looked} moments were looked at; there may be further places.")
 
 
-def add_archives(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+def _add_archives(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
     """Add the commands of this module to `runs`."""
     archive = command(
         runs,
