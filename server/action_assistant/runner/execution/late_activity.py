@@ -33,7 +33,7 @@ _GET_S: Final = 1.0
 _PATIENCE_S: Final = 3.0  # after which feedback counts although no answer confirms it
 _AGAIN_S: Final = 0.5
 _KEPT: Final = 200
-_TOLD: Final = 500  # newest entries of a robot's log
+_LOG_ENTRIES: Final = 500  # newest entries of a robot's log
 
 
 class LateActivity:
@@ -129,7 +129,7 @@ class LateActivity:
         if opened is not None and opened.run.engine != robot:
             self._elsewhere.put((robot, run), True)
             return
-        if opened is not None and opened.moves_again(self._told(opened.run, shown)):
+        if opened is not None and opened.moves_again(self._moves_again(opened.run, shown)):
             return
         while run in self._runs.by_id:  # noqa: ASYNC110 - it is just being left
             await anyio.sleep(0.01)
@@ -137,7 +137,7 @@ class LateActivity:
         if found is None or not _is_of(found[0], engine):
             self._elsewhere.put((robot, run), True)
         elif found[0].end is not None:  # else it is being adopted after a restart
-            self._runs.reopen(*found, self._told(found[0], shown))
+            self._runs.reopen(*found, self._moves_again(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
         """Return a run that is not open, and its last seq. Return None when there is no such run, or when an
@@ -146,7 +146,7 @@ class LateActivity:
             return closed
         while True:
             try:
-                entries = await self._robots.robot_log.newest(robot, _TOLD)
+                entries = await self._robots.robot_log.newest(robot, _LOG_ENTRIES)
                 found, seq = await self._history.followed(run)
             except NotFound:
                 return None
@@ -160,7 +160,7 @@ class LateActivity:
                 )
                 return None if played or found is None else (found, seq)
 
-    def _told(self, run: Run, shown: Snapshot) -> MovesAgain:
+    def _moves_again(self, run: Run, shown: Snapshot) -> MovesAgain:
         nodes = ", ".join(name for name, state in shown.nodes.items() if state in ACTIVE)
         text = (
             f"MOVES AGAIN: {run.engine} shows {nodes} moving in {run.graph_name}, after the run "

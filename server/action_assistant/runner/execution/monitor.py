@@ -45,7 +45,7 @@ _SILENT_S: Final = 3.0
 _APPEAR_S: Final = 3.0  # after a start until its graph must show in answers
 _ABSENT_S: Final = 1.0  # for which answers must lack a graph whose start the engine has refused
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun
-_LOADING_TOLD_S: Final = 1.5  # by then feedback that may rule loading out has come
+_LOADING_REPORTED_S: Final = 1.5  # by then feedback that may rule loading out has come
 _NO_PROOF: Final = "{doubt}, so that no answer proves anything"
 
 
@@ -115,7 +115,7 @@ class Monitor:
         self._threads = EngineThreads()
         self._reads = False  # while a job reads arrows of graphs
         self._loads_since: float | None = None
-        self._loading_told_at = 0.0  # seconds of loading at which that is told again
+        self._loading_reported_at = 0.0  # seconds of loading at which that is told again
         self._answered = False  # by a get, since the last feedback
         self._exact = exact
         self._rest = RestProof(exact=exact)
@@ -426,7 +426,7 @@ class Monitor:
             return ()
         if not self._rest.pending:
             self._loads_since = None
-            self._tell_loading(changes, (), 0.0)
+            self._report_loading(changes, (), 0.0)
             return ()
         unread = self._loading.unread(ours)
         if unread and not self._reads:
@@ -437,14 +437,14 @@ class Monitor:
             found = ()
         if not found:
             self._loads_since = None
-            self._tell_loading(changes, (), 0.0)
+            self._report_loading(changes, (), 0.0)
         elif self._loads_since is None:
             self._loads_since = anyio.current_time()
-        elif (waited := anyio.current_time() - self._loads_since) >= _LOADING_TOLD_S:
-            self._tell_loading(changes, found, waited)
+        elif (waited := anyio.current_time() - self._loads_since) >= _LOADING_REPORTED_S:
+            self._report_loading(changes, found, waited)
         return found
 
-    def _tell_loading(
+    def _report_loading(
         self, changes: RunChanges, actions: Sequence[LoadingAction], waited_s: float
     ) -> None:
         """Report that these actions may be loading since `waited_s` seconds or, if there are none,
@@ -454,9 +454,9 @@ class Monitor:
         if not why and not known:
             return
         is_same = bool(why) and known.startswith(why)
-        if is_same and waited_s < self._loading_told_at:
+        if is_same and waited_s < self._loading_reported_at:
             return
-        self._loading_told_at = max(4.0, 2 * waited_s)
+        self._loading_reported_at = max(4.0, 2 * waited_s)
         usual = self._loading_times.usual(run.engine, actions)
         times = [f"{waited_s:.0f} s so far"] * is_same + [usual] * bool(usual)
         sentence = f"{why} ({'; '.join(times)})" if times else why
@@ -489,7 +489,7 @@ class Monitor:
         self._lacking = await run_in_worker(stall.lacking_in_words, umrf)
         return Finding()
 
-    async def _tell_stall(self, run: Run, run_in_worker: RunInWorker) -> Finding:
+    async def _report_stall(self, run: Run, run_in_worker: RunInWorker) -> Finding:
         try:
             text = await run_in_worker(stall.packed_alarm_text, stall.packed(run), self.umrf)
         except Refused:  # nobody can read the graph now; what is known must be said all the same
@@ -510,7 +510,7 @@ class Monitor:
         stalls = self._standstill.seen(shown, asked) and not self._exact
         if stalls and self._stalled_as is not run.actions:
             self._stalled_as = run.actions
-            self._jobs.append(partial(self._tell_stall, changes.run))
+            self._jobs.append(partial(self._report_stall, changes.run))
 
 
 def _has_begun(run: Run) -> bool:

@@ -22,7 +22,7 @@ from action_assistant.runner.runs.run import Run
 #: The end of every alarm about a Stop that nothing proves.
 LOOK_AT_IT: Final = "Look at the robot; its hardware stop is the one to use."
 
-_TOLD: Final = frozenset(
+_WITHOUT_END: Final = frozenset(
     {"H7", "H8"}
 )  # hazards after which a run goes nowhere, although the engine goes on
 _RESULTS: Final = {"HALTED": "on_halted", "STOPPED": "on_stopped", "ERROR": "on_error"}
@@ -62,7 +62,7 @@ class RunChanges:
         """Add observations of the engine, and an alarm for each hazard that people must know."""
         self.tell(Observed(self._clock_us(), thin(self.run, seen)))
         for item in seen:
-            if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _TOLD):
+            if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _WITHOUT_END):
                 place = f" at {item.node}" if item.node else ""
                 self.alarm(item.code, f"{item.code}{place}: {item.message or item.effect}")
 

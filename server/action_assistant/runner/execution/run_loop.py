@@ -51,7 +51,7 @@ from action_assistant.runner.runs.events import (
     Silent,
     StopSent,
 )
-from action_assistant.runner.runs.history import sent_of
+from action_assistant.runner.runs.history import newest_sent_text
 from action_assistant.runner.runs.recorder import RunRecorder, Store
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.doubtful_errors import DoubtfulErrors
@@ -270,7 +270,7 @@ class OpenRun:
         """Give the monitor the graph that an earlier process has sent, in the background: it is
         needed only to name what the run waits for."""
         try:
-            umrf = await sent_of(self._store, self.run)
+            umrf = await newest_sent_text(self._store, self.run)
         except (Refused, msgspec.DecodeError):
             log.warning("the graph of run %s cannot be read", self.run.id)
         else:

@@ -161,7 +161,7 @@ class SimulatedLink:
         with anyio.CancelScope(shield=True):  # so that a Stop that comes meanwhile finds an engine
             if self._process is None and not self._why:
                 await self._begin()
-            await self._told("start", order)
+            await self._request("start", order)
 
     async def stop(self, graph_name: str) -> None:
         """Tell the engine to stop a graph now."""
@@ -178,7 +178,7 @@ class SimulatedLink:
     async def modify(self, order: Order, continue_from: str = "") -> None:
         """Change a running graph now. Raise NotSent if the process cannot take the change,
         EngineRefused if the engine refuses it."""
-        await self._told("modify", order, continue_from)
+        await self._request("modify", order, continue_from)
 
     async def get(self) -> Answer:
         """Return all graphs that the engine holds now. Raise NoAnswer if the engine or its process
@@ -188,7 +188,7 @@ class SimulatedLink:
             return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=())
         asked_at = self._clock_us()
         try:
-            found: Answer = await self._told("get")
+            found: Answer = await self._request("get")
         except NotSent as gone:
             raise NoAnswer(str(gone)) from gone
         return msgspec.structs.replace(found, asked_at=asked_at, incarnation=self._incarnation)
@@ -227,7 +227,7 @@ class SimulatedLink:
         reader, self._writer = await asyncio.open_connection(sock=ours, limit=_WAITING)
         self._reading = asyncio.create_task(self._read(reader))
 
-    async def _told(self, command: str, *args: Any) -> Any:
+    async def _request(self, command: str, *args: Any) -> Any:
         """Send a command and return the engine's answer. Raise NotSent if its process does not run;
         raise EngineRefused or NoAnswer as the engine in the process does."""
         number = next(self._numbers)

@@ -97,7 +97,7 @@ def _decoded(event: Event) -> RunEvent | None:
         return None
 
 
-async def sent_of(store: Store, run: Run) -> str | None:
+async def newest_sent_text(store: Store, run: Run) -> str | None:
     """Return the text of the graph that a run has now: the one that was started, or the last change
     of it. Return None if no stored event has the text. Raise Unavailable if the journal cannot
     be read."""

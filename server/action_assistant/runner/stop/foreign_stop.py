@@ -37,7 +37,7 @@ _SLOWEST_S: Final = 1.0
 _GET_S: Final = 1.0
 _PATIENCE_S: Final = 60.0
 _LOUD_S: Final = 2.0
-_TOLD: Final = 500  # newest entries of a robot's log
+_LOG_ENTRIES: Final = 500  # newest entries of a robot's log
 
 _TAKEN_UP: Final = "the runner was started anew, and it is not proven yet"
 _RESTARTED: Final = "the engine was restarted: look at the robot"
@@ -135,7 +135,7 @@ class ForeignStopLoop:
         engine. A robot whose log cannot be read is skipped."""
         for robot in self._robots.names:
             try:
-                stored = await self._robots.robot_log.newest(robot, _TOLD)
+                stored = await self._robots.robot_log.newest(robot, _LOG_ENTRIES)
             except Exception:  # the Stops on other robots must go on
                 log.exception("whether something was being stopped on %s cannot be read", robot)
                 continue
