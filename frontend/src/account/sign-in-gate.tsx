@@ -22,14 +22,14 @@ import {
   takeCredential,
   takeFarewell,
 } from "../api/session";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { boundedPart } from "../ui/lazy-part";
 import { useRootMark } from "../ui/use-root-mark";
 import { useWatched } from "../ui/watched";
 import style from "./sign-in-gate.module.css";
 
-const SignIn = lazyPart(() => import("./sign-in").then((part) => part.SignIn));
-const Invitation = lazyPart(() => import("./sign-in").then((part) => part.Invitation));
-const SignInBar = lazyPart(() => import("./sign-in").then((part) => part.SignInBar));
+const SignIn = boundedPart(() => import("./sign-in").then((part) => part.SignIn));
+const Invitation = boundedPart(() => import("./sign-in").then((part) => part.Invitation));
+const SignInBar = boundedPart(() => import("./sign-in").then((part) => part.SignInBar));
 
 type Gate =
   | { at: "knocking" }
@@ -194,28 +194,16 @@ export function SignInGate({ children }: { children: ReactNode }) {
   );
   if (gate.at === "knocking") return <div aria-busy="true" />;
   if (gate.at === "invited") {
-    return (
-      <PartBoundary>
-        <Invitation key={gate.key.text} link={gate.key} invited={gate.invited} onOpen={letIn} />
-      </PartBoundary>
-    );
+    return <Invitation key={gate.key.text} link={gate.key} invited={gate.invited} onOpen={letIn} />;
   }
   if (hold === null) {
-    return (
-      <PartBoundary>
-        <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />
-      </PartBoundary>
-    );
+    return <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />;
   }
   return (
     <PersonContext value={hold}>
       {children}
       {offline && <OfflineBar />}
-      {ended && (
-        <PartBoundary>
-          <SignInBar onOpen={letIn} />
-        </PartBoundary>
-      )}
+      {ended && <SignInBar onOpen={letIn} />}
     </PersonContext>
   );
 }

@@ -126,11 +126,10 @@ export function modifyRun(
   return runnerAt(runner).post("/api/runs/{run}/modify", { path: { run }, body });
 }
 
-export function useRuns(runner: string | undefined, graph?: string) {
+export function useRuns(runner: string | undefined) {
   return useQuery({
-    queryKey: ["runs", "list", graph ?? ""],
-    queryFn: ({ signal }) =>
-      runnerAt(runner).get("/api/runs", { query: { limit: 200, graph }, signal }),
+    queryKey: ["runs", "list"],
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/runs", { query: { limit: 200 }, signal }),
     enabled: runner !== undefined,
   });
 }

@@ -7,7 +7,7 @@ import { SignInGate } from "../account/sign-in-gate";
 import { Refusal } from "../api/http";
 import { basePath } from "../api/page-url";
 import { actionDrag } from "../canvas/action-drag";
-import { NewVersionNotice } from "../offline/new-version-notice";
+import { NewVersionNotice } from "../offline/page-version";
 import { UnansweredStartNotice } from "../runs/start/unanswered-starts";
 import { RestQuestion } from "../runs/stop/rest-question";
 import { LiveRegion } from "../ui/announcer";

@@ -32,13 +32,16 @@ import { StartControl } from "../runs/start/start-control";
 import { type GraphInRun, isInRun, useProgress } from "../status/progress-inside";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { useStableCallback } from "../ui/hooks";
+import { boundedPart, lazyPart } from "../ui/lazy-part";
 import { instant } from "../ui/times";
-import { useStableCallback } from "../ui/use-stable-callback";
 import { useNewGraphs } from "./imports/new-graphs";
 import { Nowhere, PageBar, PageFrame, useTitle } from "./page-frame";
 
-const DraftStatus = lazyPart(() => import("../runs/draft-status").then((part) => part.DraftStatus));
+const DraftStatus = boundedPart(
+  () => import("../runs/draft-status").then((part) => part.DraftStatus),
+  { waiting: null },
+);
 const RecordDryRun = lazyPart(() =>
   import("../runs/start/record-dry-run").then((part) => part.RecordDryRun),
 );
@@ -173,11 +176,7 @@ function Inside({ id }: { id: string }) {
       run={live?.ended_at === null ? live.id : null}
       Bar={TitledBar}
       list={<Lists create={create} choose={choose} />}
-      status={
-        <PartBoundary waiting={null}>
-          <Draft run={inside === null ? live : null} label={label} settle={settle} />
-        </PartBoundary>
-      }
+      status={<Draft run={inside === null ? live : null} label={label} settle={settle} />}
       start={mayStart && <Start settle={settle} />}
       record={mayStart && <Record />}
       strip={

@@ -1,11 +1,11 @@
 /** The first screen: every graph. */
 import { NamePrompt } from "../account/name-prompt";
 import { Home } from "../home/home";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { boundedPart } from "../ui/lazy-part";
 import { useNewGraphs } from "./imports/new-graphs";
 import { PageBar, PageFrame, useTitle } from "./page-frame";
 
-const KeptGraphs = lazyPart(() => import("./kept-graphs").then((part) => part.KeptGraphs));
+const KeptGraphs = boundedPart(() => import("./kept-graphs").then((part) => part.KeptGraphs));
 
 export function HomeScreen() {
   const { create, choose } = useNewGraphs();
@@ -13,16 +13,7 @@ export function HomeScreen() {
   return (
     <PageFrame>
       <PageBar crumbs={[{ label: "Graphs" }]} />
-      <Home
-        onNew={create}
-        onImport={choose}
-        greeting={<NamePrompt />}
-        kept={
-          <PartBoundary>
-            <KeptGraphs />
-          </PartBoundary>
-        }
-      />
+      <Home onNew={create} onImport={choose} greeting={<NamePrompt />} kept={<KeptGraphs />} />
     </PageFrame>
   );
 }

@@ -8,9 +8,9 @@ import { useMay } from "../api/people";
 import { MovesNowLine } from "../runs/moves-now";
 import { graphOnScreen } from "../runs/stop/stop-surroundings";
 import { Empty } from "../ui/empty";
+import { useStableCallback } from "../ui/hooks";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { type Crumb, TopBar } from "../ui/top-bar";
-import { useStableCallback } from "../ui/use-stable-callback";
 import { isolated } from "../words/isolated";
 import style from "./page-frame.module.css";
 

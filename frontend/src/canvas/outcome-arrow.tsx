@@ -4,7 +4,7 @@
  */
 import { BaseEdge, EdgeLabelRenderer, type EdgeProps, useStoreApi } from "@xyflow/react";
 import { memo, use, useLayoutEffect, useRef, useState } from "react";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { boundedPart, lazyPart, PartBoundary } from "../ui/lazy-part";
 import { pillWord } from "./arrows/bundles";
 import { PILL_PLAY } from "./arrows/docks";
 import { behindPill, pathOf } from "./arrows/line-path";
@@ -23,8 +23,10 @@ import type { DraggedOutcome } from "./outcome-handles";
 const OutcomeHandles = lazyPart(() =>
   import("./outcome-handles").then((part) => part.OutcomeHandles),
 );
-const BendHandles = lazyPart(() =>
-  import("./arrows/bend-handles").then((part) => part.BendHandles),
+// An error notice has no place within SVG.
+const BendHandles = boundedPart(
+  () => import("./arrows/bend-handles").then((part) => part.BendHandles),
+  { waiting: null, frame: () => null },
 );
 
 type ArrowData = NonNullable<Arrow["data"]>;
@@ -62,9 +64,6 @@ function portPiece(line: RoutedLine, x: number, y: number, pill: Point): Point[]
   return [[x, y - 10], [x, turn], [pill[0], turn], pill];
 }
 
-/** Draws nothing where the error notice of a failed part would be; it has no place within SVG. */
-const noNotice = () => null;
-
 export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) {
   const { id, data, selected, sourceX, sourceY, targetX, targetY } = props;
   const group = useRef<SVGGElement>(null);
@@ -96,11 +95,7 @@ export const OutcomeArrow = memo(function OutcomeArrow(props: EdgeProps<Arrow>) 
         />
       )}
       {data.lead && pill && <Pill {...{ id, data, line, pill }} selected={selected === true} />}
-      {data.lead && selected && (
-        <PartBoundary waiting={null} frame={noNotice}>
-          <BendHandles arrow={id} bundle={data.bundle} line={line} />
-        </PartBoundary>
-      )}
+      {data.lead && selected && <BendHandles arrow={id} bundle={data.bundle} line={line} />}
     </g>
   );
 });

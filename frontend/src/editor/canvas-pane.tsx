@@ -16,7 +16,7 @@ import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
 import { useHasFingersOnly } from "../ui/hooks";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { boundedPart } from "../ui/lazy-part";
 import { useWatched } from "../ui/watched";
 import { EditableCanvas } from "./canvas/editable-canvas";
 import { useCanvasElements } from "./canvas/use-canvas-elements";
@@ -28,9 +28,11 @@ import type { EditorState } from "./use-editor";
 import { useGraphLink } from "./use-graph-link";
 import type { Past } from "./use-past";
 
-const PastBar = lazyPart(() => import("../history/past-bar").then((part) => part.PastBar));
-const DraftBar = lazyPart(() => import("../drafts/draft-bar").then((part) => part.DraftBar));
-const DryRunBar = lazyPart(() => import("./dry-run/dry-run-bar").then((part) => part.DryRunBar));
+const PastBar = boundedPart(() => import("../history/past-bar").then((part) => part.PastBar));
+const DraftBar = boundedPart(() => import("../drafts/draft-bar").then((part) => part.DraftBar), {
+  waiting: null,
+});
+const DryRunBar = boundedPart(() => import("./dry-run/dry-run-bar").then((part) => part.DryRunBar));
 
 interface Props {
   me: string;
@@ -175,7 +177,7 @@ function PaneInFlow(props: Props) {
 
   return (
     <div className={style.whole}>
-      <DraftBarAbove id={context.id} />
+      <DraftBar id={context.id} />
       <div className={style.sides} data-side={side !== null || undefined}>
         {side && <side.Canvas {...{ side, flow, onPanned: endFollowing }} />}
         <div
@@ -228,15 +230,6 @@ function useDrawnContext(seen: SeenPast | null): EditorContext {
   return useMemo<EditorContext>(() => ({ ...context, graph }), [context, graph]);
 }
 
-/** Shows the bar above the canvas of a draft, which leads to its origin. */
-function DraftBarAbove({ id }: { id: string }) {
-  return (
-    <PartBoundary waiting={null}>
-      <DraftBar id={id} />
-    </PartBoundary>
-  );
-}
-
 interface PlaybackBarProps {
   context: EditorContext;
   record: ReactNode;
@@ -247,23 +240,17 @@ interface PlaybackBarProps {
 function PlaybackBar({ context, record, past }: PlaybackBarProps) {
   const { dryRun, past: place } = context;
   if (dryRun) {
-    return (
-      <PartBoundary>
-        <DryRunBar context={{ ...context, dryRun }} run={dryRun} record={record} />
-      </PartBoundary>
-    );
+    return <DryRunBar context={{ ...context, dryRun }} run={dryRun} record={record} />;
   }
   if (place === null) return null;
   return (
-    <PartBoundary>
-      <PastBar
-        drawn={place}
-        wanted={past.wanted}
-        show={past.show}
-        side={past.side}
-        onSide={past.setSide}
-      />
-    </PartBoundary>
+    <PastBar
+      drawn={place}
+      wanted={past.wanted}
+      show={past.show}
+      side={past.side}
+      onSide={past.setSide}
+    />
   );
 }
 

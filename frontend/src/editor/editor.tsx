@@ -2,7 +2,6 @@
 
 import { useLocalStorage } from "@mantine/hooks";
 import {
-  type ComponentProps,
   type ComponentType,
   createContext,
   memo,
@@ -20,7 +19,6 @@ import { useOpenThreadsOnCards, useThreads } from "../comments/use-threads";
 import type { DryRunSeed } from "../dry-run/seed";
 import type { DryRun } from "../dry-run/use-dry-run";
 import {
-  type AddRequest,
   addActionAt,
   type EditorContext,
   EditorReactContext,
@@ -40,10 +38,9 @@ import { People } from "../people/people";
 import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
-import { useIsPhone, useIsWide } from "../ui/hooks";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { useIsPhone, useIsWide, useStableCallback } from "../ui/hooks";
+import { boundedPart } from "../ui/lazy-part";
 import type { Crumb } from "../ui/top-bar";
-import { useStableCallback } from "../ui/use-stable-callback";
 import { CanvasPane } from "./canvas-pane";
 import { Overlays } from "./menus/overlays";
 import { DesktopLayout, DryRunButton, PhoneLayout } from "./panels/layouts";
@@ -142,20 +139,30 @@ function LateParts() {
   );
 }
 
-const FindBar = lazyPart(() => import("../find/find-bar").then((part) => part.FindBar));
-const QuickAdd = lazyPart(() => import("./canvas/quick-add").then((part) => part.QuickAdd));
-const HistoryPanel = lazyPart(() =>
+const FindBar = boundedPart(() => import("../find/find-bar").then((part) => part.FindBar), {
+  waiting: null,
+});
+const QuickAdd = boundedPart(() => import("./canvas/quick-add").then((part) => part.QuickAdd), {
+  waiting: null,
+});
+const HistoryPanel = boundedPart(() =>
   import("../history/history-panel").then((part) => part.HistoryPanel),
 );
-const DraftsHere = lazyPart(() => import("../drafts/drafts-here").then((part) => part.DraftsHere));
-const Inspector = lazyPart(() => import("../inspector/inspector").then((part) => part.Inspector));
-const LevelStatus = lazyPart(() =>
-  import("../levels/level-status").then((part) => part.LevelStatus),
+const DraftsHere = boundedPart(
+  () => import("../drafts/drafts-here").then((part) => part.DraftsHere),
+  { waiting: null },
 );
-const PastDetails = lazyPart(() =>
+const Inspector = boundedPart(() =>
+  import("../inspector/inspector").then((part) => part.Inspector),
+);
+const LevelStatus = boundedPart(
+  () => import("../levels/level-status").then((part) => part.LevelStatus),
+  { waiting: null },
+);
+const PastDetails = boundedPart(() =>
   import("../history/past-details").then((part) => part.PastDetails),
 );
-const Outline = lazyPart(() => import("../outline/outline").then((part) => part.Outline));
+const Outline = boundedPart(() => import("../outline/outline").then((part) => part.Outline));
 
 /** State of the editor for the parts that the page provides, such as those of runs. */
 interface EditorSummary {
@@ -265,14 +272,6 @@ function useSummary(
   };
 }
 
-function OutlinePane(props: ComponentProps<typeof Outline>) {
-  return (
-    <PartBoundary>
-      <Outline {...props} />
-    </PartBoundary>
-  );
-}
-
 interface DetailsProps {
   past: Past;
   panel: Panel;
@@ -286,42 +285,9 @@ function DetailsPane({ past: { place, seen }, panel, beside, children }: Details
   const { selection } = useEditorContext();
   if (place === null && !(beside && selection.size === 1)) return children;
   return (
-    <PartBoundary>
-      <PastDetails changes={seen?.changes ?? null} panel={panel}>
-        {children}
-      </PastDetails>
-    </PartBoundary>
-  );
-}
-
-function HistoryPane() {
-  const drafts = (
-    <PartBoundary waiting={null}>
-      <DraftsHere />
-    </PartBoundary>
-  );
-  return (
-    <PartBoundary>
-      <HistoryPanel above={drafts} />
-    </PartBoundary>
-  );
-}
-
-function FindPane(props: ComponentProps<typeof FindBar>) {
-  return (
-    <PartBoundary waiting={null}>
-      <FindBar {...props} />
-    </PartBoundary>
-  );
-}
-
-type Adding = ComponentProps<typeof QuickAdd>;
-
-function AddPane({ request, ...others }: Omit<Adding, "request"> & { request: AddRequest | null }) {
-  return (
-    <PartBoundary waiting={null}>
-      {request !== null && <QuickAdd request={request} {...others} />}
-    </PartBoundary>
+    <PastDetails changes={seen?.changes ?? null} panel={panel}>
+      {children}
+    </PastDetails>
   );
 }
 
@@ -348,9 +314,7 @@ function barParts(
     crumbs: crumbsOf(context, search, rename),
     status: (
       <>
-        <PartBoundary waiting={null}>
-          <LevelStatus />
-        </PartBoundary>
+        <LevelStatus />
         <SaveStatus />
         <ProblemCount told={told} />
         {!summary.compact && status}
@@ -436,23 +400,21 @@ export function Editor(props: Props) {
     panels,
     stage,
     strip,
-    outline: <OutlinePane progress={progress} />,
-    history: <HistoryPane />,
+    outline: <Outline progress={progress} />,
+    history: <HistoryPanel above={<DraftsHere />} />,
     find: editor.isFindOpen && (
-      <FindPane problems={problems?.problems ?? []} onClose={editor.closeFind} />
+      <FindBar problems={problems?.problems ?? []} onClose={editor.closeFind} />
     ),
     details: (
       <DetailsPane past={past} panel={editor.panel} beside={!phone && panels.side === "history"}>
-        <PartBoundary>
-          <StillInspector
-            id={id}
-            seq={context.past?.at ?? link.seq}
-            panel={editor.panel}
-            problems={context.past === null ? problems : undefined}
-            told={context.past === null ? told : NOTHING_TOLD}
-            threads={threads}
-          />
-        </PartBoundary>
+        <StillInspector
+          id={id}
+          seq={context.past?.at ?? link.seq}
+          panel={editor.panel}
+          problems={context.past === null ? problems : undefined}
+          told={context.past === null ? told : NOTHING_TOLD}
+          threads={threads}
+        />
       </DetailsPane>
     ),
     status: props.status,
@@ -470,7 +432,9 @@ export function Editor(props: Props) {
       <RoomNotices />
       <LateParts />
       <Overlays context={context} known={known} overlay={overlay} onClose={editor.closeOverlay} />
-      <AddPane context={context} request={adding} known={known} onClose={editor.closeAdd} />
+      {adding !== null && (
+        <QuickAdd context={context} request={adding} known={known} onClose={editor.closeAdd} />
+      )}
     </EditorContextProvider>
   );
 }

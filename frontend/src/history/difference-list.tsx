@@ -5,7 +5,7 @@
 import { memo, useMemo } from "react";
 import { CHANGE_SIGNS } from "../canvas/marks/change-marks";
 import { useEditorContext } from "../edit-actions/editor-context";
-import { useStableCallback } from "../ui/use-stable-callback";
+import { useStableCallback } from "../ui/hooks";
 import { isolated } from "../words/isolated";
 import { showThing } from "./changes-walk";
 import { type ChangedThing, type GraphChanges, walkOrder } from "./graph-difference";

@@ -8,7 +8,7 @@ import type { HistoryEntry } from "../api/history";
 import { errorText } from "../api/http";
 import type { ListedRun } from "../api/review";
 import { useEditorContext } from "../edit-actions/editor-context";
-import { useRunStatus } from "../status/run-status";
+import { useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { usePersonColors, useThrottledLink } from "../sync/use-room";
 import { keyOf } from "../ui/keys";

@@ -7,7 +7,7 @@ import { authorName, fetchVersion, type PinnedGraph, type Version } from "../api
 import { useLive } from "../api/page-link";
 import type { ListedRun } from "../api/review";
 import type { Tone } from "../status/progress";
-import { type Heard, runStatus, useRunStatus } from "../status/run-status";
+import { type Heard, runStatus, useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { day, hourMinute, instant } from "../ui/times";
 import { Tooltip } from "../ui/tooltip";

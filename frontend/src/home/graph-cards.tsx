@@ -9,10 +9,10 @@ import { newestRun } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useKnownColors } from "../api/people";
 import { type Run, useRuns } from "../api/runs";
-import { useRunStatus } from "../status/run-status";
+import { useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { boundedPart } from "../ui/lazy-part";
 import { colorOfName, initials } from "../ui/name-colors";
 import { ago, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
@@ -24,8 +24,10 @@ import { allLabels, type GraphOrder, lastRuns, ORDERS, selectGraphs } from "./gr
 import home from "./home.module.css";
 
 /** Decoration, and the reading and laying out of graphs with it: the list is there without. */
-const GraphPreview = lazyPart(() => import("./graph-preview").then((part) => part.GraphPreview));
-const nothing = () => null;
+const GraphPreview = boundedPart(
+  () => import("./graph-preview").then((part) => part.GraphPreview),
+  { frame: () => null },
+);
 
 const FEW = 4; // robots or labels on a card
 
@@ -68,9 +70,7 @@ function GraphCard({ graph, names, last }: GraphCardProps) {
     <article className={home.card}>
       <Link to={`/graphs/${graph.id}`} className={home.open}>
         <div className={home.preview}>
-          <PartBoundary frame={nothing}>
-            <GraphPreview graph={graph.id} seq={graph.seq} />
-          </PartBoundary>
+          <GraphPreview graph={graph.id} seq={graph.seq} />
           <People people={people} />
         </div>
         <div className={home.body}>

@@ -6,11 +6,14 @@ import { useGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useMay } from "../api/people";
 import { Empty } from "../ui/empty";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { boundedPart } from "../ui/lazy-part";
 import { GraphCards } from "./graph-cards";
 import style from "./home.module.css";
 
-const DeletedGraphs = lazyPart(() => import("./deleted-graphs").then((part) => part.DeletedGraphs));
+const DeletedGraphs = boundedPart(
+  () => import("./deleted-graphs").then((part) => part.DeletedGraphs),
+  { waiting: null },
+);
 
 interface Props {
   onNew: () => void;
@@ -94,9 +97,7 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
         {list.length > 0 && <GraphCards graphs={list} />}
         {graphs.isSuccess && (
           <div className={style.foot}>
-            <PartBoundary waiting={null}>
-              <DeletedGraphs />
-            </PartBoundary>
+            <DeletedGraphs />
           </div>
         )}
       </div>

@@ -1,7 +1,7 @@
 /** The properties of the graph itself, and how to begin. */
 import { add, connectTo, palette, removeSelection, showShortcuts, undo } from "../edit-actions/all";
 import { useEditorContext } from "../edit-actions/editor-context";
-import { FirstShortcut } from "../edit-actions/keys/shortcut-keys";
+import { FirstShortcut } from "../edit-actions/keys/shortcuts";
 import { useRenameGraph } from "../edit-actions/rename-graph";
 import { setGraphDescription } from "../graph/edit";
 import { DraftInput } from "../ui/draft-input";

@@ -15,7 +15,7 @@ import { notesOf } from "../graph/edit/notes";
 import { EXIT } from "../graph/model";
 import { countsOf } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { boundedPart, lazyPart, PartBoundary } from "../ui/lazy-part";
 import { counted } from "../words/counted";
 import { type CheckedGroup, ProblemsContext } from "./fields/field-problems";
 import { SharedField } from "./fields/shared-field";
@@ -28,13 +28,15 @@ const GraphForm = lazyPart(() => import("./graph-form").then((part) => part.Grap
 const NoteForm = lazyPart(() => forms().then((part) => part.NoteForm));
 const RelationForm = lazyPart(() => forms().then((part) => part.RelationForm));
 const RunConditions = lazyPart(() => forms().then((part) => part.RunConditions));
-const ProblemList = lazyPart(() => import("./problem-list").then((part) => part.ProblemList));
-const ProblemsHere = lazyPart(() => import("./problem-list").then((part) => part.ProblemsHere));
-const Comments = lazyPart(() => import("../comments/comments").then((part) => part.Comments));
-const CoursesPanel = lazyPart(() =>
+const ProblemList = boundedPart(() => import("./problem-list").then((part) => part.ProblemList));
+const ProblemsHere = boundedPart(() => import("./problem-list").then((part) => part.ProblemsHere), {
+  waiting: null,
+});
+const Comments = boundedPart(() => import("../comments/comments").then((part) => part.Comments));
+const CoursesPanel = boundedPart(() =>
   import("../courses/courses-panel").then((part) => part.CoursesPanel),
 );
-const JsonView = lazyPart(() => import("./json/json-view").then((part) => part.JsonView));
+const JsonView = boundedPart(() => import("./json/json-view").then((part) => part.JsonView));
 
 interface Props {
   id: string;
@@ -152,11 +154,7 @@ export function Inspector({ id, seq, panel, problems, told, threads }: Props) {
       </Tabs.List>
       <Tabs.Panel value="details" className={style.panel ?? ""}>
         <ViewOnly>
-          {context.selection.size === 1 && (
-            <PartBoundary waiting={null}>
-              <ProblemsHere told={told} />
-            </PartBoundary>
-          )}
+          {context.selection.size === 1 && <ProblemsHere told={told} />}
           <ProblemsContext value={told}>
             <PartBoundary>
               <Properties />
@@ -166,25 +164,17 @@ export function Inspector({ id, seq, panel, problems, told, threads }: Props) {
       </Tabs.Panel>
       <Tabs.Panel value="json" className={style.panel ?? ""} data-fill>
         <SharedField of="graph" field="json">
-          <PartBoundary>
-            <JsonView graph={id} seq={seq} />
-          </PartBoundary>
+          <JsonView graph={id} seq={seq} />
         </SharedField>
       </Tabs.Panel>
       <Tabs.Panel value="comments" className={style.panel ?? ""}>
-        <PartBoundary>
-          <Comments threads={threads} />
-        </PartBoundary>
+        <Comments threads={threads} />
       </Tabs.Panel>
       <Tabs.Panel value="courses" className={style.panel ?? ""}>
-        <PartBoundary>
-          <CoursesPanel seq={seq} />
-        </PartBoundary>
+        <CoursesPanel seq={seq} />
       </Tabs.Panel>
       <Tabs.Panel value="problems" className={style.panel ?? ""}>
-        <PartBoundary>
-          <ProblemList problems={problems} told={told} seq={seq} />
-        </PartBoundary>
+        <ProblemList problems={problems} told={told} seq={seq} />
       </Tabs.Panel>
     </Tabs>
   );

@@ -11,7 +11,7 @@ import { addressAround, addressInside, type Level, levelsOf } from "../canvas/le
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { Graph } from "../graph/model";
 import { announcer } from "../ui/announcer";
-import { useStableCallback } from "../ui/use-stable-callback";
+import { useStableCallback } from "../ui/hooks";
 import { isolated } from "../words/isolated";
 import { CardButton } from "./level-frame";
 import style from "./levels.module.css";

@@ -27,7 +27,7 @@ import {
 } from "../graph/edit/key-changes";
 import type { Key, Position } from "../graph/model";
 import { announcer } from "../ui/announcer";
-import { useStableCallback } from "../ui/use-stable-callback";
+import { useStableCallback } from "../ui/hooks";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./levels.module.css";

@@ -8,7 +8,14 @@ import {
   IconNote,
   IconPlayerPlay,
 } from "@tabler/icons-react";
-import { memo, type ReactNode, useId, useState } from "react";
+import {
+  type ComponentProps,
+  type CSSProperties,
+  memo,
+  type ReactNode,
+  useId,
+  useState,
+} from "react";
 import { checkedColor } from "../api/people";
 import { useEditorStore, useOpenThreadCount } from "../canvas/editor-store";
 import { noteColor } from "../canvas/notes/note-nodes";
@@ -235,7 +242,7 @@ const keyWords = (key: string): string =>
 
 const noteWord = ({ kind }: Note) => (kind === "frame" ? "Frame" : "Note");
 
-export function colorOf(row: OutlineItem): string {
+function colorOf(row: OutlineItem): string {
   if (row.kind === "note") return noteColor[row.note.color];
   if (row.kind === "inside") return colorOfName(row.part.action.actor);
   return row.kind === "action" ? colorOfName(row.action.actor) : "transparent";
@@ -258,28 +265,34 @@ export function labelOf(row: OutlineItem, name: string): string {
   }
 }
 
+/** Return the attributes of the row of a tree grid that are the same in a wide list and on a phone. */
+export function rowAttributes(
+  props: Pick<Props, "row" | "active" | "selected" | "handlers">,
+): ComponentProps<"tr"> {
+  const { row, active, selected, handlers } = props;
+  return {
+    ...{ "data-row": row.id, "data-level": row.level },
+    "data-inside": row.kind === "inside" || undefined,
+    ...{ "aria-level": row.level, "aria-posinset": row.at, "aria-setsize": row.of },
+    "aria-selected": selected,
+    tabIndex: active ? 0 : -1,
+    style: { "--c": colorOf(row), "--level": row.level } as CSSProperties,
+    onFocus: (event) => {
+      if (event.target === event.currentTarget) handlers.focus(row.id);
+    },
+  } as ComponentProps<"tr">;
+}
+
 export const OutlineRow = memo(function OutlineRow(props: Props) {
-  const { row, active, selected, progress, change, name, robots, others, mayEdit, handlers } =
-    props;
+  const { row, active, progress, change, name, robots, others, mayEdit, handlers } = props;
   const label = labelOf(row, name);
   const words = useId();
   return (
     <tr
       className={style.row}
-      data-row={row.id}
-      data-level={row.level}
-      data-inside={row.kind === "inside" || undefined}
-      aria-level={row.level}
-      aria-posinset={row.at}
-      aria-setsize={row.of}
-      aria-selected={selected}
+      {...rowAttributes(props)}
       aria-labelledby={words}
       {...(row.open === null ? {} : { "aria-expanded": row.open })}
-      tabIndex={active ? 0 : -1}
-      style={{ "--c": colorOf(row), "--level": row.level } as React.CSSProperties}
-      onFocus={(event) => {
-        if (event.target === event.currentTarget) handlers.focus(row.id);
-      }}
     >
       <td className={style.words}>
         {row.open === null ? (

@@ -11,12 +11,12 @@ import { StateLabel } from "../status/state-label";
 import type { PersonHere } from "../sync/use-room";
 import { colorOfName } from "../ui/name-colors";
 import {
-  colorOf,
   HandedTo,
   labelOf,
   Others,
   RowActions,
   type RowHandlers,
+  rowAttributes,
   Talk,
   Words,
 } from "./outline-row";
@@ -132,22 +132,7 @@ export const PhoneRow = memo(function PhoneRow(props: Props) {
   const open = row.kind === "action" && !row.action.missing ? leadingNowhere(bundles) : [];
   const asks = mayEdit && (open.includes("on_true") || (selected && open.length > 0));
   return (
-    <tr
-      className={style.row}
-      data-row={row.id}
-      data-level={row.level}
-      data-inside={row.kind === "inside" || undefined}
-      aria-level={row.level}
-      aria-posinset={row.at}
-      aria-setsize={row.of}
-      aria-selected={selected}
-      aria-labelledby={words}
-      tabIndex={active ? 0 : -1}
-      style={{ "--c": colorOf(row), "--level": row.level } as React.CSSProperties}
-      onFocus={(event) => {
-        if (event.target === event.currentTarget) handlers.focus(row.id);
-      }}
-    >
+    <tr className={style.row} {...rowAttributes(props)} aria-labelledby={words}>
       <td className={style.words}>
         <button type="button" id={words} tabIndex={-1} onClick={() => handlers.choose(row)}>
           <About row={row} name={name} progress={progress} robots={robots} />

@@ -9,7 +9,7 @@ import { fullName, type Graph, type Key } from "../graph/model";
 import { factOf, placesOf, spaced } from "../status/level-places";
 import type { GraphInRun } from "../status/progress-inside";
 import { announcer } from "../ui/announcer";
-import { useStableCallback } from "../ui/use-stable-callback";
+import { useStableCallback } from "../ui/hooks";
 import style from "./levels.module.css";
 
 /** The address of the graph that is shown, entered in the editor by the same way; null where the server has

@@ -33,21 +33,20 @@ const FORMATS = [
 interface LinkButtonProps {
   to: string;
   name: string;
-  title?: string;
   icon: typeof IconFlask;
   /** Its sign alone says enough. */
   small?: boolean;
 }
 
 /** On narrow screens its sign stays, and its name for those who hear it. */
-function LinkButton({ to, name, title, icon: Icon, small = false }: LinkButtonProps) {
+function LinkButton({ to, name, icon: Icon, small = false }: LinkButtonProps) {
   return (
     <Button
       component={Link}
       to={to}
       variant="default"
       aria-label={name}
-      title={title ?? name}
+      title={name}
       leftSection={<Icon size={15} aria-hidden />}
       className={style.action ?? ""}
       data-small={small || undefined}

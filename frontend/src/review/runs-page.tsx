@@ -27,7 +27,7 @@ import {
 import { hasEnded } from "../api/run-stop";
 import { type Run, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
-import { useRunStatus } from "../status/run-status";
+import { useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, stopwatch, useNow } from "../ui/times";

@@ -10,7 +10,7 @@ import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
 import { heldGraph, type Robot, stopRobot } from "../api/robots";
 import type { Run } from "../api/runs";
-import { runStatus } from "../status/run-status";
+import { runStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { isolated } from "../words/isolated";
 import style from "./robot-runs.module.css";

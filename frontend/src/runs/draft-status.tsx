@@ -8,11 +8,13 @@ import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
 import { differences } from "../graph/meaning";
 import type { Graph } from "../graph/model";
-import { runStatus } from "../status/run-status";
-import { lazyPart, PartBoundary } from "../ui/lazy-part";
+import { runStatus } from "../status/progress";
+import { boundedPart } from "../ui/lazy-part";
 import style from "./draft-status.module.css";
 
-const ModifyRun = lazyPart(() => import("./modify-run").then((part) => part.ModifyRun));
+const ModifyRun = boundedPart(() => import("./modify-run").then((part) => part.ModifyRun), {
+  waiting: null,
+});
 
 interface Props {
   run: Run | null;
@@ -43,16 +45,14 @@ export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props)
     <span className={style.word} data-differs={found.length > 0 || undefined}>
       {words(found.length > 0, runStatus(run, now).tone !== "unknown")} <i>{label}</i>
       {running !== null && found.length > 0 && (
-        <PartBoundary waiting={null}>
-          <ModifyRun
-            key={run.id}
-            run={run}
-            label={label}
-            running={running.graph}
-            settle={settle}
-            obstacle={obstacle}
-          />
-        </PartBoundary>
+        <ModifyRun
+          key={run.id}
+          run={run}
+          label={label}
+          running={running.graph}
+          settle={settle}
+          obstacle={obstacle}
+        />
       )}
     </span>
   );

@@ -1,6 +1,6 @@
 import { expect, test } from "vitest";
 import type { ActionRun, Run } from "../api/runs";
-import { progressByAid, progressOf, runEndText, runLabel, visitsText } from "./progress";
+import { progressByAid, progressOf, runEndText, runLabel, runStatus, visitsText } from "./progress";
 import { isInRun, progressInside } from "./progress-inside";
 
 const run: Run = {
@@ -148,4 +148,23 @@ test("a run that finished with a result that nobody told is not called true", ()
   const over = { ...run, state: "finished", ended_at: "t" } as const;
   expect(runLabel(over)).toEqual({ tone: "done", word: "finished" });
   expect(runLabel({ ...over, result: "on_true" }).tone).toBe("true");
+});
+
+const heardRun = (part: Partial<Run>) => ({ ended_at: null, ...part }) as Run;
+const SINCE = Date.parse("2026-11-26T12:00:00Z");
+const DOWN = { link: "down", since: SINCE } as const;
+
+test.each(["requested", "published", "running", "paused", "stopping"] as const)(
+  "a run that was %s is unknown while the runner is not heard",
+  (state) => {
+    const going = heardRun({ state });
+    expect(runStatus(going, { link: "live", since: SINCE }).tone).not.toBe("unknown");
+    expect(runStatus(going, DOWN).tone).toBe("unknown");
+    expect(runStatus(going, DOWN).word).toMatch(/^unknown since \d/);
+  },
+);
+
+test("what has ended stays as it ended, whoever is heard", () => {
+  const ended = heardRun({ state: "stopped", ended_at: "2026-11-26T11:59:00Z" });
+  expect(runStatus(ended, DOWN)).toEqual({ tone: "stopped", word: "stopped" });
 });

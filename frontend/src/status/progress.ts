@@ -1,6 +1,9 @@
 /** State of an action of a run, and of the run, in one word and one tone. */
+import type { LiveState } from "../api/live-socket";
+import { useLive } from "../api/page-link";
 import { MOVES } from "../api/run-stop";
 import type { ActionRun, Run, Visit } from "../api/runs";
+import { serverTimeOf } from "../clock/server-clock";
 import { clock } from "../ui/times";
 import { isolated } from "../words/isolated";
 
@@ -170,7 +173,7 @@ export function progressAt(found: Map<string, Progress>, at: number | null): Map
 }
 
 /** Nobody knows how a run goes on. `since`: ms. */
-export function unknownStatus(since: number): { tone: Tone; word: string } {
+function unknownStatus(since: number): { tone: Tone; word: string } {
   return { tone: "unknown", word: `unknown since ${clock(since)}` };
 }
 
@@ -217,4 +220,21 @@ export function runEndText(run: Run): string {
   if (run.state === "lost") return "lost: nothing proves its end";
   if (run.state === "finished" && run.result === "on_true") return "finished";
   return word;
+}
+
+export type Heard = Pick<LiveState, "link" | "since">;
+
+/** In a word, as it is counted. What has ended stays so, whoever is heard. Pure. */
+export function runStatus(run: Run, { link, since }: Heard): { tone: Tone; word: string } {
+  if (run.ended_at === null && link === "down") {
+    return unknownStatus(serverTimeOf(since));
+  }
+  return runLabel(run);
+}
+
+/** Return the state of a run; for an end also who or what caused it. */
+export function useRunStatus(run: Run): { tone: Tone; word: string } {
+  const { now } = useLive();
+  const { tone, word } = runStatus(run, now);
+  return { tone, word: run.ended_at === null ? word : runEndText(run) };
 }

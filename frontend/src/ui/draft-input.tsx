@@ -14,8 +14,6 @@ interface Props extends DraftOptions {
   leftSection?: TextInputProps["leftSection"];
   /** Name for screen readers if the label is no text. */
   ariaLabel?: string;
-  disabled?: boolean;
-  autoFocus?: boolean;
   inputMode?: "decimal" | "text";
   /** Element of a field with several lines. */
   area?: React.RefObject<HTMLTextAreaElement | null>;
@@ -34,8 +32,6 @@ export function DraftInput(props: Props) {
     ...(props.ariaLabel === undefined ? {} : { "aria-label": props.ariaLabel }),
     ...(props.placeholder === undefined ? {} : { placeholder: props.placeholder }),
     ...(props.description === undefined ? {} : { description: props.description }),
-    ...(props.disabled === undefined ? {} : { disabled: props.disabled }),
-    ...(props.autoFocus ? { "data-autofocus": true, autoFocus: true } : {}),
     styles: mono ? { input: { fontFamily: "var(--mono)", fontSize: "12px" } } : {},
     spellCheck: false,
   };

@@ -1,6 +1,6 @@
-/** Hooks about the device: the size of its screen, its search key, and what it keeps for its person. */
+/** Hooks about the device (the size of its screen, its search key, and what it keeps for its person), and stable callbacks. */
 import { useLocalStorage, useMediaQuery } from "@mantine/hooks";
-import { useCallback, useEffect, useMemo } from "react";
+import { useCallback, useEffect, useLayoutEffect, useMemo, useRef } from "react";
 import { keyOf } from "./keys";
 
 const AT_ONCE = { getInitialValueInEffect: false };
@@ -91,4 +91,18 @@ export function useKeptKeys(name: string, id: string) {
   );
   const keys = useMemo(() => keptIn(kept, id), [kept, id]);
   return useMemo(() => ({ keys, put }), [keys, put]);
+}
+
+/**
+ * Return a function that stays the same object while the component is mounted, and calls the newest
+ * callback.
+ */
+export function useStableCallback<A extends unknown[], R>(
+  callback: (...given: A) => R,
+): (...given: A) => R {
+  const latest = useRef(callback);
+  useLayoutEffect(() => {
+    latest.current = callback;
+  });
+  return useCallback((...given: A) => latest.current(...given), []);
 }

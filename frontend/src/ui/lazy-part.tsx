@@ -125,6 +125,23 @@ export class PartBoundary extends Component<PartBoundaryProps, { error: unknown 
   }
 }
 
+/** A lazy part with a boundary of its own around it. */
+export function boundedPart<P extends object>(
+  load: () => Promise<ComponentType<P>>,
+  boundary: Omit<PartBoundaryProps, "children"> = {},
+): LazyPart<P> {
+  const Part = lazyPart(load);
+  // biome-ignore lint/correctness/noComponentHookFactories: called once for a part, in a module
+  function Bounded(props: P) {
+    return (
+      <PartBoundary {...boundary}>
+        <Part {...props} />
+      </PartBoundary>
+    );
+  }
+  return Object.assign(Bounded, { preload: Part.preload });
+}
+
 const over = (notice: ReactNode) => <div className={style.over}>{notice}</div>;
 
 /** For what opens over the page: its notices stand in the middle of the screen. */

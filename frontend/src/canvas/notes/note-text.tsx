@@ -1,7 +1,7 @@
 /** The text of a note, and the completion of links in its field; both load their larger half late. */
-import { type ComponentProps, lazy, Suspense } from "react";
+import { lazy, Suspense } from "react";
 import { spokenNote } from "../../graph/note-links";
-import { lazyPart, PartBoundary } from "../../ui/lazy-part";
+import { boundedPart } from "../../ui/lazy-part";
 import style from "./note-text.module.css";
 
 const Markdown = lazy(() => import("./markdown"));
@@ -25,16 +25,8 @@ export function NoteText({ text }: { text: string }) {
   );
 }
 
-const LinkCompletion = lazyPart(() =>
-  import("./link-completion").then((part) => part.LinkCompletion),
-);
-const nothing = () => null;
-
 /** Completes links in a field once that part is loaded. */
-export function LinkNames(props: ComponentProps<typeof LinkCompletion>) {
-  return (
-    <PartBoundary frame={nothing} waiting={null}>
-      <LinkCompletion {...props} />
-    </PartBoundary>
-  );
-}
+export const LinkNames = boundedPart(
+  () => import("./link-completion").then((part) => part.LinkCompletion),
+  { waiting: null, frame: () => null },
+);

@@ -32,8 +32,8 @@ import { endName } from "../../graph/relation-words";
 import { Cursors } from "../../people/cursors";
 import { PeopleAtCards } from "../../people/people";
 import { useRoom } from "../../sync/use-room";
-import { lazyPart, PartBoundary } from "../../ui/lazy-part";
-import { useStableCallback } from "../../ui/use-stable-callback";
+import { useStableCallback } from "../../ui/hooks";
+import { boundedPart } from "../../ui/lazy-part";
 import { isolated } from "../../words/isolated";
 import style from "./editable-canvas.module.css";
 import { arrowAt } from "./hit-test";
@@ -43,7 +43,9 @@ import { useContextMenu } from "./use-context-menu";
 import { useLineEditing } from "./use-line-editing";
 import { usePinch, ZOOM } from "./use-pinch";
 
-const GraphMap = lazyPart(() => import("./graph-map").then((part) => part.GraphMap));
+const GraphMap = boundedPart(() => import("./graph-map").then((part) => part.GraphMap), {
+  waiting: null,
+});
 
 // Constants, since React Flow renders everything again when it gets a new object.
 const SNAP_GRID: [number, number] = [GRID, GRID];
@@ -277,11 +279,7 @@ function Drawing({
           />
         </>
       )}
-      {map && (
-        <PartBoundary waiting={null}>
-          <GraphMap nodes={canvas.nodes} flow={canvas.flow} />
-        </PartBoundary>
-      )}
+      {map && <GraphMap nodes={canvas.nodes} flow={canvas.flow} />}
     </ReactFlow>
   );
 }

@@ -9,7 +9,7 @@ import { moveRelation, retarget } from "../../graph/edit";
 import { setWaypoints } from "../../graph/edit/waypoints";
 import type { Key, Precondition } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
-import { useStableCallback } from "../../ui/use-stable-callback";
+import { useStableCallback } from "../../ui/hooks";
 import { nodeAt } from "./hit-test";
 
 /**

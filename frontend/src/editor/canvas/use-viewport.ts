@@ -22,7 +22,7 @@ import {
 import type { CanvasView, EditorContext } from "../../edit-actions/editor-context";
 import { type Direction, ENTRY, EXIT, type Key, type Position } from "../../graph/model";
 import type { Progress } from "../../status/progress";
-import { useStableCallback } from "../../ui/use-stable-callback";
+import { useStableCallback } from "../../ui/hooks";
 import { useFollowRun } from "./follow-run";
 
 interface FoldedCanvas {

@@ -21,7 +21,7 @@ import { DRY_RUN_SPEEDS, type DryRun } from "../../dry-run/use-dry-run";
 import * as editActions from "../../edit-actions/dry-run-actions";
 import { type EditAction, labelOf } from "../../edit-actions/edit-action";
 import { type EditorContext, selectedActions } from "../../edit-actions/editor-context";
-import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/keys/shortcuts";
 import { fullName } from "../../graph/model";
 import { endName } from "../../graph/relation-words";
 import { stopwatch } from "../../ui/times";

@@ -7,7 +7,7 @@ import { useGraphs } from "../../api/graphs";
 import { EDIT_ACTIONS } from "../../edit-actions/all";
 import { isEnabled, labelOf } from "../../edit-actions/edit-action";
 import type { EditorContext } from "../../edit-actions/editor-context";
-import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/keys/shortcuts";
 import { keyOf } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { matching, type Option, PickList } from "../../ui/pick-list";

@@ -9,7 +9,7 @@ import {
   selectedNotes,
   selectedRelations,
 } from "../../edit-actions/editor-context";
-import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/keys/shortcuts";
 import style from "./context-menu.module.css";
 
 /** Return the groups of edit actions that fit the selection. */

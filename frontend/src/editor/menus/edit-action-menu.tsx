@@ -4,7 +4,7 @@ import { Fragment, type ReactElement } from "react";
 import { EDIT_ACTIONS } from "../../edit-actions/all";
 import { type EditActionGroup, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/keys/shortcuts";
 import { useOpening } from "../../ui/late-opening";
 import style from "./toolbar.module.css";
 

@@ -15,8 +15,7 @@ import {
   useOwnShortcuts,
   withOwn,
 } from "../../edit-actions/keys/own-shortcuts";
-import { ShortcutKeys } from "../../edit-actions/keys/shortcut-keys";
-import { useSingleKeys } from "../../edit-actions/keys/shortcuts";
+import { ShortcutKeys, useSingleKeys } from "../../edit-actions/keys/shortcuts";
 import { HelpLink } from "../../status/help-link";
 import { keyOf } from "../../ui/keys";
 import { isolated } from "../../words/isolated";

@@ -18,11 +18,11 @@ import {
 } from "../../edit-actions/all";
 import { type EditAction, isEnabled, labelOf } from "../../edit-actions/edit-action";
 import { useEditorContext } from "../../edit-actions/editor-context";
-import { FirstShortcut } from "../../edit-actions/keys/shortcut-keys";
+import { FirstShortcut } from "../../edit-actions/keys/shortcuts";
+import { useStableCallback } from "../../ui/hooks";
 import { LateOpening } from "../../ui/late-opening";
 import { lazyPart } from "../../ui/lazy-part";
 import { Tooltip } from "../../ui/tooltip";
-import { useStableCallback } from "../../ui/use-stable-callback";
 import style from "./toolbar.module.css";
 
 function Tool({ editAction, pressed }: { editAction: EditAction; pressed?: boolean }) {

@@ -14,7 +14,7 @@ import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ProblemGroup } from "../../graph/problems/problem-groups";
 import { whenThere } from "../../ui/focus-field";
 import { type ListTab, useListTab } from "../../ui/hooks";
-import { lazyPart, PartBoundary } from "../../ui/lazy-part";
+import { boundedPart } from "../../ui/lazy-part";
 import { Segments } from "../../ui/segments";
 import { Tooltip } from "../../ui/tooltip";
 import { useWatched } from "../../ui/watched";
@@ -41,7 +41,9 @@ export function DryRunButton({ stacked = false }: { stacked?: boolean }) {
   );
 }
 
-const ListRail = lazyPart(() => import("./list-rail").then((part) => part.ListRail));
+const ListRail = boundedPart(() => import("./list-rail").then((part) => part.ListRail), {
+  waiting: null,
+});
 
 const SIDES: readonly { value: ListTab | "outline" | "history"; label: string }[] = [
   { value: "graphs", label: "Graphs" },
@@ -203,11 +205,7 @@ function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) 
   const open = beside || (left && !carrying);
   return (
     <>
-      {wide && folded && (
-        <PartBoundary waiting={null}>
-          <ListRail panels={panels} told={told} />
-        </PartBoundary>
-      )}
+      {wide && folded && <ListRail panels={panels} told={told} />}
       <aside
         className={style.left}
         // A drawer that closes covers nothing any more.

@@ -95,9 +95,8 @@ function misfitsIn(flow: DataFlow) {
 export function problemGroups<P extends CheckedProblem>(
   problems: readonly P[],
   graph: Pick<Graph, "actions" | "relations">,
-  flow: DataFlow = dataFlowOf(graph),
 ): ProblemGroup<P>[] {
-  const misfits = misfitsIn(flow);
+  const misfits = misfitsIn(dataFlowOf(graph));
   const actions = new Map(graph.actions.map((action) => [action.key, action]));
   const found = new Map<string, Gathered<P>>();
   for (const problem of problems) {

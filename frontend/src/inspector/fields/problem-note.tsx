@@ -31,10 +31,10 @@ function FixLink({ told }: { told: CheckedGroup }) {
   );
 }
 
-export function ProblemNote({ told, id }: { told: CheckedGroup; id?: string }) {
+export function ProblemNote({ told }: { told: CheckedGroup }) {
   const Sign = told.kind === "fill-in" ? IconPencil : IconAlertTriangle;
   return (
-    <p className={style.note} data-kind={told.kind} data-code={told.code} id={id}>
+    <p className={style.note} data-kind={told.kind} data-code={told.code}>
       <Sign size={13} aria-hidden />
       <span>
         {told.message} <FixLink told={told} /> <small className={style.code}>{told.code}</small>

@@ -5,12 +5,12 @@ import { IconTimeline } from "@tabler/icons-react";
 import { type KeyboardEvent, type PointerEvent, type ReactNode, useRef, useState } from "react";
 import type { Run } from "../../api/runs";
 import { keyOf } from "../../ui/keys";
-import { lazyPart, PartBoundary } from "../../ui/lazy-part";
+import { boundedPart } from "../../ui/lazy-part";
 import style from "./run-drawer.module.css";
 import type { ShownRunProps } from "./shown-run";
 
 /** Loaded while the page rests: graphs are opened to be drawn, too. */
-const ShownRun = lazyPart(() => import("./shown-run").then((part) => part.ShownRun));
+const ShownRun = boundedPart(() => import("./shown-run").then((part) => part.ShownRun));
 
 interface Props extends Omit<ShownRunProps, "run"> {
   /** Undefined until it is known. */
@@ -35,9 +35,7 @@ export function RunDrawer(props: Props) {
   const mode = folded === null ? "alone" : folded ? "low" : "open";
   return (
     <DrawerFrame mode={mode}>
-      <PartBoundary>
-        <ShownRun {...props} run={run} />
-      </PartBoundary>
+      <ShownRun {...props} run={run} />
     </DrawerFrame>
   );
 }

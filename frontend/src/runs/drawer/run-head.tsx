@@ -20,7 +20,7 @@ import { needsRestConfirmation } from "../../api/run-stop";
 import { abilitiesOf, pauseOrResume, type Run } from "../../api/runs";
 import { serverTimeOf } from "../../clock/server-clock";
 import { boundsText } from "../../status/durations";
-import { useRunStatus } from "../../status/run-status";
+import { useRunStatus } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
 import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { colorOfName } from "../../ui/name-colors";

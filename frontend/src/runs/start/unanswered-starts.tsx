@@ -9,7 +9,7 @@ import { Link } from "wouter";
 import { useLive } from "../../api/page-link";
 import { SIMULATOR } from "../../api/robots";
 import { findStart, type Run, type StartFound } from "../../api/runs";
-import { useRunStatus } from "../../status/run-status";
+import { useRunStatus } from "../../status/progress";
 import { colorOfName } from "../../ui/name-colors";
 import { useWatched, Watched } from "../../ui/watched";
 import { isolated } from "../../words/isolated";

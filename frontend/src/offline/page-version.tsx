@@ -1,5 +1,8 @@
-/** Detects that the server has another version of the page than this one. */
+/** Detects that the server has another version of the page than this one, and says so. */
+import { Button, CloseButton } from "@mantine/core";
+import { useEffect, useState } from "react";
 import { serverPath } from "../api/page-url";
+import style from "./new-version-notice.module.css";
 
 const BUILD = /<meta name="build" content="([^"]*)"/;
 const AGAIN = 10 * 60_000; // ms between two looks
@@ -26,7 +29,7 @@ async function servedVersion(): Promise<string | null> {
 }
 
 /** Calls back once, when the server has another version than the one that is shown. */
-export function watchVersion(onOther: () => void): () => void {
+function watchVersion(onOther: () => void): () => void {
   const own = ownVersion();
   if (own === "") return () => {};
   const look = async () => {
@@ -60,4 +63,20 @@ export async function keepPage(): Promise<void> {
   } catch (error) {
     console.warn("This browser does not keep the page:", error);
   }
+}
+
+/** Says that the server has another version of the page, and offers to load it. */
+export function NewVersionNotice() {
+  const [shown, setShown] = useState(false);
+  useEffect(() => watchVersion(() => setShown(true)), []);
+  if (!shown) return null;
+  return (
+    <div className={style.notice} role="status">
+      <span>The server was updated. This page still works; reload it to get the new version.</span>
+      <Button size="compact-sm" onClick={() => location.reload()}>
+        Reload
+      </Button>
+      <CloseButton aria-label="Not now" onClick={() => setShown(false)} />
+    </div>
+  );
 }

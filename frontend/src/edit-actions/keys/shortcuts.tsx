@@ -1,12 +1,14 @@
 /** Keyboard shortcuts of edit actions, where nobody is typing; and the clipboard's own events. */
+import { Kbd } from "@mantine/core";
 import { useLocalStorage } from "@mantine/hooks";
 import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
+import style from "../../editor/menus/toolbar.module.css";
 import { whenThere } from "../../ui/focus-field";
 import { keyOf } from "../../ui/keys";
 import { EDIT_ACTIONS } from "../all";
 import { copiedSelection, pasteText, rememberCopied } from "../clipboard";
-import { type EditAction, editActionFor, isEnabled } from "../edit-action";
+import { type EditAction, editActionFor, isEnabled, printedKeys } from "../edit-action";
 import type { EditorContext } from "../editor-context";
 import { useOwnShortcuts, withOwn } from "./own-shortcuts";
 
@@ -165,4 +167,20 @@ function useClipboard(now: { readonly current: EditorContext }): void {
       window.removeEventListener("paste", onPaste);
     };
   }, [now]);
+}
+
+export function ShortcutKeys({ shortcut }: { shortcut: string }) {
+  return (
+    <span className={style.keys}>
+      {printedKeys(shortcut).map((key) => (
+        <Kbd key={key}>{key}</Kbd>
+      ))}
+    </span>
+  );
+}
+
+export function FirstShortcut({ editAction }: { editAction: EditAction }) {
+  const own = useOwnShortcuts(EDIT_ACTIONS);
+  const [first] = own[editAction.name] ?? editAction.shortcuts;
+  return first === undefined ? null : <ShortcutKeys shortcut={first} />;
 }
