@@ -28,6 +28,7 @@ import { askedDryRun } from "../review/dry-run-link";
 import { useReplay } from "../review/replay";
 import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
+import type { Waits } from "../runs/sent-graph";
 import { StartControl } from "../runs/start/start-control";
 import { type GraphInRun, isInRun, useProgress } from "../status/progress-inside";
 import { roomUrl } from "../sync/room-connection";
@@ -42,6 +43,9 @@ const DraftStatus = boundedPart(
   () => import("../runs/draft-status").then((part) => part.DraftStatus),
   { waiting: null },
 );
+const RunWaits = boundedPart(() => import("../runs/sent-graph").then((part) => part.RunWaits), {
+  waiting: null,
+});
 const RecordDryRun = lazyPart(() =>
   import("../runs/start/record-dry-run").then((part) => part.RecordDryRun),
 );
@@ -145,8 +149,11 @@ function Inside({ id }: { id: string }) {
   const { runner } = useLive();
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);
   const past = replay.at !== null;
-  const progress = useProgress(past ? replay.run : live, unsure && !past, replay.at, inside);
-  useRunOnCanvas(past ? replay.run : live, unsure && !past, replay.at, inside);
+  const drawn = past ? replay.run : live;
+  const seen = useProgress(drawn, unsure && !past, replay.at, inside);
+  const [waits, setWaits] = useState<Waits | null>(null);
+  const progress = waits?.of === seen ? waits.progress : seen;
+  useRunOnCanvas(drawn, unsure && !past, replay.at, inside);
   const newest = run?.id;
   const { seek } = replay;
   // biome-ignore lint/correctness/useExhaustiveDependencies: another run is shown as it is now
@@ -167,31 +174,37 @@ function Inside({ id }: { id: string }) {
   }, [who, room]);
   const settle = () => room.settled(AbortSignal.timeout(NAMED_MS)).catch(unnamed);
   if (gone) return <Gone />;
+  const waiting = drawn?.ended_at === null && inside === null && (
+    <RunWaits run={drawn} progress={seen} onWaits={setWaits} />
+  );
   return (
-    <Editor
-      id={id}
-      me={person.id}
-      known={known}
-      progress={progress}
-      run={live?.ended_at === null ? live.id : null}
-      Bar={TitledBar}
-      list={<Lists create={create} choose={choose} />}
-      status={<Draft run={inside === null ? live : null} label={label} settle={settle} />}
-      start={mayStart && <Start settle={settle} />}
-      record={mayStart && <Record />}
-      strip={
-        <Strip
-          run={run}
-          cursor={replay.at}
-          onSeek={seek}
-          going={going}
-          onChoose={chooseRun}
-          versionLabel={label}
-        />
-      }
-      seed={seed}
-      corner={<ConnectionStatus run={live} whose={going.length > 1} />}
-    />
+    <>
+      {waiting}
+      <Editor
+        id={id}
+        me={person.id}
+        known={known}
+        progress={progress}
+        run={live?.ended_at === null ? live.id : null}
+        Bar={TitledBar}
+        list={<Lists create={create} choose={choose} />}
+        status={<Draft run={inside === null ? live : null} label={label} settle={settle} />}
+        start={mayStart && <Start settle={settle} />}
+        record={mayStart && <Record />}
+        strip={
+          <Strip
+            run={run}
+            cursor={replay.at}
+            onSeek={seek}
+            going={going}
+            onChoose={chooseRun}
+            versionLabel={label}
+          />
+        }
+        seed={seed}
+        corner={<ConnectionStatus run={live} whose={going.length > 1} />}
+      />
+    </>
   );
 }
 

@@ -11,6 +11,7 @@ import { type TraceEvent, useDryRunResult } from "../api/dry-runs";
 import type { Graph, Key } from "../graph/model";
 import { endName } from "../graph/relation-words";
 import type { Progress } from "../status/progress";
+import { withWaits } from "../status/waits";
 import {
   keysByName,
   momentsOf,
@@ -82,7 +83,8 @@ function useShownMoment(
     const moment = moments[index];
     if (!moment) return EMPTY;
     const keys = keysByName(graph);
-    const state = playbackStateAt(trace, moment.to, graph, keys);
+    const played = playbackStateAt(trace, moment.to, graph, keys);
+    const state = { ...played, progress: withWaits(graph, played.progress) };
     return seed === null ? state : withRecordedValues(state, seed, keys);
   }, [trace, moments, index, graph, seed]);
   const words = useMemo(() => {

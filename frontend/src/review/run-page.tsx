@@ -20,6 +20,7 @@ import { INTO } from "../status/level-places";
 import { runEndText, runLabel, useRunStatus } from "../status/progress";
 import { useProgress } from "../status/progress-inside";
 import { StateLabel } from "../status/state-label";
+import { withWaits } from "../status/waits";
 import { Empty } from "../ui/empty";
 import { instant, useNow } from "../ui/times";
 import type { Crumb } from "../ui/top-bar";
@@ -255,7 +256,8 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const { run } = replay;
   const past = replay.at !== null;
   useAddress(newest.id, replay, level);
-  const progress = useProgress(run, unsure && !past, replay.at, level.inside);
+  const seen = useProgress(run, unsure && !past, replay.at, level.inside);
+  const progress = useMemo(() => withWaits(level.graph, seen), [level.graph, seen]);
   const mates = useTracks(runner, newest);
   const engines = useMemo(() => enginesOf(newest, mates), [newest, mates]);
   const [again, setAgain] = useState<RepeatActions | null>(null);

@@ -1,16 +1,14 @@
 /** Says whether the graph on screen is the one that runs, and offers to send it if it is not. */
 
-import { useQuery } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { fetchVersion, queryKeys } from "../api/graphs";
 import { useLive } from "../api/page-link";
 import type { Run } from "../api/runs";
-import { fromUmrf } from "../canvas/from-umrf";
 import { differences } from "../graph/meaning";
 import type { Graph } from "../graph/model";
 import { runStatus } from "../status/progress";
 import { boundedPart } from "../ui/lazy-part";
 import style from "./draft-status.module.css";
+import { useSentGraph } from "./sent-graph";
 
 const ModifyRun = boundedPart(() => import("./modify-run").then((part) => part.ModifyRun), {
   waiting: null,
@@ -34,7 +32,7 @@ function words(differs: boolean, known: boolean): string {
 }
 
 export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props) {
-  const running = useRunningGraph(run);
+  const running = useSentGraph(run);
   const { now } = useLive();
   const found = useMemo(
     () => (running === null || running.seq === seq ? [] : differences(running.graph, graph)),
@@ -55,19 +53,5 @@ export function DraftStatus({ run, label, graph, seq, settle, obstacle }: Props)
         />
       )}
     </span>
-  );
-}
-
-export function useRunningGraph(run: Run | null): { seq: number; graph: Graph } | null {
-  const goes = run !== null && run.ended_at === null;
-  const version = useQuery({
-    queryKey: queryKeys.version(run?.version ?? ""),
-    queryFn: ({ signal }) => fetchVersion(run?.version ?? "", signal),
-    enabled: goes && run.version !== null,
-    staleTime: Number.POSITIVE_INFINITY,
-  }).data;
-  return useMemo(
-    () => (goes && version ? { seq: version.seq, graph: fromUmrf(version.umrf) } : null),
-    [goes, version],
   );
 }

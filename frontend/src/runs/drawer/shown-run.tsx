@@ -12,6 +12,7 @@ import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 import { instant } from "../../ui/times";
 import { movingActions } from "../moves-now";
+import { useSentGraph } from "../sent-graph";
 import style from "./run-drawer.module.css";
 import { RunHead } from "./run-head";
 import { ValuesPanel } from "./values-panel";
@@ -64,7 +65,8 @@ export function ShownRun(props: ShownRunProps) {
   const { now } = useLive();
   const [tab, setTab] = useState(ALL_ROBOTS);
   const runs = going.length > 1 ? going : [run];
-  const lanes = useLanes(run, graph, runs.length > 1 ? run.engine : "");
+  const sent = useSentGraph(run)?.graph ?? null;
+  const lanes = useLanes(run, graph, runs.length > 1 ? run.engine : "", sent);
   const tabs = robotTabs(runs, lanes, now.link !== "live");
   const shown = tabs.find(({ id }) => id === tab);
   const told = toldOf(run);

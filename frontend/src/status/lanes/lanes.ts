@@ -1,9 +1,10 @@
 /** The actions of a run as lanes of its timeline. */
 import { useRef } from "react";
 import type { Run } from "../../api/runs";
-import { fullName, type Graph } from "../../graph/model";
+import { fullName, type Graph, type Key } from "../../graph/model";
 import { isEqual } from "../../graph/values";
 import { factOf, type LevelPlace, placesIn, placesOf } from "../level-places";
+import { type Needs, needsIn } from "../waits";
 
 export interface Lane {
   /** Name by which the run reports the action. */
@@ -18,6 +19,8 @@ export interface Lane {
   around: string | null;
   /** Set if it has inner lanes. */
   holds: boolean;
+  /** What it waits for of other robots, by names of lanes; left out if there is nothing. */
+  needs?: Needs;
 }
 
 type Sorted = Map<string | null, { name: string; place: LevelPlace }[]>;
@@ -44,9 +47,27 @@ function byAround(run: Run, places: ReadonlyMap<string, LevelPlace>): Sorted {
   return inside;
 }
 
+/** The needs of actions by their full names, which lanes have in a run. */
+function needsByName(graph: Graph | null): ReadonlyMap<string, Needs> {
+  if (graph === null) return new Map();
+  const names = new Map(graph.actions.map((action) => [action.key, fullName(action)]));
+  const nameOf = (key: Key) => names.get(key) ?? "";
+  return new Map(
+    [...needsIn(graph)].map(([key, { parents, others }]) => [
+      nameOf(key),
+      {
+        parents: parents.map(nameOf),
+        others: others.map(({ key, words }) => ({ key: nameOf(key), words })),
+      },
+    ]),
+  );
+}
+
 /** Every action, those that ran first, in the order in which they began, and right below each those inside
- * of it. `robot` is whose they are where the graph does not say. */
-export function lanesOf(run: Run, graph: Graph, robot = ""): Lane[] {
+ * of it. `robot` is whose they are where the graph does not say. `sent`: the graph that runs, as far
+ * as it is known. */
+export function lanesOf(run: Run, graph: Graph, robot = "", sent: Graph | null = graph): Lane[] {
+  const needs = needsByName(sent);
   const known = new Map(graph.actions.map((action) => [fullName(action), action]));
   const own = Object.keys(run.actions ?? {});
   const places = own.length > 0 ? placesOf(run) : placesIn(run.graph_name, new Set(), known.keys());
@@ -58,7 +79,9 @@ export function lanesOf(run: Run, graph: Graph, robot = ""): Lane[] {
       const its = whose ?? (known.get(name)?.actor || robot);
       const holds = inside.has(name);
       const { levels, name: label } = place;
-      lanes.push({ name, label, aid, robot: its, levels, around, holds });
+      const need = levels.length === 0 ? needs.get(name) : undefined;
+      const waits = need && { needs: need };
+      lanes.push({ name, label, aid, robot: its, levels, around, holds, ...waits });
       if (holds) put(name, its);
     }
   };
@@ -85,9 +108,14 @@ export function robotsOf(lanes: readonly Lane[]): string[] {
 }
 
 /** The lanes of a run for React; while nothing begins they are the same objects. */
-export function useLanes(run: Run | null, graph: Graph, robot = ""): readonly Lane[] {
+export function useLanes(
+  run: Run | null,
+  graph: Graph,
+  robot = "",
+  sent: Graph | null = graph,
+): readonly Lane[] {
   const last = useRef<readonly Lane[]>([]);
-  const now = run === null ? [] : lanesOf(run, graph, robot);
+  const now = run === null ? [] : lanesOf(run, graph, robot, sent);
   if (!isEqual(last.current, now)) {
     const known = new Map(last.current.map((lane) => [lane.name, lane]));
     last.current = now.map((lane) => {

@@ -13,8 +13,9 @@ import { serverNow } from "../../clock/server-clock";
 import { keyOf } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { duration, instant, stopwatch, useNow } from "../../ui/times";
-import { progressOf, progressOfAction, type Tone } from "../progress";
+import { type Progress, progressOf, progressOfAction, type Tone } from "../progress";
 import { toneColor } from "../state-label";
+import { waitingFor, waitWords } from "../waits";
 import {
   growingSpan,
   shareOf,
@@ -223,6 +224,18 @@ function Groups({ track, axis, named, inside, ...props }: GroupsProps) {
   const nested = track.lanes.some(({ holds }) => holds);
   const ended = instant(run.ended_at);
   const silent = ended === null ? silentSince : null;
+  const progressIn = (name: string): Progress | null => {
+    const action = run.actions?.[name];
+    return action ? progressOfAction(name, action, run, silent !== null) : null;
+  };
+  const progressIs = ({ name, needs }: Lane): Progress | null => {
+    const own = progressIn(name);
+    if (own === null || needs === undefined) return own;
+    return waitingFor(
+      own,
+      waitWords(needs, (other) => progressIn(other)?.tone),
+    );
+  };
   return robotsOf(lanes).map((robot) => (
     <Fragment key={robot}>
       {named && (
@@ -240,7 +253,7 @@ function Groups({ track, axis, named, inside, ...props }: GroupsProps) {
               key={lane.name}
               lane={lane}
               visits={action?.visits ?? NOTHING}
-              progress={action ? progressOfAction(lane.name, action, run, silent !== null) : null}
+              progress={progressIs(lane)}
               axis={axis}
               ended={ended}
               silentSince={silent}
