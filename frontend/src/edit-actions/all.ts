@@ -27,6 +27,7 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   notes.note,
   notes.frame,
   notes.write,
+  notes.setRobot,
   draw.copy,
   draw.cut,
   draw.pasteHere,

@@ -4,6 +4,7 @@ import {
   IconLayoutSidebarRight,
   IconNote,
   IconPencil,
+  IconRobot,
   IconRowInsertBottom,
 } from "@tabler/icons-react";
 import { CARD } from "../canvas/geometry/arrange";
@@ -95,14 +96,14 @@ export const write: EditAction = {
   },
 };
 
-/** Return the `data-form` of the form that shows the selection; null if several things are selected. */
+/** Return the `data-form` of the form that shows the selection; null if several things without actions are selected. */
 function formOfSelection(context: EditorContext): string | null {
   const chosen = [
     ...selectedNotes(context),
     ...selectedActions(context).map(({ key }) => key),
     ...selectedRelations(context).map(relationId),
   ];
-  if (chosen.length > 1) return null;
+  if (chosen.length > 1) return selectedActions(context).length > 0 ? "several" : null;
   return chosen[0] ?? (context.selection.has(EXIT) ? EXIT : "graph");
 }
 
@@ -140,6 +141,25 @@ export const details: EditAction = {
     const form = selectorOf(chosen);
     // A panel that slides in cannot have the focus before it is visible.
     setTimeout(() => whenThere(form, (found) => focusFirst(found, before), PATIENCE), 60);
+  },
+};
+
+export const setRobot: EditAction = {
+  name: "robot",
+  label: "Set the robot",
+  group: "Draw",
+  shortcuts: [],
+  icon: IconRobot,
+  changes: true,
+  also: "actor whose owner performer",
+  enabled: (context) => selectedActions(context).some(({ missing }) => !missing),
+  idle: "Choose the actions first.",
+  run: (context) => {
+    context.setPanel("details");
+    const form = selectorOf(formOfSelection(context) ?? "");
+    const field = `${form} [data-robot-field]`;
+    const before = document.activeElement;
+    setTimeout(() => whenThere(field, (found) => focusFirst(found, before), PATIENCE), 60);
   },
 };
 

@@ -4,14 +4,13 @@ import { IconGhost2, IconPackage } from "@tabler/icons-react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import { adoptGhost, rename, setField } from "../graph/edit";
 import type { Action } from "../graph/model";
-import { robotNames } from "../graph/robots";
-import { DraftChoice, DraftInput } from "../ui/draft-input";
-import { colorOfName } from "../ui/name-colors";
+import { DraftInput } from "../ui/draft-input";
 import { ArrowList } from "./arrow-list";
 import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
 import { ParameterList } from "./parameters/parameter-list";
+import { RobotField } from "./robot-field";
 import { RunConditions } from "./run-conditions";
 
 function wholeNumber(draft: string): string | null {
@@ -43,7 +42,7 @@ function Ghost({ action }: { action: Action }) {
 }
 
 export function ActionForm({ action }: { action: Action }) {
-  const { doc, graph, openOverlay } = useEditorContext();
+  const { doc, openOverlay } = useEditorContext();
   if (action.missing) return <Ghost action={action} />;
   return (
     <div className={style.form} data-form={action.key}>
@@ -60,20 +59,7 @@ export function ActionForm({ action }: { action: Action }) {
         </SharedField>
       </div>
       <SharedField of={action.key} field="robot">
-        <DraftChoice
-          label="Robot"
-          placeholder="any robot"
-          data={robotNames(graph.actions)}
-          value={action.actor}
-          leftSection={
-            <i
-              className={style.robot}
-              style={{ background: colorOfName(action.actor) }}
-              aria-hidden
-            />
-          }
-          onCommit={(robot) => setField(doc, action.key, "actor", robot.trim())}
-        />
+        <RobotField actions={[action]} />
       </SharedField>
       <DescriptionField action={action} />
       <ParameterList action={action} side="in" />

@@ -2,4 +2,5 @@
 export { ActionForm } from "./action-form";
 export { NoteForm } from "./note-form";
 export { RelationForm } from "./relation-form";
+export { SeveralForm } from "./robot-field";
 export { RunConditions } from "./run-conditions";

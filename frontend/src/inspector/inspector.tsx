@@ -27,6 +27,7 @@ const ActionForm = lazyPart(() => forms().then((part) => part.ActionForm));
 const GraphForm = lazyPart(() => import("./graph-form").then((part) => part.GraphForm));
 const NoteForm = lazyPart(() => forms().then((part) => part.NoteForm));
 const RelationForm = lazyPart(() => forms().then((part) => part.RelationForm));
+const SeveralForm = lazyPart(() => forms().then((part) => part.SeveralForm));
 const RunConditions = lazyPart(() => forms().then((part) => part.RunConditions));
 const ProblemList = boundedPart(() => import("./problem-list").then((part) => part.ProblemList));
 const ProblemsHere = boundedPart(() => import("./problem-list").then((part) => part.ProblemsHere), {
@@ -81,10 +82,13 @@ function Properties() {
     ];
     const parts = counts.flatMap(([count, noun]) => (count === 0 ? [] : counted(count, noun)));
     return (
-      <p className={style.hint}>
-        Selected: {parts.join(", ")}. Drag moves them together, <b>Del</b> deletes them,{" "}
-        <b>Ctrl D</b> duplicates them.
-      </p>
+      <>
+        <p className={style.hint}>
+          Selected: {parts.join(", ")}. Drag moves them together, <b>Del</b> deletes them,{" "}
+          <b>Ctrl D</b> duplicates them.
+        </p>
+        <SeveralForm actions={actions} />
+      </>
     );
   }
   if (note) return <NoteForm key={note.key} note={note} />;

@@ -2,7 +2,7 @@
 import { Button, Modal, Text, Textarea } from "@mantine/core";
 import { IconPlayerPlayFilled, IconRefresh, IconUserCheck } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { type ReactNode, useState } from "react";
+import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
 import { errorText } from "../../api/http";
@@ -12,6 +12,8 @@ import { useMay, usePerson } from "../../api/people";
 import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
 import type { Run } from "../../api/runs";
 import { type Approval, approve, fetchApprovals, runPreflight } from "../../api/starts";
+import { fromUmrf } from "../../canvas/from-umrf";
+import { robotNames } from "../../graph/robots";
 import { HelpLink } from "../../status/help-link";
 import { EngineLabel } from "../../status/state-label";
 import { HoldButton } from "../../ui/hold-button";
@@ -35,6 +37,35 @@ interface Props {
 
 const LOOK_AGAIN = 5_000; // ms
 
+/** Return the names of the robots that the actions of a UMRF text belong to; empty if it is no JSON. */
+function robotsOfText(text: string | undefined): string[] {
+  try {
+    return text === undefined ? [] : robotNames(fromUmrf(JSON.parse(text)).actions);
+  } catch {
+    return [];
+  }
+}
+
+/** Says before anything is pressed that a graph of several robots runs in the simulator only, for now. */
+function SeveralRobots({ text }: { text: string | undefined }) {
+  const robots = useMemo(() => robotsOfText(text), [text]);
+  if (robots.length < 2) return null;
+  return (
+    <Text size="sm" className={style.several ?? ""} role="note">
+      {robots.map((name, i) => (
+        <span key={name}>
+          {i > 0 && (i === robots.length - 1 ? " and " : ", ")}
+          <i style={{ background: colorOfName(name) }} aria-hidden />
+          <b>
+            <bdi>{name}</bdi>
+          </b>
+        </span>
+      ))}{" "}
+      share this graph. The simulator can play all of them; robots cannot be given it yet.
+    </Text>
+  );
+}
+
 /** The text of the moment, and what the runner sees when it looks at the chosen engines now. */
 function useLook(graph: string, seq: number, engines: readonly string[], behaviours: boolean) {
   const { runner } = useLive();
@@ -57,7 +88,7 @@ function useLook(graph: string, seq: number, engines: readonly string[], behavio
     retry: false,
   });
   const lookSoon = () => void look.refetch({ cancelRefetch: false });
-  return { look, lookSoon, error: umrf.error ?? look.error };
+  return { look, lookSoon, text: umrf.data, error: umrf.error ?? look.error };
 }
 
 /** The simulator goes alone; robots go together. */
@@ -181,7 +212,7 @@ export function StartDialog(props: Props) {
   const [reason, setReason] = useKeptText(place);
   const { now } = useLive();
   const { behaviours, choice } = useBehaviours(engines.includes(SIMULATOR));
-  const { look, lookSoon, error } = useLook(graph, seq, engines, behaviours);
+  const { look, lookSoon, text, error } = useLook(graph, seq, engines, behaviours);
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
@@ -217,6 +248,7 @@ export function StartDialog(props: Props) {
       closeButtonProps={{ "aria-label": "Close" }}
       size="lg"
     >
+      <SeveralRobots text={text} />
       <Where engines={engines} behaviours={behaviours} onToggle={choose} />
       {choice}
       {engines.length > 0 && (
