@@ -74,7 +74,8 @@ export function handOverWords(graph: Graph, relation: Relation): readonly string
     if (verb === undefined) return [];
     const ends = any(outcomes.map((outcome) => ENDINGS[outcome]));
     const who = hand.to === "" ? "Any robot" : isolated(hand.to);
-    return `${who} ${verb} ${isolated(child)} when ${robotWord(hand.from)}’s ${isolated(parent)} ${ends}.`;
+    const inCase = response === "stop" || response === "pause" ? ", if it runs," : "";
+    return `${who} ${verb} ${isolated(child)}${inCase} when ${robotWord(hand.from)}’s ${isolated(parent)} ${ends}.`;
   });
 }
 

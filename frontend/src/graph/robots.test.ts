@@ -56,7 +56,7 @@ test("an arrow says who starts what, and when", () => {
   setResponse(doc, arrow, "on_false", "run");
   expect(words()).toEqual([
     "Scout starts Step1 when Carrier’s Step0 ends true or ends false.",
-    "Scout stops Step1 when Carrier’s Step0 ends with an error.",
+    "Scout stops Step1, if it runs, when Carrier’s Step0 ends with an error.",
   ]);
 });
 

@@ -32,6 +32,10 @@ export function RelationForm({ relation }: { relation: Relation }) {
   const child = endName(graph, relation.child);
   const entry = relation.parent === ENTRY;
   const hand = handOverOf(relation, robotOf(graph));
+  // A pause says more than who pauses, and a restart does nothing.
+  const plain = Object.values(relation.conditions).some((each) => /pause|restart/.test(each));
+  const sentences =
+    hand === null || plain ? relationWords(graph, relation) : handOverWords(graph, relation);
   const nothing = ignoredWords(graph, relation);
   return (
     <div className={style.form} data-form={id}>
@@ -80,10 +84,10 @@ export function RelationForm({ relation }: { relation: Relation }) {
             <div>
               {hand !== null && (
                 <p>
-                  <b>{handOverLabel(hand)}.</b> {handOverWords(graph, relation).join(" ")}
+                  <b>{handOverLabel(hand)}</b>
                 </p>
               )}
-              {relationWords(graph, relation).map((sentence) => (
+              {sentences.map((sentence) => (
                 <p key={sentence}>{sentence}</p>
               ))}
               {nothing !== null && <p>{nothing}</p>}

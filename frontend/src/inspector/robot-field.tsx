@@ -58,7 +58,7 @@ export function SeveralForm({ actions }: { actions: readonly Action[] }) {
   const own = actions.filter(({ missing }) => !missing);
   if (own.length === 0) return null;
   return (
-    <div className={style.form} data-form="several">
+    <div className={style.form} data-form="several" style={{ marginTop: "0.75rem" }}>
       <RobotField key={own.map(({ key }) => key).join(" ")} actions={own} />
     </div>
   );

@@ -148,6 +148,10 @@ function LaneState({ progress }: { progress: Progress }) {
   );
 }
 
+/** Return whether an action that has not begun says more than fits its column; nothing is on its track. */
+const isLong = (progress: Progress | null): boolean =>
+  progress?.tone === "idle" && progress.word.length > 14;
+
 export const LaneRow = memo(function LaneRow(props: Props) {
   const { lane, visits, progress, axis, ended, silentSince, selected } = props;
   const silent = ended === null ? silentSince : null;
@@ -166,7 +170,9 @@ export const LaneRow = memo(function LaneRow(props: Props) {
           <Growing axis={axis} from={silent} className={was ? style.silentOpen : style.silent} />
         )}
       </div>
-      <span className={style.state}>{progress && <LaneState progress={progress} />}</span>
+      <span className={style.state} data-wide={isLong(progress) || undefined}>
+        {progress && <LaneState progress={progress} />}
+      </span>
     </li>
   );
 });
