@@ -48,7 +48,7 @@ function Where({ secure, proxied, reached }: Record<"secure" | "proxied" | "reac
       <p className={style.where} data-tone="off">
         <IconPlugConnectedX size={18} aria-hidden />
         <span>
-          <b>Only this computer reaches this server.</b> Restart the server with{" "}
+          <b className="ink">Only this computer reaches this server.</b> Restart the server with{" "}
           <code>action-assistant serve --share</code>. Links that you make now work after that.
         </span>
       </p>
@@ -58,7 +58,7 @@ function Where({ secure, proxied, reached }: Record<"secure" | "proxied" | "reac
     <p className={style.where}>
       <IconLock size={18} aria-hidden />
       <span>
-        <b>Encrypted.</b>{" "}
+        <b className="ink">Encrypted.</b>{" "}
         {proxied ? (
           "The proxy in front of this server has the certificate."
         ) : (
@@ -73,7 +73,8 @@ function Where({ secure, proxied, reached }: Record<"secure" | "proxied" | "reac
     <p className={style.where} data-tone="off">
       <IconLockOpen2 size={18} aria-hidden />
       <span>
-        <b>Not encrypted.</b> Others on the same network can read what is sent, links too.{" "}
+        <b className="ink">Not encrypted.</b> Others on the same network can read what is sent,
+        links too.{" "}
         {proxied ? (
           "Give the proxy a certificate"
         ) : (
@@ -93,7 +94,7 @@ function NewLink() {
   const [label, setLabel] = useState("");
   return (
     <form
-      className={style.fresh}
+      className="stack gap-50"
       aria-label="New link"
       onSubmit={(event) => {
         event.preventDefault();
@@ -149,7 +150,7 @@ function Body() {
       {open.length > 0 && (
         <section className={style.links} aria-label="Links">
           <div className={style.heading}>
-            <h3>{counted(open.length, "link")}</h3>
+            <h3 className="m-0 text-13 weight-650">{counted(open.length, "link")}</h3>
             {origins.length > 1 && (
               <Select
                 aria-label="Address in the links"
@@ -173,7 +174,7 @@ function Body() {
         </section>
       )}
       {revoke.isError && (
-        <p className={style.problem} role="alert">
+        <p className="m-0 ink-error text-13" role="alert">
           {errorText(revoke.error)}{" "}
           <Button
             size="compact-sm"
@@ -263,8 +264,8 @@ export function ShareLink({ invitation, origin, revoke }: ShareLinkProps) {
     <li className={style.link}>
       <div className={style.head}>
         <b className={style.role}>{invitation.role}</b>
-        {invitation.label !== "" && <span className={style.label}>{invitation.label}</span>}
-        <span className={style.facts}>
+        {invitation.label !== "" && <span className="break-anywhere">{invitation.label}</span>}
+        <span className="break-anywhere faint-12">
           {guestWords(invitation.guests)}
           {made !== null && ` · made ${ago(made, now)}`}
         </span>
@@ -289,7 +290,7 @@ export function ShareLink({ invitation, origin, revoke }: ShareLinkProps) {
         <Button
           color="red"
           variant="subtle"
-          className={style.revoke ?? ""}
+          className="ink-error"
           aria-label={`Revoke the link for ${isolated(label)}`}
           onClick={() => setAsking(true)}
         >

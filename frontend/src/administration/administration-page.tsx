@@ -31,9 +31,9 @@ function Inside() {
 export function AdministrationPage() {
   const may = useMay("restore");
   return (
-    <main className={style.page}>
+    <main className="page">
       <div className={style.inner}>
-        <h2 className={style.title}>Administration</h2>
+        <h2 className="page-title">Administration</h2>
         {may ? (
           <Inside />
         ) : (
@@ -69,7 +69,7 @@ function factsOf(backups: Backups, now: number): StatusFact[] {
 
 export function BackupsCard({ backups, at }: { backups: Backups | null; at: string }) {
   return (
-    <section className={style.card} aria-label="Backups">
+    <section className="page-card min-w-0" aria-label="Backups">
       <div className={style.cardHead}>
         <h3>Backups</h3>
         {backups?.is_late && (
@@ -79,7 +79,7 @@ export function BackupsCard({ backups, at }: { backups: Backups | null; at: stri
         )}
       </div>
       {backups === null ? (
-        <p className={style.version}>The state of the backups cannot be read.</p>
+        <p className="m-0 ink2 text-13">The state of the backups cannot be read.</p>
       ) : (
         <Facts facts={factsOf(backups, Date.parse(at))} />
       )}
@@ -92,12 +92,12 @@ export function RobotLinks({ status }: { status: ProcessStatus }) {
   if (robots === undefined || robots.length === 0) return null;
   const now = Date.parse(status.at);
   return (
-    <section className={style.card} aria-label="Links to robots">
+    <section className="page-card min-w-0" aria-label="Links to robots">
       <div className={style.cardHead}>
         <h3>Links to robots</h3>
       </div>
       {/* biome-ignore lint/a11y/noNoninteractiveTabindex: what scrolls is reached by keys */}
-      <div className={style.scroll} tabIndex={0}>
+      <div className="scroll-x" tabIndex={0}>
         <table className={style.figures}>
           <thead>
             <tr>

@@ -62,11 +62,11 @@ export function Findings() {
     (severity) => found?.filter((each) => each.severity === severity) ?? [],
   );
   return (
-    <section className={style.card} aria-label="Doctor">
+    <section className="page-card min-w-0" aria-label="Doctor">
       <div className={style.cardHead}>
         <h3>Doctor</h3>
         {found != null && last?.age_s != null && (
-          <span className={style.version} role="status">
+          <span className="m-0 ink2 text-13" role="status">
             {summary(found)} Looked at {span(last.age_s * 1000 + Math.max(0, now - heardAt))} ago.
           </span>
         )}
@@ -86,7 +86,7 @@ export function Findings() {
         </p>
       )}
       {found == null && running === null && !error && (
-        <p className={style.version}>
+        <p className="m-0 ink2 text-13">
           Runs the checks of <code>action-assistant doctor</code> on the computer of the editor.
         </p>
       )}

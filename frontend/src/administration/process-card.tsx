@@ -100,14 +100,14 @@ interface Props {
 export function ProcessCard({ title, asked: { data, error } }: Props) {
   const state = error ? "silent" : data === undefined ? "unknown" : readinessOf(data);
   return (
-    <section className={style.card} aria-label={title}>
+    <section className="page-card min-w-0" aria-label={title}>
       <div className={style.cardHead}>
         <h3>{title}</h3>
         <span className={style.state} data-state={state}>
           {WORDS[state]}
         </span>
         {data && (
-          <span className={style.version}>
+          <span className="m-0 ink2 text-13">
             Version {data.versions.program}, tables {data.versions.schema}, Python{" "}
             {data.versions.python}
           </span>
@@ -140,7 +140,7 @@ export function Facts({ facts }: { facts: readonly StatusFact[] }) {
       {facts.map(({ name, value, isBad }) => (
         <div key={name} data-bad={isBad || undefined}>
           <dt>{name}</dt>
-          <dd>{value}</dd>
+          <dd className="m-0 fill break-anywhere">{value}</dd>
         </div>
       ))}
     </dl>

@@ -4,6 +4,7 @@ import "@fontsource-variable/jetbrains-mono/index.css";
 import "@mantine/core/styles.css";
 import "@mantine/notifications/styles.css";
 import "../ui/base.css";
+import "../ui/utilities.css";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { errorText } from "../api/http";

@@ -47,7 +47,7 @@ export function CardState({ progress }: { progress: Progress }) {
   return (
     <div className={style.state} title={progress.inferred ? "Inferred, not seen" : undefined}>
       <StateLabel tone={progress.tone} word={progress.word} {...(more === "" ? {} : { more })} />
-      {progress.inferred && <span className={style.inferred}>inferred</span>}
+      {progress.inferred && <span className="ellipsis ink2 text-12_25">inferred</span>}
     </div>
   );
 }
@@ -55,13 +55,15 @@ export function CardState({ progress }: { progress: Progress }) {
 /** Shows the name of an action, and its old name where two moments are compared. */
 function Head({ action, oldName }: { action: Action; oldName: string | null }) {
   return (
-    <div className={style.head} data-head>
+    <div className="flex items-baseline justify-between gap-6px" data-head>
       <b className={style.name} title={action.name}>
         {action.missing && <IconGhost2 size={13} aria-hidden />}
         {oldName && <del>{oldName}</del>}
         {action.name}
       </b>
-      {action.instanceId > 0 && <span className={style.instance}>{action.instanceId}</span>}
+      {action.instanceId > 0 && (
+        <span className="ink3 text-12_25 tabular">{action.instanceId}</span>
+      )}
       <InsideSpot of={action.key} name={action.name} />
     </div>
   );
@@ -86,7 +88,9 @@ function CardText({ data, selected }: Pick<NodeProps<CardNode>, "data" | "select
   return (
     <>
       <Head action={action} oldName={change?.oldName ?? null} />
-      {action.missing && <div className={style.hint}>named by an arrow, but not there</div>}
+      {action.missing && (
+        <div className="ink-error text-12_25">named by an arrow, but not there</div>
+      )}
       {!action.missing && (instead ?? (progress && <CardState progress={progress} />))}
       <CardLines
         rows={rows}

@@ -191,7 +191,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
             </span>
           )}
           {never.length > 0 && (
-            <span className={style.never}>
+            <span className="ink2">
               <span aria-hidden>∅</span>
               <span className="visually-hidden">never taken</span>
             </span>

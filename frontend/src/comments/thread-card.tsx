@@ -26,13 +26,13 @@ function Said({ thread, message, color }: SaidProps) {
   const { person } = usePerson();
   const now = useNow(30_000);
   return (
-    <article className={style.message}>
+    <article className="flex gap-50">
       <span className={style.face} style={{ background: color }} aria-hidden>
         {initials(message.author.name || "Guest")}
       </span>
-      <div className={style.body}>
+      <div className="fill">
         <p className={style.who}>
-          <b>{message.author.name || "Guest"}</b> {ago(message.at, now)}
+          <b className="ink">{message.author.name || "Guest"}</b> {ago(message.at, now)}
           {message.author.id === person.id && mayEdit && (
             <button
               type="button"
@@ -72,7 +72,7 @@ export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
             {place}
           </button>
         ) : (
-          <p className={style.about}>{place}</p>
+          <p className="m-0 break-anywhere ink2 weight-600">{place}</p>
         ))}
       {thread.messages.map((message) => (
         <Said

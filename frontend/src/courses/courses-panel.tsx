@@ -118,7 +118,7 @@ export function CoursesPanel({ seq }: { seq: number }) {
   const untaken =
     courses.length === 0 ? [] : coverage.untaken.filter((each) => isThere(graph, each));
   return (
-    <div className={style.panel} data-courses>
+    <div className="stack gap-75" data-courses>
       <h2 className={style.title}>Expected courses</h2>
       {courses.length === 0 && <Nothing context={context} />}
       <ul className={style.list} aria-label="Expected courses">
@@ -174,9 +174,9 @@ export function CourseRow({ course, mayEdit, onPlay, onDrop }: CourseRowProps) {
           <bdi>{name}</bdi>
         </b>
         <span className="visually-hidden">: {READ[verdict]}</span>
-        {why !== "" && <p className={style.why}>{why}</p>}
-        {verdict === "unknown" && <p className={style.why}>{READ.unknown}</p>}
-        <p className={style.by}>
+        {why !== "" && <p className="text-12_5">{why}</p>}
+        {verdict === "unknown" && <p className="text-12_5">{READ.unknown}</p>}
+        <p className="quiet-12">
           <bdi>{authorName(course.author)}</bdi>, {day(course.at / 1000, now)}
           {" · "}
           {run === "" ? "from a dry-run" : <Link to={`/runs/${run}`}>its run</Link>}

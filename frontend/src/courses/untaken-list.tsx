@@ -119,7 +119,7 @@ function UntakenRow({
   };
   return (
     <li className={style.untaken} data-untaken={`${relationId(arrow)}|${arrow.outcome}`}>
-      <div className={style.line}>
+      <div className="row gap-50">
         <span className={style.outcome} style={{ color: outcomeColor[arrow.outcome] }}>
           <OutcomeSign outcome={arrow.outcome} size={12} />
           <span className="visually-hidden">{outcomeWord[arrow.outcome]}: </span>

@@ -18,12 +18,18 @@ function Fields({ fields }: { fields: readonly FieldChange[] }) {
           <span>{line.name}</span>{" "}
           {line.before !== null && (
             <del>
-              <i aria-hidden>−</i> {line.before}
+              <i className="weight-700 not-italic" aria-hidden>
+                −
+              </i>{" "}
+              {line.before}
             </del>
           )}{" "}
           {line.after !== null && (
             <ins>
-              <i aria-hidden>+</i> {line.after}
+              <i className="weight-700 not-italic" aria-hidden>
+                +
+              </i>{" "}
+              {line.after}
             </ins>
           )}
         </li>
@@ -54,7 +60,7 @@ export function DifferenceView({ found, label }: { found: Changes; label: string
       )}
       {actions.map((change) => (
         <li key={change.aid} data-change={change.change}>
-          <b>{change.name}</b> <span className={style.change}>{change.change}</span>
+          <b>{change.name}</b> <span className="ink3">{change.change}</span>
           <Fields fields={change.fields} />
         </li>
       ))}
@@ -63,7 +69,7 @@ export function DifferenceView({ found, label }: { found: Changes; label: string
           <b>
             {isolated(change.parent)} → {isolated(change.child)}
           </b>{" "}
-          <span className={style.change}>{change.change}</span>
+          <span className="ink3">{change.change}</span>
           <Fields fields={change.fields} />
         </li>
       ))}

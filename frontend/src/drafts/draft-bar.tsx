@@ -52,7 +52,7 @@ function Proposal({ draft }: { draft: GraphDraft }) {
   if (!proposal) return null;
   return (
     <>
-      <span className={style.proposed}>Proposed: {answersWords(proposal, draft.seq)}</span>
+      <span className="ink2">Proposed: {answersWords(proposal, draft.seq)}</span>
       <Button
         size="compact-sm"
         variant="subtle"
@@ -76,7 +76,7 @@ function Steps({ draft, onOpen }: StepsProps) {
   const { ahead, behind } = draft;
   const known = ahead !== null && behind !== null;
   return (
-    <div className={style.steps}>
+    <div className="wrap gap-6px">
       <Button size="compact-sm" disabled={!known} onClick={() => onOpen("compare")}>
         Compare
       </Button>

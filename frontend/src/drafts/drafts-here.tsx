@@ -48,7 +48,7 @@ function ProposalOf({ draft, onMerge }: DraftRowProps) {
         </p>
       )}
       {mayEdit && (
-        <div className={style.steps}>
+        <div className="wrap gap-6px">
           <Button
             size="compact-sm"
             loading={busy}

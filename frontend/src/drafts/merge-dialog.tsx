@@ -144,7 +144,7 @@ function Side({ conflict, side, name, group, chosen, onChoose }: ConflictSidePro
         <bdi>{name}</bdi>
       </span>
       {conflict.removed === side ? (
-        <p className={style.removed}>removed it</p>
+        <p className="m-0 ink-error">removed it</p>
       ) : (
         <ToldChanges changes={conflict[side]} nothing="changed it" />
       )}

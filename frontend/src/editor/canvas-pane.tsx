@@ -176,7 +176,7 @@ function PaneInFlow(props: Props) {
   useGraphLink(context, begun);
 
   return (
-    <div className={style.whole}>
+    <div className="column">
       <DraftBar id={context.id} />
       <div className={style.sides} data-side={side !== null || undefined}>
         {side && <side.Canvas {...{ side, flow, onPanned: endFollowing }} />}

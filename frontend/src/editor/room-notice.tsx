@@ -12,7 +12,7 @@ interface NoticeProps {
 export function Notice({ icon, tone, children, action }: NoticeProps) {
   return (
     <div className={style.say} data-tone={tone}>
-      <span className={style.icon} aria-hidden>
+      <span className="grid ink2" aria-hidden>
         {icon}
       </span>
       <span className={style.words}>{children}</span>

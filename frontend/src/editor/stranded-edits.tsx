@@ -115,7 +115,7 @@ function Lines({ lines }: { lines: readonly ChangedField[] }) {
       {lines.map((line) => (
         <li key={line.field}>
           <span className={style.field}>{line.field}</span>{" "}
-          {line.before !== null && <del>{line.before}</del>}
+          {line.before !== null && <del className="ink2">{line.before}</del>}
           {line.before !== null && line.after !== null && (
             <>
               {" "}
@@ -123,7 +123,7 @@ function Lines({ lines }: { lines: readonly ChangedField[] }) {
               <span className="visually-hidden">becomes</span>{" "}
             </>
           )}
-          {line.after !== null && <ins>{line.after}</ins>}
+          {line.after !== null && <ins className="weight-600 no-underline">{line.after}</ins>}
           {line.now !== undefined && (
             <span className={style.now}> now {line.now ?? "nothing"}</span>
           )}

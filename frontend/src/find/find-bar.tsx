@@ -50,7 +50,7 @@ function Found({ id, hit, current, onChoose }: FoundProps) {
       )}
       <span className={style.text}>
         <b>{hit.title}</b>
-        {hit.why !== "" && <span className={style.why}>{hit.why}</span>}
+        {hit.why !== "" && <span className="block break-anywhere ink2 text-75">{hit.why}</span>}
       </span>
     </div>
   );
@@ -129,7 +129,7 @@ export function FindBar({ problems, onClose }: Props) {
       <div className={style.row}>
         <TextInput
           ref={field}
-          className={style.field ?? ""}
+          className="fill"
           aria-label="Find in graph"
           placeholder="Name, robot, value, response, problem …"
           leftSection={<IconSearch size={15} aria-hidden />}

@@ -96,7 +96,7 @@ export function ChangesWalk({ changes }: { changes: GraphChanges }) {
               <IconChevronLeft size={17} aria-hidden />
             </ActionIcon>
           </Tooltip>
-          <span role="status">
+          <span className="min-w-0 truncate" role="status">
             {here ? `${at + 1} of ${count} · ${thingWords(here)}` : `${count} to look at`}
           </span>
           <Tooltip label="The next change (N)">

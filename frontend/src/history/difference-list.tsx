@@ -35,9 +35,9 @@ const Thing = memo(
         <button type="button" onClick={() => onShow(thing)}>
           <i aria-hidden>{looks ? "·" : CHANGE_SIGNS[change]}</i>
           <span>
-            <b>{name}</b> <span className={style.quiet}>{looks ? "only moved" : change}</span>
+            <b>{name}</b> <span className="ink2">{looks ? "only moved" : change}</span>
             {lines.map((line) => (
-              <span key={line.name} className={style.change}>
+              <span key={line.name} className="block ink2">
                 {isolated(line.name)} <del>{line.before ?? ""}</del> →{" "}
                 <code>{line.after ?? "nothing"}</code>
               </span>
@@ -55,14 +55,14 @@ export function DifferenceList({ changes }: { changes: GraphChanges }) {
   const context = useEditorContext();
   const onShow = useStableCallback((thing: ChangedThing) => showThing(context, thing));
   const order = useMemo(() => walkOrder(changes.things), [changes]);
-  if (order.length === 0) return <p className={style.quiet}>Nothing differs.</p>;
+  if (order.length === 0) return <p className="ink2">Nothing differs.</p>;
   const more = order.length - MOST;
   return (
     <ul className={style.fields} aria-label="What differs, one by one">
       {order.slice(0, MOST).map((thing) => (
         <Thing key={`${thing.thing} ${thing.key}`} thing={thing} onShow={onShow} />
       ))}
-      {more > 0 && <li className={style.quiet}>and {more} more</li>}
+      {more > 0 && <li className="ink2">and {more} more</li>}
     </ul>
   );
 }

@@ -131,7 +131,7 @@ export function EntryRow(props: Props) {
         </span>
         <span className={style.told}>
           <span className={style.head}>
-            <bdi className={style.who}>{who}</bdi>{" "}
+            <bdi className="weight-600">{who}</bdi>{" "}
             <time dateTime={entry.until}>{timeRange(entry)}</time>
           </span>
           {did !== null && <span className={style.did}>{did}</span>}

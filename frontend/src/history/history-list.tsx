@@ -32,7 +32,7 @@ function Changed({ id, from, to }: { id: string; from: number; to: number }) {
   const found = useDifference(id, from, to);
   if (found.isPending) return <Skeleton height={24} />;
   if (found.isError) return <p role="alert">{errorText(found.error)}</p>;
-  if (!meansSomething(found.data)) return <p className={style.quiet}>Only where things stand.</p>;
+  if (!meansSomething(found.data)) return <p className="m-0 ink3">Only where things stand.</p>;
   return <DifferenceView found={found.data} label="What it changed" />;
 }
 
@@ -63,9 +63,11 @@ function Row({ entry, id, seq, mayEdit, now }: EntryProps) {
     <li className={style.entry}>
       <p className={style.line}>
         <span>
-          <bdi className={style.who}>{authorName(entry.author)}</bdi> {doneWords(entry)}
+          <bdi className="weight-600">{authorName(entry.author)}</bdi> {doneWords(entry)}
         </span>
-        <time dateTime={entry.until}>{when}</time>
+        <time className="flex-none faint-12 tabular" dateTime={entry.until}>
+          {when}
+        </time>
       </p>
       <div className={style.buttons}>
         {before !== null && (
@@ -101,7 +103,7 @@ export function HistoryList(props: Props) {
   if (history.isPending) return <Skeleton height={120} />;
   if (history.isError) return <p role="alert">{errorText(history.error)}</p>;
   return (
-    <ol className={style.list} aria-label="History">
+    <ol className="list-reset" aria-label="History">
       {history.data.map((entry) => (
         <Row key={`${entry.kind} ${entry.seq} ${entry.at}`} entry={entry} now={now} {...props} />
       ))}

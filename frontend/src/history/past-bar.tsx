@@ -127,7 +127,7 @@ export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
         onLeave={() => lookAt(null)}
       />
       <div className={style.row}>
-        <span className={style.compare}>
+        <span className="inline-row gap-6px nowrap ink2">
           Compare with <CompareWith {...{ place, timeline, running, newest }} />
         </span>
         {changes && (

@@ -50,7 +50,7 @@ export function PastDetails({ changes: newest, panel, children }: Props) {
   }, [panel]);
   const label = selection.size === 1 || changes === null ? "Who set what" : "What differs";
   return (
-    <div className={style.details}>
+    <div className="column">
       <div className={style.tabs}>
         <Segments
           label="What the details show"
@@ -70,7 +70,7 @@ export function PastDetails({ changes: newest, panel, children }: Props) {
           <PastWays versions={versions} />
         </section>
       ) : (
-        <div className={style.whole}>{children}</div>
+        <div className="fill-y">{children}</div>
       )}
     </div>
   );

@@ -39,12 +39,12 @@ export function By({ value, color }: ByProps) {
   return (
     <span className={style.by}>
       <i style={{ "--c": color } as CSSProperties} aria-hidden />
-      <bdi>{authorName(value.author)}</bdi>
+      <bdi className="ellipsis ink weight-600">{authorName(value.author)}</bdi>
       {at !== null && ` · ${day(at, now)} ${hourMinute(at)}`}
       {value.merged && (
         <span>
           {" · merged by "}
-          <bdi>{authorName(value.merged.by)}</bdi>
+          <bdi className="ellipsis ink weight-600">{authorName(value.merged.by)}</bdi>
         </span>
       )}
     </span>
@@ -166,7 +166,7 @@ function SetBack({ of, field, span }: Props & { span: ValueSpan }) {
       leftSection={<IconArrowBackUp size={15} aria-hidden />}
       onClick={set}
     >
-      <span className={style.backWords}>
+      <span className="ellipsis">
         Set {isolated(name)} back to <code>{span.text}</code>
       </span>
     </Button>

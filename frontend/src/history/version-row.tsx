@@ -139,7 +139,8 @@ export function VersionItem(props: Props) {
         </p>
       )}
       <p className={style.facts}>
-        <bdi>{authorName(author)}</bdi> · <time dateTime={at}>{timeWords(at, now)}</time> ·{" "}
+        <bdi className="ink">{authorName(author)}</bdi> ·{" "}
+        <time dateTime={at}>{timeWords(at, now)}</time> ·{" "}
         <code title={digest}>{shortDigest(digest)}</code>
         <Tooltip label="Copy the whole digest">
           <ActionIcon

@@ -69,7 +69,7 @@ export function VersionsList({ timeline }: { timeline: Timeline }) {
           No version yet. Each start publishes one. You can also publish one by hand, with a note.
         </p>
       )}
-      <ol className={style.list} aria-label="Versions">
+      <ol className="list-reset" aria-label="Versions">
         {all.slice(0, most).map(item)}
       </ol>
       {all.length > most && (

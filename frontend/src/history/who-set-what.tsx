@@ -21,14 +21,14 @@ function BlameRow({ of, blame, color }: BlameRowProps) {
   const [open, setOpen] = useState(false);
   const { field, value, before } = blame;
   return (
-    <li className={style.field}>
+    <li className="border-bottom">
       <button
         type="button"
         className={style.blame}
         aria-expanded={open}
         onClick={() => setOpen(!open)}
       >
-        <span className={style.name}>{plainFieldWords(field)}</span>
+        <span className="ink2">{plainFieldWords(field)}</span>
         <code>
           {before !== null && <del>{blamedValue(field, before)}</del>} {blamedValue(field, value)}
         </code>
@@ -51,7 +51,7 @@ export function WhoSetWhat({ of, what }: { of: string; what: string }) {
   const colorOf = usePersonColors(found.data?.map(({ author }) => author.id));
   const { busy, restore } = useGoingBack(context);
   if (found.isPending) return <Skeleton height={120} />;
-  if (found.isError) return <p className={style.quiet}>It did not exist at that moment.</p>;
+  if (found.isError) return <p className="ink2">It did not exist at that moment.</p>;
   return (
     <>
       <ul className={style.fields} aria-label="Who set what">

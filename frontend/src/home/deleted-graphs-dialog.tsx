@@ -47,8 +47,8 @@ function Row({ graph, kind, now }: { graph: GraphSummary; kind: Kind; now: numbe
   };
   return (
     <li className={style.row}>
-      <span className={style.text}>
-        <bdi className={style.name}>
+      <span className="fill">
+        <bdi className="block truncate weight-600">
           {graph.name || "Untitled"}
           {graph.draft_of && `, draft “${isolated(graph.draft_of.name)}”`}
         </bdi>
@@ -82,7 +82,7 @@ function List({ kind }: { kind: Kind }) {
   if (deleted.isError) return <p role="alert">{errorText(deleted.error)}</p>;
   if (graphs.length === 0) return <p className={style.none}>Nothing is deleted.</p>;
   return (
-    <ul className={style.list}>
+    <ul className="list-reset">
       {graphs.map((graph) => (
         <Row key={graph.id} graph={graph} kind={kind} now={now} />
       ))}

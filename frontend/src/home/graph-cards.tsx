@@ -68,7 +68,7 @@ function GraphCard({ graph, names, last }: GraphCardProps) {
   const { robots = [], labels = [], people = [] } = graph;
   return (
     <article className={home.card}>
-      <Link to={`/graphs/${graph.id}`} className={home.open}>
+      <Link to={`/graphs/${graph.id}`} className="block ink-inherit no-underline">
         <div className={home.preview}>
           <GraphPreview graph={graph.id} seq={graph.seq} />
           <People people={people} />
@@ -138,7 +138,7 @@ export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
           data-search
         />
         {labels.length > 0 && (
-          <fieldset className={style.labels}>
+          <fieldset className="fieldset-reset wrap gap-37_5">
             <legend className="visually-hidden">Only with the label</legend>
             {labels.map((each) => (
               <button

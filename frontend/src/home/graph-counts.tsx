@@ -16,7 +16,10 @@ export function GraphCounts({ graph, brief = false }: { graph: GraphSummary; bri
   if (words.length === 0) return null;
   const { wrong, fillIn } = counts;
   return (
-    <span className={style.counts} title={words.join(", ")}>
+    <span
+      className="inline-flex flex-none gap-40 nowrap text-11_5 weight-600"
+      title={words.join(", ")}
+    >
       {wrong > 0 && (
         <span className={style.count} data-kind="wrong">
           <IconAlertTriangle size={13} aria-hidden /> {wrong}{" "}

@@ -48,7 +48,7 @@ export function GraphRow({ graph, current }: { graph: GraphSummary; current: boo
       data-current={current || undefined}
     >
       <i className={style.dot} style={{ background: toneColor[tone] }} aria-hidden />
-      <span className={style.text}>
+      <span className="fill">
         <span className={style.name}>{graph.name || "Untitled"}</span>
         <span className={style.sub}>{subtitle(graph, words, now)}</span>
       </span>
@@ -64,7 +64,7 @@ export function RowSkeletons({ count }: { count: number }) {
         // biome-ignore lint/suspicious/noArrayIndexKey: they are all alike
         <div className={style.row} key={i}>
           <Skeleton circle height={8} />
-          <span className={style.text}>
+          <span className="fill">
             <Skeleton height={10} width="62%" mb={6} />
             <Skeleton height={8} width="84%" />
           </span>

@@ -46,7 +46,7 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
   const graphs = useGraphs();
   const list = graphs.data ?? [];
   return (
-    <main className={style.page}>
+    <main className="page">
       <div className={style.inner}>
         <div className={style.hello}>
           <div>
@@ -57,7 +57,7 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
             </p>
           </div>
           {mayEdit && (
-            <div className={style.buttons}>
+            <div className="flex gap-50">
               <Button leftSection={<IconFileImport size={16} />} onClick={onImport}>
                 Import a file
               </Button>

@@ -209,7 +209,7 @@ export const ActionRow = memo(function ActionRow({ known, note = "", onPlace }: 
         onClick={() => onPlace(template)}
       >
         <span className={style.grip} aria-hidden />
-        <span className={style.text}>
+        <span className="fill">
           <span className={style.name}>{template.name}</span>
           <span className={style.sub}>
             {signature(template)}

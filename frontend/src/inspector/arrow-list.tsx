@@ -32,12 +32,12 @@ function Line({ relation, context }: { relation: Relation; context: EditorContex
                 <OutcomeSign outcome={outcome} size={11} /> {outcomeWord[outcome]}
               </span>
             ))}
-            <span className={style.quiet}> → {answer.response} </span>
+            <span className="ink3"> → {answer.response} </span>
           </span>
         ))}
-        {answers.length === 0 && <span className={style.quiet}>ignored → </span>}
+        {answers.length === 0 && <span className="ink3">ignored → </span>}
         <b>{endName(context.graph, relation.child)}</b>
-        {hand && <span className={style.quiet}> · {robotWord(hand.to)}</span>}
+        {hand && <span className="ink3"> · {robotWord(hand.to)}</span>}
       </button>
       <Tooltip label="Delete this arrow">
         <ActionIcon
@@ -62,7 +62,7 @@ function Connect({ action, onDone }: { action: Action; onDone: () => void }) {
       .map((other) => ({ value: other.key, label: `${other.name} ${other.instanceId}` })),
   ];
   return (
-    <div className={style.connect}>
+    <div className="flex gap-37_5">
       <Select
         aria-label="When it is"
         data={OUTCOMES.map((value) => ({ value, label: outcomeWord[value] }))}
@@ -114,13 +114,13 @@ export function ArrowList({ action }: { action: Action }) {
           Connect
         </Button>
       </div>
-      <ul className={style.arrows}>
+      <ul className="list-reset stack gap-25">
         {out.map((relation) => (
           <Line key={relationId(relation)} relation={relation} context={context} />
         ))}
       </ul>
       {out.length === 0 && !connecting && (
-        <p className={style.hint}>
+        <p className="m-0 ink2">
           Nothing follows. Drag from one of the four outcomes under the card, or press Connect.
         </p>
       )}

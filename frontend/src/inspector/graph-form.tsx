@@ -38,7 +38,7 @@ export function GraphForm() {
         />
       </SharedField>
       <LabelsField />
-      <p className={style.hint}>
+      <p className="m-0 ink2">
         {counted(graph.actions.length, "action")}, {counted(arrows, "arrow")}
       </p>
       <GraphInterface />

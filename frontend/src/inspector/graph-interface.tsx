@@ -28,7 +28,7 @@ function InterfaceRow({ side, of: parameter }: ParameterProps) {
   const keys = of.map(({ key }) => key);
   const types = TYPES.some((known) => known === type) || type === null ? TYPES : [...TYPES, type];
   return (
-    <li className={style.interface}>
+    <li className="row-wrap gap-50">
       <button
         type="button"
         className={style.owner}
@@ -61,7 +61,11 @@ function InterfaceRow({ side, of: parameter }: ParameterProps) {
           }
         />
       )}
-      {mixed && <p className={style.mixed}>Actions of this graph take it with different types.</p>}
+      {mixed && (
+        <p className="m-0 w-full ink-error text-12">
+          Actions of this graph take it with different types.
+        </p>
+      )}
     </li>
   );
 }
@@ -79,7 +83,7 @@ function InterfaceSide({ side, title, parameters }: InterfaceSideProps) {
       <div className={style.heading}>
         <h2>{title}</h2>
       </div>
-      <ul className={style.interfaces}>
+      <ul className="list-reset stack gap-37_5">
         {parameters.map((each) => (
           <InterfaceRow key={each.path} side={side} of={each} />
         ))}

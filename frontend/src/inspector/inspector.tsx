@@ -83,7 +83,7 @@ function Properties() {
     const parts = counts.flatMap(([count, noun]) => (count === 0 ? [] : counted(count, noun)));
     return (
       <>
-        <p className={style.hint}>
+        <p className="m-0 ink2">
           Selected: {parts.join(", ")}. Drag moves them together, <b>Del</b> deletes them,{" "}
           <b>Ctrl D</b> duplicates them.
         </p>
@@ -102,7 +102,7 @@ function Properties() {
 function ProblemsTab({ told }: { told: readonly CheckedGroup[] }) {
   const { wrong, fillIn, warnings } = countsOf(told);
   return (
-    <span className={style.tabWords}>
+    <span className="inline-row gap-30">
       Problems
       {wrong > 0 && (
         <span className={style.count} data-kind="wrong">
@@ -142,13 +142,13 @@ export function Inspector({ id, seq, panel, problems, told, threads }: Props) {
         </Tabs.Tab>
         <Tabs.Tab value="json">JSON</Tabs.Tab>
         <Tabs.Tab value="comments" aria-label={open === 0 ? "Comments" : `Comments, ${open} open`}>
-          <span className={style.tabWords}>
+          <span className="inline-row gap-30">
             <IconMessageCircle size={15} aria-hidden />
             {open > 0 && <span className={style.count}>{open}</span>}
           </span>
         </Tabs.Tab>
         <Tabs.Tab value="courses" aria-label="Expected courses">
-          <span className={style.tabWords}>
+          <span className="inline-row gap-30">
             <IconShieldCheck size={15} aria-hidden />
           </span>
         </Tabs.Tab>

@@ -88,7 +88,7 @@ export function NoteForm({ note }: { note: Note }) {
           onCommit={(text) => change({ size: [width, Number(text)] })}
         />
       </div>
-      <p className={style.hint}>
+      <p className="m-0 ink2">
         {frame
           ? "Moving a frame moves what lies in it. Engines ignore frames."
           : "Markdown. [[Drive 0]] links to the action of that name, also after it is renamed. Engines ignore notes."}

@@ -102,7 +102,7 @@ function ProblemItem({ told }: { told: CheckedGroup }) {
   const field = fieldOfGroup(told);
   return (
     <li className={style.problem} data-kind={told.kind} data-code={told.code}>
-      <div className={style.head}>
+      <div className="row gap-50">
         {place !== null && words !== "" ? (
           <button
             type="button"
@@ -113,7 +113,7 @@ function ProblemItem({ told }: { told: CheckedGroup }) {
             {words}
           </button>
         ) : (
-          <span className={style.graph}>Graph</span>
+          <span className="ink2 weight-500">Graph</span>
         )}
         <WayInside inside={told.problems[0].inside} />
         <Tooltip label="Copy a link to this problem">
@@ -147,9 +147,9 @@ function Part({ kind, told }: { kind: ProblemKind; told: readonly CheckedGroup[]
   return (
     <section className={style.part} data-kind={kind} aria-label={TITLES[kind]}>
       <h2>
-        {TITLES[kind]} <span className={style.number}>{here.length}</span>
+        {TITLES[kind]} <span className="tabular">{here.length}</span>
       </h2>
-      <ul className={style.items}>
+      <ul className="list-reset stack gap-50">
         {here.map((each) => (
           <ProblemItem key={each.id} told={each} />
         ))}

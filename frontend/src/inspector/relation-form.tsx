@@ -57,7 +57,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
         </button>
       </div>
       {entry ? (
-        <p className={style.hint}>The graph starts with {isolated(child)}.</p>
+        <p className="m-0 ink2">The graph starts with {isolated(child)}.</p>
       ) : (
         <>
           <section className={style.section}>

@@ -45,13 +45,13 @@ function Origins({ flat: { origins, left_out } }: { flat: FlatGraph }) {
             <b>
               <bdi>{action}</bdi>
             </b>
-            {levels.length > 1 && <bdi className={style.quiet}>{wayWords(levels)}</bdi>}
+            {levels.length > 1 && <bdi className="quiet-xs">{wayWords(levels)}</bdi>}
           </li>
         ))}
-        {more > 0 && <li className={style.quiet}>and {more} more</li>}
+        {more > 0 && <li className="quiet-xs">and {more} more</li>}
       </ul>
       {left_out.length > 0 && (
-        <p className={style.quiet}>
+        <p className="quiet-xs">
           These entries belong to no action of the flattened graph:{" "}
           {left_out
             .map(({ levels, fields }) => `${fields.join(", ")} of ${wayWords(levels)}`)

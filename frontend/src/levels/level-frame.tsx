@@ -237,11 +237,11 @@ const InnerCard = memo(function InnerCard({
     >
       {robot !== "" && <RobotTag name={robot} />}
       <MarkInside path={path} />
-      <div className={card.head}>
+      <div className="flex items-baseline justify-between gap-6px">
         <b className={card.name} title={name}>
           {name}
         </b>
-        {instanceId > 0 && <span className={card.instance}>{instanceId}</span>}
+        {instanceId > 0 && <span className="ink3 text-12_25 tabular">{instanceId}</span>}
         {graphsInside.now()?.byName.has(name) && (
           <CardButton
             label={`Expand the graph inside ${isolated(name)}`}
@@ -281,7 +281,7 @@ function Head({ level, name, progress }: FrameProps) {
         <bdi>{name}</bdi>
       </b>
       {progress && <StateLabel tone={progress.tone} word={progress.word} />}
-      <span className={style.count}>{count}</span>
+      <span className="ink2 text-12_25">{count}</span>
       <span className={style.buttons}>
         <CardButton
           label={`Open the graph inside ${isolated(name)}`}

@@ -76,7 +76,7 @@ function UsedIn() {
         </p>
         {graphs.map((graph) => (
           <Menu.Item key={graph} component={Link} to={`/graphs/${graph}`}>
-            <bdi className={style.name}>{graphsInside.now()?.names.get(graph) || "Untitled"}</bdi>
+            <bdi className="truncate">{graphsInside.now()?.names.get(graph) || "Untitled"}</bdi>
           </Menu.Item>
         ))}
       </Menu.Dropdown>

@@ -38,7 +38,11 @@ export function ReasonList({ context, reasons, told = (way) => way, label, onClo
         return (
           <li key={`${reason.code} ${words} ${reason.message}`}>
             {words !== "" && (
-              <button type="button" className={style.way} onClick={() => show(way)}>
+              <button
+                type="button"
+                className="button-bare ink-accent weight-600"
+                onClick={() => show(way)}
+              >
                 <bdi>{words}</bdi>
               </button>
             )}

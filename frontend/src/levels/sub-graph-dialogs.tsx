@@ -112,12 +112,12 @@ function ParameterLists({ look: { inputs = {}, outputs = {} } }: { look: Extract
     <dl className={style.sides}>
       {sides.map(([word, side]) => (
         <div key={word}>
-          <dt>{word}</dt>
-          <dd>
-            {Object.keys(side).length === 0 && <span className={style.quiet}>nothing</span>}
+          <dt className="quiet-xs">{word}</dt>
+          <dd className="m-0 stack break-anywhere">
+            {Object.keys(side).length === 0 && <span className="quiet-xs">nothing</span>}
             {Object.entries(side).map(([name, type]) => (
               <span key={name} className={style.side}>
-                <bdi>{name.replaceAll("::", ".")}</bdi> <bdi className={style.quiet}>{type}</bdi>
+                <bdi>{name.replaceAll("::", ".")}</bdi> <bdi className="quiet-xs">{type}</bdi>
               </span>
             ))}
           </dd>
@@ -204,7 +204,7 @@ function ExtractForm({ look, again, ...props }: ExtractProps & PreviewProps) {
       />
       <ParameterLists look={look} />
       {differences.length === 0 ? (
-        <p className={style.quiet}>It does what these actions do now, for all of their results.</p>
+        <p className="quiet-xs">It does what these actions do now, for all of their results.</p>
       ) : (
         <div className={style.warned}>
           <p>As a sub-graph, the actions may behave differently than they do now:</p>
@@ -216,7 +216,7 @@ function ExtractForm({ look, again, ...props }: ExtractProps & PreviewProps) {
           />
         </div>
       )}
-      <p className={style.quiet}>
+      <p className="quiet-xs">
         A robot runs it only if the new graph is in its index. It cannot be paused while that graph
         runs.
       </p>
@@ -315,7 +315,7 @@ function UnpackQuestion({ look, context, onClose, name }: UnpackQuestionProps) {
       )}
       <ReasonList label="What would be different" reasons={told} {...{ context, onClose }} />
       {left.length > 0 && (
-        <p className={style.quiet}>
+        <p className="quiet-xs">
           These entries belong to no action after unpacking: {left.map(isolated).join(", ")} of{" "}
           <bdi>{name}</bdi>.
         </p>

@@ -85,9 +85,9 @@ const Row = memo(function Row({ listed, base, current }: ActionRowProps) {
       data-row
     >
       <span className={style.name}>
-        <bdi>{name || "Without a name"}</bdi>
+        <bdi className="flex-1 truncate">{name || "Without a name"}</bdi>
         {older > 0 && (
-          <span className={style.older} title={`Older parameters in ${older}`}>
+          <span className="inline-flex flex-none ink-warn" title={`Older parameters in ${older}`}>
             <IconAlertTriangle size={13} aria-hidden />
             <span className="visually-hidden"> older parameters in {older}</span>
           </span>
@@ -159,7 +159,7 @@ function Filters({ robots, filter, onFilter }: FilterProps) {
     ),
   ];
   return (
-    <fieldset className={style.filters}>
+    <fieldset className="m-0 p-0 border-0 wrap gap-25">
       <legend className="visually-hidden">Which actions</legend>
       {all.map(([value, words]) => (
         <button

@@ -22,13 +22,11 @@ function Row({ facts, free }: { facts: ParameterFacts; free: string }) {
         <code className={style.type}>{type}</code>
       </td>
       <td className={style.said}>
-        {[allowed, ...more].filter(Boolean).join(" · ") || (
-          <span className={style.quiet}>{free}</span>
-        )}
+        {[allowed, ...more].filter(Boolean).join(" · ") || <span className="m-0 ink3">{free}</span>}
       </td>
       <td className={style.value}>
         {value !== null && <code>{value}</code>}{" "}
-        {!required && <span className={style.quiet}>optional</span>}
+        {!required && <span className="m-0 ink3">optional</span>}
       </td>
     </tr>
   );
@@ -49,7 +47,7 @@ function ParameterTable({ title, none, parameters, free = "" }: ParameterTablePr
     <section>
       <h3 className={style.heading}>{title}</h3>
       {rows.length === 0 ? (
-        <p className={style.quiet}>{none}</p>
+        <p className="m-0 ink3">{none}</p>
       ) : (
         <table className={style.table} aria-label={title}>
           <thead>
@@ -90,7 +88,7 @@ export function UsedIn({ usedIn, differs, onTake }: UsedInProps) {
         Used in
         {usedIn.length > 0 && <span>{counted(usedIn.length, "graph")}</span>}
       </h3>
-      {usedIn.length === 0 && <p className={style.quiet}>No graph uses it yet.</p>}
+      {usedIn.length === 0 && <p className="m-0 ink3">No graph uses it yet.</p>}
       <ul className={style.facts} aria-label="Graphs that use it">
         {usedIn.map((id) => (
           <li key={id}>
@@ -98,7 +96,7 @@ export function UsedIn({ usedIn, differs, onTake }: UsedInProps) {
               <bdi>{nameOf(id)}</bdi>
             </Link>
             {differs.includes(id) && (
-              <span className={style.differs}>
+              <span className="ink-warn weight-550">
                 older parameters
                 {onTake && (
                   <Button size="compact-sm" variant="subtle" onClick={() => onTake(id, nameOf(id))}>
@@ -140,7 +138,7 @@ export function OnRobots({ name, knowledge, own, offer }: OnRobotsProps) {
   return (
     <section>
       <h3 className={style.heading}>On robots</h3>
-      {robots.length === 0 && <p className={style.quiet}>No robot is registered.</p>}
+      {robots.length === 0 && <p className="m-0 ink3">No robot is registered.</p>}
       <ul className={style.facts} aria-label="Robots">
         {robots.map((robot) => {
           const has = having.find((each) => each.robot === robot);
@@ -150,7 +148,7 @@ export function OnRobots({ name, knowledge, own, offer }: OnRobotsProps) {
               <span className={style.robot}>
                 <i style={{ background: colorOfName(robot) }} aria-hidden /> <bdi>{robot}</bdi>
               </span>
-              <span className={differs ? style.differs : style.quiet}>{text}</span>
+              <span className={differs ? "ink-warn weight-550" : "m-0 ink3"}>{text}</span>
               {has && offer?.(has)}
             </li>
           );

@@ -66,8 +66,9 @@ function NamesLine({ id, seq, name }: NamesLineProps) {
   if (outline !== undefined) {
     return (
       <p className={style.names}>
-        Package <code>{outline.package}</code> · class <code>{name}</code> · library{" "}
-        <code>lib{outline.package}.so</code>
+        Package <code className="mono">{outline.package}</code> · class{" "}
+        <code className="mono">{name}</code> · library{" "}
+        <code className="mono">lib{outline.package}.so</code>
       </p>
     );
   }

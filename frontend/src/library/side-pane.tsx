@@ -38,7 +38,7 @@ function LastBuild({ id }: { id: string }) {
       className={style.build}
       data-failed={!build.ended_well || undefined}
     >
-      <p>
+      <p className="m-0 wrap gap-40">
         <b>Last build</b> {buildWords(build)}
         {at !== null && <time dateTime={build.at}>{ago(at, now)}</time>}
       </p>
@@ -46,7 +46,7 @@ function LastBuild({ id }: { id: string }) {
         <ul>
           {build.errors.map((fault) => (
             <li key={`${faultPlace(fault)} ${fault.message}`}>
-              <code>{faultPlace(fault)}</code> {fault.message}
+              <code className="text-12 mono">{faultPlace(fault)}</code> {fault.message}
             </li>
           ))}
         </ul>
@@ -70,7 +70,7 @@ export function SidePane({ id, action, seq, mayEdit }: Props) {
   const open = threads.filter(({ about, resolved }) => about === action?.key && !resolved).length;
   const [tab, setTab] = useState<string | null>("package");
   return (
-    <Tabs value={tab} onChange={setTab} keepMounted={false} className={style.side ?? ""}>
+    <Tabs value={tab} onChange={setTab} keepMounted={false} className="min-w-0">
       <Tabs.List>
         <Tabs.Tab value="package">C++ package</Tabs.Tab>
         <Tabs.Tab value="comments" aria-label={open === 0 ? "Comments" : `Comments, ${open} open`}>

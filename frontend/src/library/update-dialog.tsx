@@ -127,7 +127,7 @@ function OtherRenames({ update }: { update: Update }) {
   if (names.length === 0) return null;
   return (
     <details className={style.others}>
-      <summary>
+      <summary className="ink2 cursor-pointer">
         {update.suggested.length > 0 ? "Something else was" : "Choose what was"} only renamed
       </summary>
       {names.map((name) => {
@@ -206,10 +206,10 @@ function Use({ use, update, mayEdit }: UseProps) {
             onChange={() => update.leave(graph)}
           />
         )}
-        <h3 id={title}>
+        <h3 className="m-0 break-anywhere text-13" id={title}>
           <bdi>{name || "Untitled"}</bdi>
         </h3>
-        <span className={style.quiet}>{count === 1 ? "used once" : `used ${count} times`}</span>
+        <span className="faint-12">{count === 1 ? "used once" : `used ${count} times`}</span>
       </div>
       {difference && (
         <DifferenceView found={difference} label={`What changes in ${isolated(name)}`} />

@@ -149,7 +149,7 @@ export function Words({ row, progress, name, robots }: WordsProps) {
               <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
             )}
           </span>
-          {more.length > 0 && <span className={style.sub}>{more.join(" · ")}</span>}
+          {more.length > 0 && <span className="truncate ink2 text-75">{more.join(" · ")}</span>}
         </>
       );
     }
@@ -162,8 +162,8 @@ export function Words({ row, progress, name, robots }: WordsProps) {
     case "target":
       return (
         <span className={style.target}>
-          <span className={style.response}>{row.response}</span> <b>{name}</b>
-          {!row.relation.required && <span className={style.sub}>optional</span>}
+          <span className="ink2">{row.response}</span> <b>{name}</b>
+          {!row.relation.required && <span className="truncate ink2 text-75">optional</span>}
           <HandedTo relation={row.relation} robots={robots} />
         </span>
       );
@@ -175,7 +175,7 @@ export function Words({ row, progress, name, robots }: WordsProps) {
       return (
         <span className={style.note}>
           <Sign size={13} aria-label={noteWord(row.note)} />
-          <span className={style.sub}>{spokenNote(text) || "empty"}</span>
+          <span className="truncate ink2 text-75">{spokenNote(text) || "empty"}</span>
         </span>
       );
     }

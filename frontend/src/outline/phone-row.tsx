@@ -48,7 +48,7 @@ const VALUES = 2; // on a line
 
 function Signs({ of }: { of: readonly Precondition[] }) {
   return of.map((outcome) => (
-    <span key={outcome} className={style.sign} style={{ color: outcomeColor[outcome] }}>
+    <span key={outcome} className="inline-flex" style={{ color: outcomeColor[outcome] }}>
       <OutcomeSign outcome={outcome} size={14} />
     </span>
   ));
@@ -76,7 +76,7 @@ function Bundle({ row, name, back, robots }: BundleProps) {
         <Signs of={row.bundled ?? []} />
         {row.response !== "run" && <b>{row.response}</b>}
         <Way size={14} />
-        <bdi className={style.to}>{name}</bdi>
+        <bdi className="truncate">{name}</bdi>
       </span>
       <HandedTo relation={row.relation} robots={robots} />
     </>
@@ -91,7 +91,7 @@ function About(props: Pick<Props, "row" | "progress" | "robots"> & { name: strin
   const named = action.missing || robots.size > 0;
   return (
     <>
-      <span className={style.head}>
+      <span className="row min-w-0 gap-50">
         <bdi className={style.name}>{name}</bdi>
         <Talk of={action.key} />
         {progress && (
@@ -101,7 +101,10 @@ function About(props: Pick<Props, "row" | "progress" | "robots"> & { name: strin
       <span className={style.sub}>
         {action.missing && "named by an arrow, but not there"}
         {!action.missing && robots.size > 0 && (
-          <b style={{ color: action.actor === "" ? undefined : colorOfName(action.actor) }}>
+          <b
+            className="weight-600"
+            style={{ color: action.actor === "" ? undefined : colorOfName(action.actor) }}
+          >
             <bdi>{action.actor || "any robot"}</bdi>
           </b>
         )}
@@ -192,7 +195,7 @@ function Connect({ row, open, active, handlers }: ConnectProps) {
   return (
     <button
       type="button"
-      className={`${style.chip} ${style.optional} ${style.connect}`}
+      className={`${style.chip} ${style.optional} ink-accent`}
       tabIndex={active ? 0 : -1}
       onClick={() => handlers.run(CONNECT, row)}
     >

@@ -13,7 +13,7 @@ export const RobotFilter = memo(function Robots() {
   const lit = useWatched(store.robot);
   if (robots.length < 2 && lit === null) return null;
   return (
-    <fieldset className={style.robots}>
+    <fieldset className="fieldset-reset wrap gap-6px">
       <legend className="visually-hidden">Show the actions of one robot</legend>
       {robots.map(([name, actions]) => (
         <button
@@ -26,7 +26,7 @@ export const RobotFilter = memo(function Robots() {
         >
           <i style={{ background: colorOfName(name) }} aria-hidden />
           <span>{name || "any robot"}</span>
-          <span className={style.count}>
+          <span className="ink2 tabular">
             {actions}
             <span className="visually-hidden"> {actions === 1 ? "action" : "actions"}</span>
           </span>

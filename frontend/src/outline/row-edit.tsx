@@ -12,7 +12,6 @@ import { endName } from "../graph/relation-words";
 import { useDraft } from "../ui/drafts";
 import { keyOf } from "../ui/keys";
 import { isolated } from "../words/isolated";
-import style from "./outline.module.css";
 import { outcomesOf, type RowEditKind } from "./row-actions";
 import type { OutlineItem } from "./rows";
 
@@ -81,7 +80,7 @@ function Connect({ row, onDone }: Props) {
     );
   };
   return (
-    <div className={style.pair}>
+    <div className="flex gap-37_5">
       {!entry && (
         <Select
           aria-label="When it is"

@@ -21,7 +21,7 @@ function Refusals({ refusals }: { refusals: readonly PackageRefusal[] }) {
         {refusals.map(({ place, reason }) => (
           <li key={`${place} ${reason}`}>
             <span>
-              <bdi className={style.place}>{place || "an action without a name"}</bdi> {reason}
+              <bdi className="weight-600">{place || "an action without a name"}</bdi> {reason}
             </span>
           </li>
         ))}

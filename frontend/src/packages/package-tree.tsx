@@ -96,9 +96,9 @@ export function PackageFiles({ graph, seq, name, path }: PackageFilesProps) {
   const contents = usePackage(graph, seq, name);
   const text = contents.data?.files.find((file) => file.path === path)?.text ?? "";
   return (
-    <section aria-label={`${name}/${path}`} className={style.preview}>
+    <section aria-label={`${name}/${path}`} className="stack min-w-0 min-h-0 gap-50">
       <div className={style.title}>
-        <h3>
+        <h3 className="m-0 fill truncate text-13">
           <bdi>
             {name}/{path}
           </bdi>

@@ -125,7 +125,7 @@ export function PackageRefusals({ refusals, context, onClose }: PackageRefusalsP
         {refusals.map(({ action, place, reason }) => (
           <li key={`${place} ${reason}`}>
             <span>
-              <bdi className={style.place}>{place || "an action without a name"}</bdi> {reason}
+              <bdi className="weight-600">{place || "an action without a name"}</bdi> {reason}
             </span>
             <Button variant="default" size="compact-sm" onClick={() => show(action)}>
               Show<span className="visually-hidden"> {action || "it"}</span>

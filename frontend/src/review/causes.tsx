@@ -123,7 +123,8 @@ function PlaceView({ place, graph }: { place: CourseChange; graph: string }) {
         label={`What ${isolated(authorName(place.author))} changed`}
       />
       <p className={style.step}>
-        Step {place.place}: <del>{place.before}</del> <ins>{place.after}</ins>
+        Step {place.place}: <del className="ink2">{place.before}</del>{" "}
+        <ins className="weight-600 no-underline">{place.after}</ins>
       </p>
     </li>
   );
@@ -149,7 +150,7 @@ function Answer({ answer, graph }: { answer: SinceAnswer; graph: string }) {
           ))}
         </ol>
       )}
-      <p className={style.quiet}>
+      <p className="ink2 text-13">
         {found.looked} {found.looked === 1 ? "moment" : "moments"} {since}, simulated with what the
         actions of this run did.
         {found.exact ? "" : " The graph may have changed and changed back between two of them."}
@@ -174,7 +175,7 @@ function SinceWhenButton({ runner, run }: SinceWhenButtonProps) {
       </Button>
       <Modal opened={open} onClose={() => setOpen(false)} title="Since when?" size="lg">
         {asked.isPending && (
-          <p role="status" className={style.waiting}>
+          <p role="status" className="row gap-50">
             <Loader size="xs" /> Past moments of the graph are simulated…
           </p>
         )}

@@ -36,8 +36,8 @@ function Head({ run, title }: { run: Run; title: string }) {
   const start = instant(run.started_at);
   const end = instant(run.ended_at);
   return (
-    <section className={style.run} aria-label={title}>
-      <Link to={`/runs/${run.id}`} className={style.link}>
+    <section className="page-card stack items-start gap-30" aria-label={title}>
+      <Link to={`/runs/${run.id}`} className="ink weight-600">
         Run {run.number} · {isolated(run.graph_name)}
       </Link>
       <StateLabel pill {...useRunStatus(run)} />
@@ -146,7 +146,7 @@ interface SideProps {
 function Side({ found, onSelect }: SideProps) {
   return (
     <aside className={style.side} aria-label="What differs">
-      <Tabs defaultValue="differences" keepMounted={false} className={style.tabs ?? ""}>
+      <Tabs defaultValue="differences" keepMounted={false} className="stack h-full">
         <Tabs.List>
           <Tabs.Tab value="differences">Differences {differencesOf(found).length}</Tabs.Tab>
           <Tabs.Tab value="steps">Step by step</Tabs.Tab>
@@ -158,7 +158,7 @@ function Side({ found, onSelect }: SideProps) {
           <WhereTheyPart found={found} onSelect={onSelect} />
         </Tabs.Panel>
         <Tabs.Panel value="steps" className={style.panel ?? ""}>
-          <div className={style.scroll}>
+          <div className="scroll-x">
             <Steps found={found} />
           </div>
           {found.left_out > 0 && (
@@ -245,7 +245,7 @@ export function ComparePage({ bar }: { bar: (parts: RunBarParts) => ReactNode })
           </Button>
         ),
       })}
-      <main className={style.page}>
+      <main className="page">
         {a === "" && runner !== undefined && b !== "" && <Choose runner={runner} b={b} />}
         {found.isLoading && (
           <div className={style.inner} aria-busy="true">
@@ -299,7 +299,7 @@ function VisitCell({ visit, slower }: { visit: Visit | null; slower: boolean }) 
   const result = visit.result;
   const tone = result ?? (visit.until === null ? "run" : "unknown");
   return (
-    <span className={style.visit}>
+    <span className="inline-row gap-50">
       <StateLabel tone={tone} word={outcome(visit)} />
       <span className={style.took} data-slower={slower || undefined}>
         {took(visit)}

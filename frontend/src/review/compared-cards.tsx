@@ -66,7 +66,7 @@ export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
     (aid: string) => {
       const action = actions.get(aid);
       return (
-        <span className={style.rows}>
+        <span className="stack gap-2px">
           {aid === parting && (
             <span className={style.flag}>
               1 · first difference{found.parting?.step.levels.length ? ", inside" : ""}

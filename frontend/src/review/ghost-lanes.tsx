@@ -84,7 +84,7 @@ function GhostName({ action, parts, onPick, inside }: Omit<LaneProps, "steps" | 
   const opened = holds && inside !== null ? inside.open.has(name) : null;
   return (
     <span
-      className={style.first}
+      className="row min-w-0"
       style={{ paddingLeft: `${Math.min(6, levels.length) * 0.75}rem` }}
     >
       {inside !== null && (
@@ -190,7 +190,7 @@ export function GhostLanes({ found, a, b, selected, onPick }: Props) {
       <div className={style.head} aria-hidden>
         <div className={style.ruler}>
           {ticksOf(span).map((t) => (
-            <span key={t} style={{ left: percent(t / span) }}>
+            <span className="absolute nowrap" key={t} style={{ left: percent(t / span) }}>
               {t < 60_000 ? `${t / 1000} s` : duration(t)}
             </span>
           ))}

@@ -28,7 +28,7 @@ function Crumbs({ level, name }: { level: LevelCursor; name: string }) {
       <ol className={style.way}>
         {words.map((each, depth) => (
           // biome-ignore lint/suspicious/noArrayIndexKey: a level is its depth
-          <li key={depth}>
+          <li className="row min-w-0" key={depth}>
             {depth === levels.length ? (
               <b aria-current="location">
                 <bdi>{each}</bdi>

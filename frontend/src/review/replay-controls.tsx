@@ -104,7 +104,7 @@ export function PlayerControls({ replay, goes, children }: Props) {
       />
       <span className={style.time} data-testid="replay-time">
         {replay.waiting ? <Loader size={12} aria-label="Loading the replay" /> : null}
-        <b>{duration(Math.max(0, here - start))}</b> / {duration(span)}
+        <b className="ink weight-600">{duration(Math.max(0, here - start))}</b> / {duration(span)}
       </span>
       <NativeSelect
         className={style.speed ?? ""}

@@ -205,7 +205,7 @@ export function RunEvents(props: Props) {
         <p className={style.more}>{found.length - shown.length} earlier ones are not listed.</p>
       )}
       {found.length === 0 && <p className={style.more}>Nothing of this was said or seen.</p>}
-      <ol className={style.events}>
+      <ol className="list-reset">
         {shown.map((event, i) => (
           <Line
             // biome-ignore lint/suspicious/noArrayIndexKey: the list is only ever appended to

@@ -76,8 +76,8 @@ export function RunFacts({ runner, run, version, by }: Props) {
     <dl className={style.facts}>
       {rows.map(([name, value]) => (
         <div key={`${name} ${value}`}>
-          <dt>{name}</dt>
-          <dd className={name === "Digest" ? style.mono : undefined}>{value}</dd>
+          <dt className="ink2">{name}</dt>
+          <dd className={name === "Digest" ? "text-11_5 mono" : undefined}>{value}</dd>
         </div>
       ))}
     </dl>

@@ -84,7 +84,7 @@ function SavedFilters({ filter, onChange }: Pick<Props, "filter" | "onChange">) 
       </Menu.Target>
       <Menu.Dropdown>
         {saved.map((each) => (
-          <div key={each.query} className={style.savedFilter}>
+          <div key={each.query} className="row">
             <Menu.Item onClick={() => onChange(filterOf(new URLSearchParams(each.query)))}>
               {each.name}
             </Menu.Item>
@@ -117,7 +117,7 @@ export function RunFilters({ runner, filter, onChange, engines }: Props) {
   useEffect(() => setText(filter.text), [filter.text]);
   const search = useDebouncedCallback((next: string) => onChange({ ...filter, text: next }), 250);
   return (
-    <div className={style.filters}>
+    <div className="row-wrap gap-50">
       <TextInput
         aria-label="Search runs"
         placeholder="Graph, person, number or message"

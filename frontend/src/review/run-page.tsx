@@ -107,8 +107,8 @@ function RunStatus({ newest, run, past }: RunStatusProps) {
   return (
     <>
       <StateLabel pill {...(past ? then : now)} />
-      {past && <span className={style.simulated}>as it was then</span>}
-      {newest.simulated && <span className={style.simulated}>simulated</span>}
+      {past && <span className="nowrap ink3 text-xs">as it was then</span>}
+      {newest.simulated && <span className="nowrap ink3 text-xs">simulated</span>}
     </>
   );
 }
@@ -137,14 +137,14 @@ function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: 
   return (
     <aside className={style.side} aria-label="About the run">
       <RunPrint run={newest} version={label} by={by} />
-      <Tabs defaultValue="events" keepMounted={false} className={style.tabs ?? ""}>
+      <Tabs defaultValue="events" keepMounted={false} className="stack h-full">
         <Tabs.List>
           <Tabs.Tab value="events">Events</Tabs.Tab>
           <Tabs.Tab value="parameters">Parameters</Tabs.Tab>
           <Tabs.Tab value="facts">Facts</Tabs.Tab>
           <Tabs.Tab value="raw">Raw</Tabs.Tab>
         </Tabs.List>
-        <Tabs.Panel value="events" className={style.panel ?? ""}>
+        <Tabs.Panel value="events" className="fill-y overflow-y-auto">
           <RunEvents
             run={newest}
             version={label}
@@ -155,14 +155,14 @@ function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: 
             onSeek={replay.seek}
           />
         </Tabs.Panel>
-        <Tabs.Panel value="parameters" className={style.panel ?? ""}>
+        <Tabs.Panel value="parameters" className="fill-y overflow-y-auto">
           <RunParameters run={replay.run} selected={selected} onPick={onSelect} />
         </Tabs.Panel>
-        <Tabs.Panel value="facts" className={style.panel ?? ""}>
+        <Tabs.Panel value="facts" className="fill-y overflow-y-auto">
           <RunNotes runner={runner} run={newest.id} />
           <RunFacts runner={runner} run={newest} version={label} by={by} />
         </Tabs.Panel>
-        <Tabs.Panel value="raw" className={style.panel ?? ""}>
+        <Tabs.Panel value="raw" className="fill-y overflow-y-auto">
           <RawEvents runner={runner} run={newest} />
         </Tabs.Panel>
       </Tabs>
@@ -218,7 +218,7 @@ function RunTimeline(props: RunTimelineProps) {
         <DryRunFromHere run={newest} at={replay.at} />
       </PlayerControls>
       {replay.failed !== null && (
-        <p className={style.failed} role="alert">
+        <p className="m-0 ink-error text-12" role="alert">
           The replay cannot be loaded: {errorText(replay.failed)}
         </p>
       )}

@@ -88,7 +88,11 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
         <StateLabel tone={tone} word={word} />
       </td>
       <td>
-        <Link to={to} className={style.link} onClick={(event) => event.stopPropagation()}>
+        <Link
+          to={to}
+          className="ink-inherit weight-500 no-underline rounded-4"
+          onClick={(event) => event.stopPropagation()}
+        >
           <span className={style.number}>Run {run.number}</span> {run.graph_name}
         </Link>
         {run.pinned && <IconPinFilled size={12} aria-label="pinned" className={style.pin} />}
@@ -102,9 +106,9 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
       <td>
         <span className={style.version}>{label}</span>
       </td>
-      <td className={style.quiet}>{runPlace(run)}</td>
+      <td className="ink2">{runPlace(run)}</td>
       <td>{by}</td>
-      <td className={style.quiet}>{start !== null && `${day(start, now)} ${clock(start)}`}</td>
+      <td className="ink2">{start !== null && `${day(start, now)} ${clock(start)}`}</td>
       <td className={style.took}>{took}</td>
       <td className={style.figures}>
         {run.graph !== null && (
@@ -278,10 +282,10 @@ export function RunsPage() {
     setChosen(on ? [...chosen.slice(-1), run] : chosen.filter((each) => each !== run));
   const [b = "", a = ""] = [...chosen].sort((x, y) => numberOf(runs, y) - numberOf(runs, x));
   return (
-    <main className={style.page}>
+    <main className="page">
       <div className={style.inner}>
-        <div className={style.head}>
-          <h2 className={style.title}>Runs</h2>
+        <div className="page-head">
+          <h2 className="page-title">Runs</h2>
           <RunFilters runner={runner} filter={filter} onChange={setFilter} engines={engines} />
         </div>
         <div className={style.buttons} aria-live="polite">

@@ -71,7 +71,7 @@ function ResultBar({ action }: { action: ActionStatistics }) {
 function SpreadBar({ action, most }: { action: ActionStatistics; most: number }) {
   const { p50, p90, longest } = action.spans;
   const share = (s: number) => `${Math.min(100, (s / most) * 100)}%`;
-  if (p50 === null) return <span className={style.quiet}>no end was seen</span>;
+  if (p50 === null) return <span className="m-0 faint-12">no end was seen</span>;
   return (
     <span className={style.spread} aria-hidden>
       <i
@@ -91,7 +91,7 @@ function SpreadBar({ action, most }: { action: ActionStatistics; most: number })
 function ActionWay({ action: { levels, name } }: { action: ActionStatistics }) {
   return (
     <bdi>
-      {levels.length > 0 && <span className={style.levels}>{[...levels, ""].join(INTO)}</span>}
+      {levels.length > 0 && <span className="ink3 weight-400">{[...levels, ""].join(INTO)}</span>}
       {name}
     </bdi>
   );
@@ -102,7 +102,7 @@ function Actions({ actions }: { actions: readonly ActionStatistics[] }) {
   const weight = (action: ActionStatistics) => high(action.spans.p50) * action.visits;
   const slowest = [...actions].sort((a, b) => weight(b) - weight(a));
   return (
-    <div className={style.scroll}>
+    <div className="scroll-x">
       <table className={style.table}>
         <thead>
           <tr>
@@ -161,7 +161,7 @@ function Found({ found }: { found: Statistics }) {
         <section className={style.card}>
           <h3>Success</h3>
           <p className={style.big}>{rate === null ? "—" : `${rate} %`}</p>
-          <p className={style.quiet}>
+          <p className="m-0 faint-12">
             {found.judged > 0 && `${found.succeeded} of ${found.judged} runs finished true. `}
             {found.unknown > 0 &&
               `${found.unknown} finished with an unknown result, since robots do not report it; they are not counted. `}
@@ -171,7 +171,7 @@ function Found({ found }: { found: Statistics }) {
         <section className={style.card}>
           <h3>Most failing</h3>
           {failing.length === 0 ? (
-            <p className={style.quiet}>
+            <p className="m-0 faint-12">
               {hidden > 0
                 ? `No action is known to have ended false or in error; the result of ${hidden} visits is not known.`
                 : "No action ended false or in error."}
@@ -192,7 +192,7 @@ function Found({ found }: { found: Statistics }) {
         <section className={style.card}>
           <h3>Arrows never taken</h3>
           {found.never_taken.length === 0 ? (
-            <p className={style.quiet}>
+            <p className="m-0 faint-12">
               {found.untold > 0
                 ? "None is known."
                 : "Every arrow of the newest version whose action ran was taken."}
@@ -202,16 +202,16 @@ function Found({ found }: { found: Statistics }) {
               {found.never_taken.slice(0, 6).map((arrow) => (
                 <li key={`${arrow.parent} ${arrow.child}`}>
                   {isolated(arrow.parent)} → {isolated(arrow.child)}{" "}
-                  <span className={style.quiet}>on {arrow.outcomes.join(", ")}</span>
+                  <span className="m-0 faint-12">on {arrow.outcomes.join(", ")}</span>
                 </li>
               ))}
               {found.never_taken.length > 6 && (
-                <li className={style.quiet}>and {found.never_taken.length - 6} more</li>
+                <li className="m-0 faint-12">and {found.never_taken.length - 6} more</li>
               )}
             </ul>
           )}
           {found.untold > 0 && (
-            <p className={style.quiet}>
+            <p className="m-0 faint-12">
               Of {counted(found.untold, "arrow")} it is not known whether it was ever taken: robots
               do not report results.
             </p>
@@ -237,7 +237,7 @@ export function StatisticsPage({ bar }: { bar: (parts: RunBarParts) => ReactNode
   return (
     <>
       {bar({ crumbs: [{ label: "Runs", to: "/runs" }, { label: "Statistics" }] })}
-      <main className={style.page}>
+      <main className="page">
         {found.isLoading && (
           <div className={style.inner} aria-busy="true">
             <Skeleton height={110} mb={12} />

@@ -55,7 +55,7 @@ function Facts({ robot }: { robot: Robot }) {
   const restarted = instant(robot.restarted_at);
   const took = robot.took_ms === null ? "" : ` within ${Math.max(1, Math.round(robot.took_ms))} ms`;
   return (
-    <p className={style.facts}>
+    <p className="m-0 quiet-xs tabular">
       domain {robot.domain} · <code>{robot.get_service}</code>
       {robot.rmw !== "" && ` · ${robot.rmw}`} ·{" "}
       {heard === null ? "never answered" : `answered ${ago(heard, now)}${took}`}
@@ -122,17 +122,17 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
   return (
     <article className={style.card} aria-label={robot.name}>
       <i className={style.stripe} style={{ background: colorOfName(robot.name) }} aria-hidden />
-      <header className={style.head}>
+      <header className="row gap-60">
         <h3 className={style.name}>{robot.name}</h3>
         <EngineLabel robot={robot} />
-        <span className={style.gap} />
+        <span className="flex-1" />
         <More robot={robot} onEdit={onEdit} />
       </header>
       <Facts robot={robot} />
       {robot.why !== "" && <p className={style.why}>{robot.why}</p>}
       <ul className={style.signs}>
         {robotSigns(robot).map(({ good, text }) => (
-          <li key={text} data-good={good || undefined}>
+          <li className="inline-row gap-30" key={text} data-good={good || undefined}>
             {good ? (
               <IconCheck size={14} aria-hidden />
             ) : (
@@ -194,9 +194,9 @@ function IndexedActions({ robot }: { robot: string }) {
       <ul className={style.list}>
         {actions.map(({ name, inputs, outputs }) => (
           <li key={name}>
-            <b>{name}</b> <span className={style.quiet}>({parameters(inputs)})</span>
+            <b>{name}</b> <span className="quiet-xs">({parameters(inputs)})</span>
             {Object.keys(outputs).length > 0 && (
-              <span className={style.quiet}> → {parameters(outputs)}</span>
+              <span className="quiet-xs"> → {parameters(outputs)}</span>
             )}
           </li>
         ))}

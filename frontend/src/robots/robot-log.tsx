@@ -68,7 +68,7 @@ function Effect({ told }: { told: RobotLogLine }) {
   if (told.run === null) return null;
   const stopped = told.command === "start" || told.command === "stop";
   return (
-    <Link to={`/runs/${told.run}`} className={style.run}>
+    <Link to={`/runs/${told.run}`} className="ink-error weight-600">
       {stopped ? "stopped" : "while"} run {told.number}
     </Link>
   );
@@ -112,7 +112,7 @@ export function RobotLog({ robot, onImport }: Props) {
     return <Text c="dimmed">No command of others was seen while the runner was listening.</Text>;
   }
   return (
-    <ol className={style.list}>
+    <ol className="list-reset">
       {entries.data.map((told) => (
         <Line key={told.seq} robot={robot} told={told} onImport={onImport} />
       ))}

@@ -38,11 +38,11 @@ function Foreign(props: Props & { graph: string; stopping: string | null; state:
   return (
     <li className={style.line}>
       <StateLabel tone="unknown" word={stopping === null ? state.toLowerCase() : "stopping"} />
-      <span className={style.name}>{graph}</span>
-      <span className={style.quiet}>
+      <span className="break-anywhere ink-inherit weight-550">{graph}</span>
+      <span className="quiet-xs">
         {stopping ? `STOP UNCONFIRMED: ${stopping}` : "not started from here"}
       </span>
-      <span className={style.gap} />
+      <span className="flex-1" />
       <Button
         size="compact-sm"
         leftSection={<IconFileImport size={15} aria-hidden />}
@@ -64,7 +64,7 @@ function Foreign(props: Props & { graph: string; stopping: string | null; state:
 }
 
 function StartedBy({ run }: { run: Run }) {
-  return <span className={style.quiet}>started by {isolated(useCurrentName(run.author))}</span>;
+  return <span className="quiet-xs">started by {isolated(useCurrentName(run.author))}</span>;
 }
 
 export function RobotRuns({ robot, onImport }: Props) {
@@ -84,7 +84,7 @@ export function RobotRuns({ robot, onImport }: Props) {
       {own.map((run) => (
         <li key={run.id} className={style.line}>
           <StateLabel {...runStatus(run, now)} />
-          <Link to={`/runs/${run.id}`} className={style.name}>
+          <Link to={`/runs/${run.id}`} className="break-anywhere ink-inherit weight-550">
             Run {run.number} of <bdi>{run.graph_name}</bdi>
           </Link>
           <StartedBy run={run} />

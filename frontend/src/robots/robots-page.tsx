@@ -63,10 +63,10 @@ export function RobotsPage({ onImport }: Props) {
     </Button>
   );
   return (
-    <main className={style.page}>
+    <main className="page">
       <div className={style.inner}>
         <div className={style.head}>
-          <h2 className={style.title}>Robots</h2>
+          <h2 className="page-title">Robots</h2>
           {robots.length > 0 && button}
         </div>
         {reach?.no_reach && <NoReach why={reach.no_reach} />}
@@ -124,7 +124,7 @@ export function FoundEngines({ may, on, onTake }: FoundEnginesProps) {
         <IconRadar2 size={16} aria-hidden /> In sight, not registered
       </h3>
       {looking && (
-        <p className={style.quiet} role="status">
+        <p className="quiet-xs" role="status">
           Looking for engines; more may be found for another {Math.ceil(data?.left_s ?? 0)} s.
         </p>
       )}
@@ -132,10 +132,10 @@ export function FoundEngines({ may, on, onTake }: FoundEnginesProps) {
         {found.map((each) => (
           <li key={`${each.domain} ${each.get_service}`} className={style.line}>
             <b>{each.actor || "An engine"}</b>
-            <span className={style.quiet}>
+            <span className="quiet-xs">
               domain {each.domain} · {each.get_service} · {words(each)}
             </span>
-            <span className={style.gap} />
+            <span className="flex-1" />
             <Button size="compact-sm" disabled={!may} onClick={() => onTake(each)}>
               Register{each.actor === "" ? " …" : ""}
             </Button>

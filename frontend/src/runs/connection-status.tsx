@@ -32,7 +32,7 @@ export function ConnectionStatus({ run, whose = false }: { run?: Run | null; who
   const { now } = useLive();
   if (now.link === "live") {
     return (
-      <span className={style.both}>
+      <span className="inline-flex gap-40">
         {run && run.ended_at === null && !run.simulated && <LastSeen run={run} whose={whose} />}
         <span className={style.word} data-link="live">
           <i aria-hidden /> Live

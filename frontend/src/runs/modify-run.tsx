@@ -64,7 +64,7 @@ function List({ found }: { found: readonly MeaningDifference[] }) {
               <span>
                 {what} <i>{kind}</i>
                 {details.map((detail) => (
-                  <span key={detail} className={style.detail}>
+                  <span key={detail} className="block ink2 text-sm">
                     {detail}
                   </span>
                 ))}

@@ -65,7 +65,7 @@ export function StateLabel({ tone, word, more, pill = false, still = false }: Pr
         <Sign size={tone === "stopped" ? 9 : 12} stroke={2.8} />
       </span>
       {word}
-      {more !== undefined && <span className={style.more}>· {more}</span>}
+      {more !== undefined && <span className="weight-500">· {more}</span>}
     </span>
   );
 }

@@ -100,9 +100,9 @@ export function OptionList(props: OptionListProps) {
               onClick={() => onPick(option)}
             >
               <span className={style.icon}>{option.icon}</span>
-              <span className={style.text}>
-                <span className={style.name}>{option.label}</span>
-                {option.sub && <span className={style.sub}>{option.sub}</span>}
+              <span className="stack fill">
+                <span className="truncate weight-500">{option.label}</span>
+                {option.sub && <span className="truncate faint-11_5">{option.sub}</span>}
               </span>
               {option.right}
             </div>
@@ -136,7 +136,7 @@ export function PickList(props: Props) {
     event.stopPropagation();
   };
   return (
-    <div className={style.box}>
+    <div className="stack min-h-0">
       <TextInput
         autoFocus
         data-autofocus

@@ -28,7 +28,7 @@ interface Props {
 
 export function Logo() {
   const { base } = useRouter();
-  return <img src={`${base}/mark.svg`} alt="" width={24} height={24} className={style.mark} />;
+  return <img src={`${base}/mark.svg`} alt="" width={24} height={24} className="block" />;
 }
 
 /** The focus goes past the bar. */

@@ -82,7 +82,7 @@ export function ChangeTag({ mark, beside = false }: { mark: ChangeMark; beside?:
       ) : (
         <>
           <span className="visually-hidden">{change} by </span>
-          <bdi>{by}</bdi>
+          <bdi className="ellipsis">{by}</bdi>
         </>
       )}
     </span>

@@ -314,7 +314,7 @@ export function EditableCanvas({ context, canvas, me, map, onPanned, pointer, wr
     // biome-ignore lint/a11y/noStaticElementInteractions: a double click repeats what the keys A and ] do
     <div
       ref={frame}
-      className={style.frame}
+      className="inset-0"
       onDoubleClick={onDoubleClick}
       onFocusCapture={(event) => {
         const edge = event.target.closest<HTMLElement>(".react-flow__edge")?.dataset.id;

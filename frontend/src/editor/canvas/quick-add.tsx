@@ -155,11 +155,13 @@ export function QuickAdd({ context, request, known, onClose }: Props) {
               onPointerMove={() => setAt(i)}
               onClick={() => choose(template)}
             >
-              <span className={style.name}>
+              <span className="row gap-4px weight-500">
                 {isNew && <IconPlus size={13} aria-hidden />}
                 {isNew ? `New action “${isolated(template.name)}”` : template.name}
               </span>
-              {template.description && <span className={style.sub}>{template.description}</span>}
+              {template.description && (
+                <span className="block truncate faint-11_5">{template.description}</span>
+              )}
             </div>
           );
         })}

@@ -249,7 +249,7 @@ function Faults({ context, run }: { context: EditorContext; run: DryRun }) {
 }
 
 function MomentText({ run }: { run: DryRun }) {
-  if (run.failed) return <span className={style.failed}>{errorText(run.failed)}</span>;
+  if (run.failed) return <span className="ink-error">{errorText(run.failed)}</span>;
   if (run.moments.length === 0)
     return <span>{run.busy ? "Working it out …" : "Nothing happens."}</span>;
   const last = run.index === run.moments.length - 1;

@@ -84,7 +84,7 @@ export function PhoneLayout(props: PhoneParts) {
     if (onCanvas) setPane("canvas");
   }, [onCanvas, setPane]);
   return (
-    <main className={style.phone}>
+    <main className="column">
       <Segments
         className={style.segments ?? ""}
         fullWidth
@@ -92,14 +92,14 @@ export function PhoneLayout(props: PhoneParts) {
         value={pane}
         onChange={setPane}
       />
-      <div className={style.pane}>
+      <div className="fill-y relative border-top">
         {find}
         {pane === "canvas" && stage}
         {pane === "outline" && outline}
         {pane === "history" && history}
-        {pane === "details" && <div className={style.sheet}>{details}</div>}
+        {pane === "details" && <div className="column bg-panel">{details}</div>}
         {pane === "run" && (
-          <div className={style.sheet}>
+          <div className="column bg-panel">
             <div className={style.status}>{status}</div>
             {strip}
           </div>
@@ -220,7 +220,7 @@ function ListSide({ wide, panels, told, outline, history, list }: DesktopParts) 
           <SideTabs panels={panels} />
           {beside && <FoldButton fold={fold} />}
         </div>
-        <div className={style.side}>
+        <div className="fill-y">
           {side === "outline" ? outline : side === "history" ? history : list}
         </div>
       </aside>

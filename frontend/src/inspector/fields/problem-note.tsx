@@ -37,7 +37,8 @@ export function ProblemNote({ told }: { told: CheckedGroup }) {
     <p className={style.note} data-kind={told.kind} data-code={told.code}>
       <Sign size={13} aria-hidden />
       <span>
-        {told.message} <FixLink told={told} /> <small className={style.code}>{told.code}</small>
+        {told.message} <FixLink told={told} />{" "}
+        <small className="ink3 text-11 mono">{told.code}</small>
       </span>
     </p>
   );

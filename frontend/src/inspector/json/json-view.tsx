@@ -32,7 +32,7 @@ function faultsOf(verdict: Verdict): readonly JsonError[] {
 function VerdictWords({ verdict, onShow }: { verdict: Verdict; onShow: readonly string[] }) {
   switch (verdict.kind) {
     case "checking":
-      return <p className={style.quiet}>Checking …</p>;
+      return <p className="ink3">Checking …</p>;
     case "unknown":
       return (
         <p data-tone="warning">
@@ -49,7 +49,7 @@ function VerdictWords({ verdict, onShow }: { verdict: Verdict; onShow: readonly 
     case "fits": {
       const { changes, problems } = verdict.rewriting;
       if (changes.length === 0)
-        return <p className={style.quiet}>The text means the same as before: nothing changes.</p>;
+        return <p className="ink3">The text means the same as before: nothing changes.</p>;
       const some = onShow.slice(0, 3).join(", ");
       const more = onShow.length > 3 ? ` and ${onShow.length - 3} more` : "";
       return (
@@ -84,7 +84,7 @@ function Meanwhile({ names, onRest, onAll, onBack }: MeanwhileProps) {
         <IconAlertTriangle size={14} aria-hidden /> Somebody changed{" "}
         {names.map(isolated).join(", ")} since you began. What should stay?
       </p>
-      <div className={style.buttons}>
+      <div className="wrap gap-37_5">
         <Button size="compact-sm" onClick={onAll}>
           Mine
         </Button>
@@ -149,7 +149,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
         <div className={style.words} role="status">
           <VerdictWords verdict={verdict} onShow={places(context.graph, changes)} />
         </div>
-        <div className={style.buttons}>
+        <div className="wrap gap-37_5">
           <Button
             size="compact-sm"
             variant="filled"
@@ -167,7 +167,7 @@ export function JsonView({ graph, seq }: { graph: string; seq: number }) {
     );
   }
   return (
-    <div className={style.json}>
+    <div className="column relative gap-50">
       <div className={style.copy}>
         <CopyButton value={text}>
           {({ copied, copy }) => (

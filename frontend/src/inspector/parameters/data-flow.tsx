@@ -22,7 +22,7 @@ export function GiverChips({ givers, path }: Props) {
   const own = flatName(path);
   const shown = [...new Map(givers.map((giver) => [giver.parent, giver])).values()];
   return (
-    <span className={style.chips}>
+    <span className="wrap fill gap-25">
       {shown.map(({ parent, output }) => (
         <button
           key={parent}

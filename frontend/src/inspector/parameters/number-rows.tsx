@@ -46,7 +46,7 @@ export function NumberField({
           ariaLabel={`${letter} of ${pathWords(parameter.path.slice(0, parameter.path.lastIndexOf("/")))}`}
           mono
           inputMode="decimal"
-          leftSection={<span className={flowStyle.letter}>{letter}</span>}
+          leftSection={<span className="ink2 text-11_5">{letter}</span>}
           value={shown(field)}
           placeholder={unwritten ? "fill in" : ""}
           check={(draft) => complaint(field, draft)}
@@ -114,7 +114,7 @@ export function NumberRows({ action, side, block }: Props) {
         <legend>
           <span className={style.path}>{name}</span>
           <span className={style.type}>{block.word}</span>
-          <span className={style.fieldEnd}>
+          <span className="inline-row gap-2px">
             {side === "in" && !inLibrary && (
               <OutputPicker
                 owner={action.key}

@@ -44,7 +44,7 @@ interface AddProps {
 function Suggestion({ name, why }: { name: string; why: string | undefined }) {
   return (
     <span className={style.suggestion}>
-      {name} <small>{why}</small>
+      {name} <small className="ink2">{why}</small>
     </span>
   );
 }
@@ -182,7 +182,7 @@ export function ParameterList({ action, side }: { action: Action; side: Paramete
         ))}
       </DataFlowContext>
       {list.length === 0 && !adding && (
-        <p className={style.hint}>{side === "in" ? "Takes none." : "Gives none."}</p>
+        <p className="m-0 ink2">{side === "in" ? "Takes none." : "Gives none."}</p>
       )}
       {adding && <AddParameter action={action} side={side} onDone={() => setAdding(false)} />}
     </section>

@@ -103,7 +103,7 @@ function TypedValue(props: ValueProps & { native: NonNullable<ParameterValue["na
       rightSectionWidth={clearable && end ? 60 : 32}
       rightSection={
         clearable || end ? (
-          <span className={style.fieldEnd}>
+          <span className="inline-row gap-2px">
             {clearable && <TakeAway name={name} write={write} />}
             {end}
           </span>

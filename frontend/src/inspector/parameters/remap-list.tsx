@@ -87,7 +87,7 @@ function AddRemap({ relation, onDone }: { relation: Relation; onDone: () => void
         value={target}
         onPick={setTarget}
       />
-      <div className={style.buttons}>
+      <div className="flex gap-37_5">
         <Button type="submit" size="compact-sm" disabled={source === null || target === null}>
           Add
         </Button>
@@ -114,23 +114,24 @@ export function RemapList({ relation }: { relation: Relation }) {
         </Button>
       </div>
       {same.length > 0 && (
-        <p className={style.hint}>
-          Of the same name and type: <span className={style.mono}>{same.join(", ")}</span>
+        <p className="m-0 ink2">
+          Of the same name and type:{" "}
+          <span className="flex-1 break-anywhere text-11_5 mono">{same.join(", ")}</span>
         </p>
       )}
       {same.length === 0 && relation.remap.length === 0 && !adding && (
-        <p className={style.hint}>
+        <p className="m-0 ink2">
           Nothing: no output of {isolated(endName(graph, relation.parent))} is called and typed as
           an input of {isolated(endName(graph, relation.child))}.
         </p>
       )}
-      <ul className={style.arrows}>
+      <ul className="list-reset stack gap-25">
         {relation.remap.map((remap) => {
           const wrong = misfit(parent, child, remap);
           return (
             <li className={style.remap} key={remap.source}>
               <div className={style.arrow}>
-                <span className={style.mono}>
+                <span className="flex-1 break-anywhere text-11_5 mono">
                   {remap.source} <IconArrowDown size={11} aria-label="as" className={style.as} />{" "}
                   {remap.target}
                 </span>

@@ -151,14 +151,14 @@ export function RunHead(props: Props) {
       <span className={style.version}>{versionLabel}</span>
       <StateLabel pill still {...useRunStatus(run)} />
       <Origin run={run} until={unsure ? serverTimeOf(now.since) : null} />
-      <span className={style.gap} />
+      <span className="flex-1" />
       {told !== "" && (
         <span className={style.alarm} role={announces ? "alert" : undefined} title={told}>
           {told}
         </span>
       )}
       {!run.recorded && <span className={style.alarm}>not recorded</span>}
-      <span className={style.buttons}>
+      <span className="row flex-none gap-35">
         {cursor !== null && (
           <Button
             size="compact-xs"

@@ -91,7 +91,7 @@ export function PreflightList({ engine, alone, look, moment }: Props) {
           <i style={{ background: colorOfName(engine) }} aria-hidden /> {engine}
         </h4>
       )}
-      <ul className={style.list} aria-label={`Looked at on ${isolated(engine)}`}>
+      <ul className="list-reset" aria-label={`Looked at on ${isolated(engine)}`}>
         {look
           ? look.items.map((item) => (
               <Line key={item.code} item={item} look={look} moment={moment} />
@@ -261,7 +261,7 @@ function IndexWriting({ item, look, robot, graph, seq, onLookAgain }: IndexWriti
       )}
       {can && !may && <span>Only operators and owners can do that.</span>}
       {write.isError && (
-        <span className={style.failed} role="alert">
+        <span className="ink-error" role="alert">
           {errorText(write.error)}
         </span>
       )}

@@ -33,7 +33,7 @@ function TwoLines({ first, second }: { first: string; second: string }) {
   return (
     <span className={style.lines}>
       <b>{first}</b>
-      <span>{second}</span>
+      <span className="ellipsis text-11 weight-500">{second}</span>
     </span>
   );
 }

@@ -119,15 +119,15 @@ function Choice({ robot, on, may, behaviours, onToggle }: ChoiceProps) {
         onChange={onToggle}
       />
       <i className={style.stripe} style={{ background: colorOfName(robot.name) }} aria-hidden />
-      <span className={style.name}>{robot.simulated ? "Simulator" : robot.name}</span>
+      <span className="fill ellipsis weight-550">{robot.simulated ? "Simulator" : robot.name}</span>
       {robot.simulated ? (
-        <span className={style.quiet}>
+        <span className="quiet-xs">
           {behaviours ? "its Python code may move something" : "nothing moves"}
         </span>
       ) : (
         <EngineLabel robot={robot} />
       )}
-      {!robot.simulated && !may && <span className={style.quiet}>operators only</span>}
+      {!robot.simulated && !may && <span className="quiet-xs">operators only</span>}
     </label>
   );
 }
@@ -177,13 +177,13 @@ function Exactly({
 }) {
   return (
     <dl className={style.exactly}>
-      <dt>Graph</dt>
+      <dt className="ink2">Graph</dt>
       <dd>{name}</dd>
-      <dt>Version</dt>
+      <dt className="ink2">Version</dt>
       <dd>{label}</dd>
-      <dt>Digest</dt>
-      <dd className={style.mono}>{digest === "" ? "…" : `${digest.slice(0, 16)}…`}</dd>
-      <dt>{engines.length > 1 ? "Robots" : "On"}</dt>
+      <dt className="ink2">Digest</dt>
+      <dd className="weight-400 mono">{digest === "" ? "…" : `${digest.slice(0, 16)}…`}</dd>
+      <dt className="ink2">{engines.length > 1 ? "Robots" : "On"}</dt>
       <dd>{engines.map(isolated).join(", ") || "nowhere yet"}</dd>
     </dl>
   );
@@ -336,8 +336,8 @@ function BehavioursChoice(props: { on: boolean; onChange: (on: boolean) => void 
           checked={!props.on}
           onChange={() => props.onChange(false)}
         />
-        <span className={style.name}>Simulated</span>
-        <span className={style.quiet}>each takes a second and succeeds</span>
+        <span className="fill ellipsis weight-550">Simulated</span>
+        <span className="quiet-xs">each takes a second and succeeds</span>
       </label>
       <label className={style.choice} data-on={props.on || undefined}>
         <input
@@ -346,8 +346,8 @@ function BehavioursChoice(props: { on: boolean; onChange: (on: boolean) => void 
           checked={props.on}
           onChange={() => props.onChange(true)}
         />
-        <span className={style.name}>Python behaviours</span>
-        <span className={style.quiet}>{listed(there.names) || "none yet"}</span>
+        <span className="fill ellipsis weight-550">Python behaviours</span>
+        <span className="quiet-xs">{listed(there.names) || "none yet"}</span>
       </label>
       {(there.problem !== "" || refused.length > 0) && (
         <Text size="sm" c="dimmed">
@@ -389,7 +389,7 @@ function Said({ given, me, label }: { given: readonly Approval[]; me: string; la
         </>
       )}
       {mine && `You said yes to ${isolated(label)}: somebody else may start it.`}{" "}
-      <span className={style.doubt}>
+      <span className="ink2">
         A second person needs a browser of their own. Two browsers that opened the same link may
         belong to one person: the server cannot know that.
       </span>

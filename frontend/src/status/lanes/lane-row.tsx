@@ -49,7 +49,7 @@ function LaneName({ lane, onPick, opened, nested, onOpen }: Omit<Props, "visits"
         aria-label={lane.levels.length > 0 ? way : undefined}
       >
         <i style={{ background: colorOfName(lane.robot) }} aria-hidden />
-        <span>
+        <span className="truncate">
           <bdi>{lane.label}</bdi>
         </span>
       </button>

@@ -89,7 +89,7 @@ function Ticks({ span }: { span: number }) {
   return (
     <div className={style.axis} aria-hidden>
       {ticksOf(span).map((t) => (
-        <span key={t} style={{ left: `${(t / span) * 100}%` }}>
+        <span className="absolute nowrap" key={t} style={{ left: `${(t / span) * 100}%` }}>
           {t < 60_000 ? `${t / 1000} s` : duration(t)}
         </span>
       ))}
@@ -293,7 +293,11 @@ export function Timeline(props: Props) {
         </div>
       </div>
       <Across {...{ axis, cursor, goes, silentSince, signs, gaps }} />
-      <ul ref={list} className={style.lanes} aria-label="Actions of the run over time">
+      <ul
+        ref={list}
+        className="list-reset min-h-0 overflow-auto"
+        aria-label="Actions of the run over time"
+      >
         {tracks.map((track) => (
           <Groups
             key={track.run.id}
