@@ -1,6 +1,5 @@
 /** Share: links with a role, who came in by them, and their end. For owners. */
 import { Button, Group, Modal, Select, Text, TextInput } from "@mantine/core";
-import { useMediaQuery } from "@mantine/hooks";
 import {
   IconCheck,
   IconCopy,
@@ -23,6 +22,7 @@ import {
   useSharing,
 } from "../api/sharing";
 import { copyText } from "../ui/copy-text";
+import { useIsPhone } from "../ui/hooks";
 import { Segments } from "../ui/segments";
 import { ago, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
@@ -195,7 +195,7 @@ function Body() {
 }
 
 export function ShareDialog({ opened, onClose }: { opened: boolean; onClose: () => void }) {
-  const phone = useMediaQuery("(max-width: 600px)", false, { getInitialValueInEffect: false });
+  const phone = useIsPhone();
   return (
     <Modal
       opened={opened}

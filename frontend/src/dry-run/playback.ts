@@ -2,7 +2,7 @@
 
 import type { TraceEvent } from "../api/dry-runs";
 import { fullName, type Graph, type Key } from "../graph/model";
-import type { Progress, Tone } from "../status/progress";
+import { finishedWords, type Progress, STATE_WORDS } from "../status/progress";
 import { isolated } from "../words/isolated";
 
 /** All that happens at one time. */
@@ -55,13 +55,6 @@ export function keysByName(graph: Pick<Graph, "actions">): ReadonlyMap<string, K
   return new Map(graph.actions.filter((a) => !a.missing).map((a) => [fullName(a), a.key]));
 }
 
-const tones: Readonly<Record<string, Tone>> = {
-  on_true: "true",
-  on_false: "false",
-  on_error: "error",
-  on_stopped: "stopped",
-};
-
 function progressOf(visit: PlayedVisit, over: boolean): Progress {
   const { tone, word } = wordOf(visit, over);
   return {
@@ -76,25 +69,10 @@ function progressOf(visit: PlayedVisit, over: boolean): Progress {
   };
 }
 
-function wordOf({ state, result }: PlayedVisit, over: boolean): { tone: Tone; word: string } {
-  switch (state) {
-    case "RUNNING":
-      return { tone: "run", word: over ? "still runs" : "running" };
-    case "PAUSE_REQUESTED":
-      return { tone: "run", word: "pausing" };
-    case "PAUSED":
-      return { tone: "stopped", word: "paused" };
-    case "STOPPING":
-      return { tone: "stopped", word: "stopping" };
-    case "ERROR":
-      return { tone: "error", word: "error" };
-    case "FINISHED":
-      return result
-        ? { tone: tones[result] ?? "done", word: result.replace(/^on_/, "") }
-        : { tone: "done", word: "finished" };
-    default:
-      return { tone: "idle", word: over ? "did not run" : "waits" };
-  }
+function wordOf({ state, result }: PlayedVisit, over: boolean): Pick<Progress, "tone" | "word"> {
+  if (state === "RUNNING" && over) return { tone: "run", word: "still runs" };
+  if (state === "FINISHED") return finishedWords(result);
+  return STATE_WORDS.get(state) ?? { tone: "idle", word: over ? "did not run" : "waits" };
 }
 
 /** Return the visits of each action and the state of the graph after the first `to` events. */

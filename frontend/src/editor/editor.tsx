@@ -1,6 +1,5 @@
 /** The editor of one graph: canvas, lists, details and run strip, arranged for the size of the screen. */
 
-import { useLocalStorage } from "@mantine/hooks";
 import {
   type ComponentType,
   createContext,
@@ -38,7 +37,7 @@ import { People } from "../people/people";
 import type { Progress } from "../status/progress";
 import type { RoomLink } from "../sync/room-connection";
 import { useThrottledLink } from "../sync/use-room";
-import { useIsPhone, useIsWide, useStableCallback } from "../ui/hooks";
+import { useIsPhone, useIsWide, useKept, useStableCallback } from "../ui/hooks";
 import { boundedPart } from "../ui/lazy-part";
 import type { Crumb } from "../ui/top-bar";
 import { CanvasPane } from "./canvas-pane";
@@ -244,11 +243,7 @@ function useSummary(
   const [placing, setPlacing] = useState(false);
   const wide = useIsWide();
   const phone = useIsPhone();
-  const [folded, setFolded] = useLocalStorage({
-    key: "aa.strip-folded",
-    defaultValue: false,
-    getInitialValueInEffect: false,
-  });
+  const [folded, setFolded] = useKept("aa.strip-folded", false);
   const [selected = null] = context.graph.actions
     .filter((action) => context.selection.has(action.key))
     .map((action) => action.key);

@@ -1,6 +1,5 @@
 /** The state of an open editor, and the context on which edit actions work. */
 
-import { useLocalStorage } from "@mantine/hooks";
 import { type RefObject, useCallback, useMemo, useRef, useState } from "react";
 import { useMay } from "../api/people";
 import { useEditorStore } from "../canvas/editor-store";
@@ -23,7 +22,7 @@ import {
   useThrottledLink,
   useUndo,
 } from "../sync/use-room";
-import { useKeptKeys } from "../ui/hooks";
+import { useKept, useKeptKeys } from "../ui/hooks";
 import { exportGraph } from "./export-graph";
 import { NO_PAST, type Past } from "./use-past";
 
@@ -93,11 +92,7 @@ function useTools() {
   const { presence } = useRoom();
   const [selection, setSelection] = useState(NONE);
   const [tool, setTool] = useState<Tool>("pan");
-  const [snap, setSnap] = useLocalStorage({
-    key: "aa.snap",
-    defaultValue: false,
-    getInitialValueInEffect: false,
-  });
+  const [snap, setSnap] = useKept("aa.snap", false);
   const select = useCallback(
     (ids: Iterable<string>) => {
       const next = new Set(ids);

@@ -1,9 +1,9 @@
 /** State of the moment of the past that is shown, which the address of the page contains, too. */
-import { useLocalStorage } from "@mantine/hooks";
 import { startTransition, useCallback, useEffect, useState } from "react";
 import type { PastPlace } from "../edit-actions/editor-context";
 import { pastOf, withPast } from "../edit-actions/graph-links";
 import type { SeenPast } from "../history/past-bar";
+import { useKept } from "../ui/hooks";
 import { Watched } from "../ui/watched";
 
 const WRITTEN = 300; // ms after the last step, since browsers limit changes of the address
@@ -44,11 +44,7 @@ export function usePast(): Past {
   }));
   const [wanted] = useState(() => new Watched(place));
   const [drawn] = useState(() => new Watched<SeenPast | null>(null));
-  const [side, setSide] = useLocalStorage({
-    key: "aa.compare-side",
-    defaultValue: false,
-    getInitialValueInEffect: false,
-  });
+  const [side, setSide] = useKept("aa.compare-side", false);
   const lookAt = useCallback(
     (next: PastPlace | null) => {
       wanted.set(next);

@@ -1,6 +1,5 @@
 /** Keeps marked on the canvas what changed since the last good run, while nobody is at work on it. */
 
-import { useLocalStorage } from "@mantine/hooks";
 import { useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect, useMemo } from "react";
 import { authorName, useVersions } from "../api/graphs";
@@ -17,6 +16,7 @@ import { shortText } from "../graph/field-words";
 import type { Action, Graph, Relation } from "../graph/model";
 import { readGraph } from "../graph/read";
 import { useRoom } from "../sync/use-room";
+import { useKept } from "../ui/hooks";
 import { whenIdle } from "../ui/lazy-part";
 import { Tooltip } from "../ui/tooltip";
 import { changedAction, changedRelation } from "./graph-difference";
@@ -226,9 +226,5 @@ export class SinceMarker {
 }
 
 export function useSinceOn() {
-  return useLocalStorage({
-    key: "aa.since-marks",
-    defaultValue: true,
-    getInitialValueInEffect: false,
-  });
+  return useKept("aa.since-marks", true);
 }

@@ -1,6 +1,5 @@
 /** Graphs as cards: searched, sorted, by label; each says how it is and who is in it. */
 import { NativeSelect, TextInput } from "@mantine/core";
-import { useLocalStorage } from "@mantine/hooks";
 import { IconSearch } from "@tabler/icons-react";
 import { useMemo, useState } from "react";
 import { Link } from "wouter";
@@ -12,6 +11,7 @@ import { type Run, useRuns } from "../api/runs";
 import { useRunStatus } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
+import { useKept } from "../ui/hooks";
 import { boundedPart } from "../ui/lazy-part";
 import { colorOfName, initials } from "../ui/name-colors";
 import { ago, instant, useNow } from "../ui/times";
@@ -115,11 +115,7 @@ export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
   const listed = useRuns(runner).data;
   const [search, setSearch] = useState("");
   const [label, setLabel] = useState<string | null>(null);
-  const [order, setOrder] = useLocalStorage<GraphOrder>({
-    key: "aa.graphs-by",
-    defaultValue: "changed",
-    getInitialValueInEffect: false,
-  });
+  const [order, setOrder] = useKept<GraphOrder>("aa.graphs-by", "changed");
   const runs = useMemo(() => lastRuns([...(listed ?? []), ...live.runs.values()]), [listed, live]);
   const labels = allLabels(graphs);
   const wish = { search, label: label !== null && labels.includes(label) ? label : null, order };

@@ -55,38 +55,39 @@ const resultTone: Record<string, Tone> = {
   on_halted: "stopped",
 };
 
-function finished(visit: Visit | undefined): { tone: Tone; word: string } {
-  const result = visit?.result;
+interface StateWords {
+  readonly tone: Tone;
+  readonly word: string;
+}
+
+/** Words for states of an engine that a run and a dry-run say alike. */
+export const STATE_WORDS: ReadonlyMap<string, StateWords> = new Map<string, StateWords>([
+  ["RUNNING", { tone: "run", word: "running" }],
+  ["PAUSE_REQUESTED", { tone: "run", word: "pausing" }],
+  ["PAUSED", { tone: "stopped", word: "paused" }],
+  ["STOPPING", { tone: "stopped", word: "stopping" }],
+  ["ERROR", { tone: "error", word: "error" }],
+]);
+
+/** Return the words for an action that ended with a result. */
+export function finishedWords(result: string | null | undefined): StateWords {
   if (!result) return { tone: "done", word: "finished" };
   const tone = resultTone[result] ?? "done";
   return { tone, word: result.replace(/^on_/, "") };
 }
 
-function stateOf(action: ActionRun, over: boolean, unsure: boolean): { tone: Tone; word: string } {
+function stateOf(action: ActionRun, over: boolean, unsure: boolean): StateWords {
   const last = action.visits.at(-1);
   if (MOVES.has(action.state)) {
     if (over) return { tone: "unknown", word: "end not seen" };
     if (unsure) return { tone: "unknown", word: "unknown" };
   }
-  switch (action.state) {
-    case "RUNNING":
-      return { tone: "run", word: "running" };
-    case "PAUSE_REQUESTED":
-      return { tone: "run", word: "pausing" };
-    case "PAUSED":
-      return { tone: "stopped", word: "paused" };
-    case "STOPPING":
-      return { tone: "stopped", word: "stopping" };
-    case "BYPASSED":
-      return { tone: "done", word: "passed over" };
-    case "ERROR":
-      return { tone: "error", word: "error" };
-    case "FINISHED":
-      return finished(last);
-    default:
-      if (last !== undefined && visitEnd(last) !== null) return finished(last);
-      return { tone: "idle", word: over ? "did not run" : "waits" };
-  }
+  const words = STATE_WORDS.get(action.state);
+  if (words !== undefined) return words;
+  if (action.state === "BYPASSED") return { tone: "done", word: "passed over" };
+  if (action.state === "FINISHED") return finishedWords(last?.result);
+  if (last !== undefined && visitEnd(last) !== null) return finishedWords(last.result);
+  return { tone: "idle", word: over ? "did not run" : "waits" };
 }
 
 /**

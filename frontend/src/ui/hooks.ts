@@ -37,14 +37,15 @@ export function useSearchKey(): void {
   }, []);
 }
 
+/** A value that this device keeps for its person. It is there at the first rendering. */
+export function useKept<T>(key: string, defaultValue: T) {
+  return useLocalStorage<T>({ key, defaultValue, ...AT_ONCE });
+}
+
 export type ListTab = "graphs" | "actions";
 
 export function useListTab() {
-  return useLocalStorage<ListTab>({
-    key: "aa.list-tab",
-    defaultValue: "graphs",
-    getInitialValueInEffect: false,
-  });
+  return useKept<ListTab>("aa.list-tab", "graphs");
 }
 
 /** Keys by graph, the last one that was changed at the end. */
@@ -80,11 +81,7 @@ export function withKept(
 
 /** `name`: of the place on the device. */
 export function useKeptKeys(name: string, id: string) {
-  const [kept, keep] = useLocalStorage<KeptKeys>({
-    key: name,
-    defaultValue: {},
-    getInitialValueInEffect: false,
-  });
+  const [kept, keep] = useKept<KeptKeys>(name, {});
   const put = useCallback(
     (keys: readonly string[], isIn: boolean) => keep((before) => withKept(before, id, keys, isIn)),
     [keep, id],

@@ -1,10 +1,10 @@
 /** Keyboard shortcuts of edit actions, where nobody is typing; and the clipboard's own events. */
 import { Kbd } from "@mantine/core";
-import { useLocalStorage } from "@mantine/hooks";
 import { notifications } from "@mantine/notifications";
 import { useEffect, useRef } from "react";
 import style from "../../editor/menus/toolbar.module.css";
 import { whenThere } from "../../ui/focus-field";
+import { useKept } from "../../ui/hooks";
 import { keyOf } from "../../ui/keys";
 import { EDIT_ACTIONS } from "../all";
 import { copiedSelection, pasteText, rememberCopied } from "../clipboard";
@@ -14,11 +14,7 @@ import { useOwnShortcuts, withOwn } from "./own-shortcuts";
 
 /** Returns whether single letters are shortcuts, and a setter; speech input types letters by itself. */
 export function useSingleKeys() {
-  return useLocalStorage({
-    key: "aa.single-keys",
-    defaultValue: true,
-    getInitialValueInEffect: false,
-  });
+  return useKept("aa.single-keys", true);
 }
 
 const FIELDS = "input, textarea, select, [role=dialog], [role=menu], [role=listbox]";

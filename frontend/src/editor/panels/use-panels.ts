@@ -1,8 +1,8 @@
 /** State of the panels beside the canvas; on a phone, of the visible pane. */
-import { useLocalStorage } from "@mantine/hooks";
 import { useCallback, useState } from "react";
 import type { Panel } from "../../edit-actions/editor-context";
 import { whenThere } from "../../ui/focus-field";
+import { useKept } from "../../ui/hooks";
 
 export type Pane = "canvas" | "outline" | "history" | "details" | "run";
 
@@ -16,11 +16,7 @@ export const ENTRY_BUTTON = "[data-history] [data-entry]";
 
 /** Keeps on this device whether the lists are folded to a rail. */
 function useFoldedList() {
-  const [folded, setFolded] = useLocalStorage({
-    key: "aa.list-folded",
-    defaultValue: false,
-    getInitialValueInEffect: false,
-  });
+  const [folded, setFolded] = useKept("aa.list-folded", false);
   return { folded, setFolded };
 }
 

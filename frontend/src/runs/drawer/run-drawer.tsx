@@ -1,9 +1,9 @@
 /** The drawer under the canvas: the run of the graph, once there was one. */
 
-import { useLocalStorage } from "@mantine/hooks";
 import { IconTimeline } from "@tabler/icons-react";
 import { type KeyboardEvent, type PointerEvent, type ReactNode, useRef, useState } from "react";
 import type { Run } from "../../api/runs";
+import { useKept } from "../../ui/hooks";
 import { keyOf } from "../../ui/keys";
 import { boundedPart } from "../../ui/lazy-part";
 import style from "./run-drawer.module.css";
@@ -55,11 +55,7 @@ export function usualHeight(room: number): number {
 }
 
 function useDrawerHeight() {
-  const [kept, keep] = useLocalStorage<number | null>({
-    key: "aa.drawer-height",
-    defaultValue: null,
-    getInitialValueInEffect: false,
-  });
+  const [kept, keep] = useKept<number | null>("aa.drawer-height", null);
   const [pulled, setPulled] = useState<number | null>(null);
   const room = window.innerHeight;
   const height = heldHeight(pulled ?? kept ?? usualHeight(room), room);
