@@ -43,6 +43,8 @@ const RUN: Run = {
   detail: "",
   alarms: [],
   recorded: true,
+  robots: null,
+  held: null,
   actions: {
     Go_0: { aid: "a", state: "FINISHED", visits: [visit(2, 9, "true")], older: 0, messages: [] },
     "Sub/Go_0": { aid: null, state: "FINISHED", visits: [], older: 0, messages: [] },

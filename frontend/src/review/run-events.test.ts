@@ -32,6 +32,8 @@ function ran(from: string, until: string): Run {
     alarms: [],
     group: null,
     recorded: true,
+    robots: null,
+    held: null,
     actions: {
       Look_0: {
         aid: "a",

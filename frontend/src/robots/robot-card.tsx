@@ -39,6 +39,10 @@ function robotSigns(robot: Robot): Sign[] {
   if (robot.generation === "older") {
     signs.push({ good: false, text: "Speaks an older generation of messages: it cannot be used" });
   }
+  if (robot.led) {
+    const text = "Led step by step: a run may start further actions on it until it ends";
+    signs.push({ good: true, text });
+  }
   if (robot.others > 0) {
     const who = robot.others === 1 ? "1 other program" : `${robot.others} other programs`;
     signs.push({ good: false, text: `${isolated(who)} can also start graphs on it` });
@@ -96,6 +100,7 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
               rmw: robot.rmw,
               get_service: robot.get_service,
               profile: robot.profile,
+              led: robot.led,
             })
           }
         >

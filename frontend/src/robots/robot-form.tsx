@@ -25,6 +25,7 @@ export const NEW: Registration = {
   rmw: "",
   get_service: "umrf_graph_get",
   profile: {},
+  led: false,
 };
 
 type RobotFormField = "name" | "domain" | "get_service" | "rmw" | "profile";
@@ -170,6 +171,12 @@ export function RobotForm({ editing, onClose }: { editing: EditedRobot; onClose:
             allowDecimal={false}
             error={at("domain")}
             onChange={(value) => setRobot({ ...robot, domain: Number(value) || 0 })}
+          />
+          <Switch
+            label="Runs that are led step by step"
+            description="Such a run may start further actions on this robot, minutes later, until it ends."
+            checked={robot.led}
+            onChange={(event) => setRobot({ ...robot, led: event.currentTarget.checked })}
           />
           <Button
             variant="subtle"

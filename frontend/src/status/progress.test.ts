@@ -29,6 +29,8 @@ const run: Run = {
   detail: "",
   alarms: [],
   recorded: true,
+  robots: null,
+  held: null,
   group: null,
 };
 

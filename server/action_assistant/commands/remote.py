@@ -48,10 +48,37 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     add_server(run, "patrol --script fast.json")
     run.add_argument("graph", metavar="GRAPH", help="id or name")
     run.add_argument("--engine", default="simulator", metavar="ROBOT", help="default: %(default)s")
+    run.add_argument(
+        "--robots",
+        type=_robots,
+        metavar="ACTOR=ROBOT,…",
+        help="lead it step by step on these robots; =ROBOT plays actions without an actor",
+    )
+    run.add_argument(
+        "--lost",
+        choices=("stop", "wait"),
+        default="stop",
+        help="what happens when one of --robots is lost: everything stops, or waits for you; "
+        "default: %(default)s",
+    )
+    run.add_argument(
+        "--accept",
+        nargs=2,
+        metavar=("CODE,…", "REASON"),
+        help="start despite these problems, and why: 'two-at-once' 'They share no space.'",
+    )
     run.add_argument("--script", type=Path, metavar="S.json", help="what simulated actions do")
     run.add_argument("--label", default="", help="of the version")
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
     run.set_defaults(handler=_run)
+
+
+def _robots(text: str) -> dict[str, str]:
+    """Read `Scout=David,Carrier=Carol`. Raise ValueError if it is anything else."""
+    pairs = [each.rpartition("=") for each in text.split(",")]
+    if any(not equals or not robot for _, equals, robot in pairs):
+        raise ValueError(text)
+    return {actor: robot for actor, _, robot in pairs}
 
 
 def _add_stop(stop: argparse.ArgumentParser) -> None:
@@ -116,6 +143,11 @@ def _run(options: argparse.Namespace) -> int:
         }
         if version.get("subgraphs"):
             order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
+        if options.robots is not None:
+            order |= {"engine": "conducted", "robots": options.robots, "lost": options.lost}
+        if options.accept is not None:
+            codes, reason = options.accept
+            order["override"] = {"codes": codes.split(","), "reason": reason}
         if script is not None:
             order["script"] = script
         run = decoded(server.runner("POST", "/api/runs", json=order), RunShown)
@@ -128,12 +160,16 @@ def _watch(server: Server, run: str) -> int:
     from action_assistant.runner.runs.views import RunShown
 
     seen: dict[str, str] = {}
+    held = ""
     while True:
         now = decoded(server.runner("GET", f"/api/runs/{run}"), RunShown)
         for name, action in now.actions.items():
             if seen.get(name) != action.state:
                 seen[name] = action.state
                 print(one_line(f"{name}: {action.state}"), flush=True)
+        if now.held is not None and held != now.held.why:
+            print(one_line(f"HELD: {now.held.why} Let it go on: runs go-on {run}"), flush=True)
+        held = "" if now.held is None else now.held.why
         if now.state in _ENDED:
             code, words = verdict(now)
             print(told(words))

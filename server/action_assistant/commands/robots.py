@@ -48,6 +48,11 @@ def _add_robots(robots: argparse.ArgumentParser) -> None:
         help="it takes only what a second person has said yes to",
     )
     add.add_argument(
+        "--led",
+        action="store_true",
+        help="the runner may lead it step by step, in runs that several robots share",
+    )
+    add.add_argument(
         "--replace", action="store_true", help="register it anew, if it is registered already"
     )
     add.set_defaults(handler=_add)
@@ -78,6 +83,8 @@ def _add(options: argparse.Namespace) -> int:
     if options.second_person:
         profile[SECOND_PERSON] = True
     wanted: dict[str, Any] = {"name": options.name, "domain": options.domain, "profile": profile}
+    if options.led:
+        wanted["led"] = True
     if options.rmw:
         wanted["rmw"] = options.rmw
     if options.get_service is not None:

@@ -35,7 +35,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(handler=_runs)
     more = runs.add_subparsers(
-        metavar="at-rest | since | verify | archive | restore | copy | examples"
+        metavar="at-rest | go-on | since | verify | archive | restore | copy | examples"
     )
     rests = command(
         more,
@@ -46,6 +46,11 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     rests.add_argument("run", metavar="RUN", help="id of the run")
     rests.add_argument("--how", required=True, help="how you have seen that nothing moves")
     rests.set_defaults(handler=_at_rest)
+    goes_on = command(
+        more, "go-on", "let a held run go on: its robots may begin to move at once", "RUN"
+    )
+    goes_on.add_argument("run", metavar="RUN", help="id of the run")
+    goes_on.set_defaults(handler=_go_on)
     _add_archives(more)
     runs_copy.add_to(more)
     _add_since(more)
@@ -69,6 +74,18 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
 
 
 COMMANDS: Final = {"runs": _add_runs}
+
+
+def _go_on(options: argparse.Namespace) -> int:
+    """Let a held run go on, as it is held now."""
+    path = f"/api/runs/{options.run}"
+    with running(options) as server:
+        held = server.runner("GET", path).json()["held"]
+        if held is None:
+            raise RequestRefused("The run is not held; it goes on already.")
+        server.runner("POST", f"{path}/go_on", json={"since": held["since"]})
+    print(one_line(f"it goes on; it was held: {held['why']}"))
+    return 0
 
 
 def _runs(options: argparse.Namespace) -> int:

@@ -27,6 +27,7 @@ from action_assistant.runner.api.runs import routes
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import ArchiveStore
 from action_assistant.runner.archives.retention import Retention
+from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.execution.start_checks import StartSources
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
@@ -81,9 +82,12 @@ async def open_services(
             services.review_service = ReviewService(
                 archive_store, utc_us, services.worker_queries, control.next_number
             )
-            control.watch(
-                lambda opened: services.review_service.run_changed(opened.run, opened.recorder)
-            )
+
+            def review(opened: OpenRun) -> None:
+                if not opened.is_led:  # a piece is a part of its run
+                    services.review_service.run_changed(opened.run, opened.recorder)
+
+            control.watch(review)
             services.retention = Retention(
                 journal,
                 recordings,

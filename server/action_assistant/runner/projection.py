@@ -15,6 +15,7 @@ from action_assistant.runner.runs.events import (
     Answered,
     Ended,
     MovesAgain,
+    PieceOf,
     Proof,
     Published,
     Requested,
@@ -50,6 +51,8 @@ def fold(event: Event) -> Sequence[Executable]:
 def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
     change = update(run).where(run.c.id == id_)
     match event:
+        case Requested(piece=PieceOf()):
+            return ()  # a part of its conducted run, which has a row
         case Requested() as asked:
             words = holds(asked.run, asked.graph_name, asked.engine, asked.author.name)
             return (_run(asked), *words)
@@ -109,8 +112,18 @@ def _run(asked: Requested) -> Executable:
         state=OPEN,
         desired="running",
         requested_at=asked.at,
-        summary={"alarms": []} if asked.group is None else {"alarms": [], "group": asked.group},
+        summary=_first_summary(asked),
     )
+
+
+def _first_summary(asked: Requested) -> dict[str, object]:
+    """Return the summary of a run before anything else is known of it."""
+    summary: dict[str, object] = {"alarms": []}
+    if asked.group is not None:
+        summary["group"] = asked.group
+    if asked.led is not None:
+        summary["robots"] = asked.led.robots
+    return summary
 
 
 def _robot(robot_: RobotRegistered) -> Executable:

@@ -13,6 +13,7 @@ from sqlalchemy import (
     MetaData,
     Table,
     Text,
+    false,
     literal_column,
     text,
 )
@@ -69,6 +70,7 @@ robot: Final = Table(
     Column("rmw", Text, nullable=False),
     Column("get_service", Text, nullable=False),
     Column("profile", JSON, nullable=False),
+    Column("led", Boolean(create_constraint=False), nullable=False, server_default=false()),
     Column("registered_at", BigInteger, nullable=False),
     Column("retired_at", BigInteger),
 )

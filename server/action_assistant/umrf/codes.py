@@ -159,7 +159,7 @@ CODES: Final[dict[str, Code]] = {
     # Several actors, in the graph or its sub-graphs
     "actors": Code(
         "hazard", _WARNING, "several actors, and an engine that cannot synchronise",
-        "one engine refuses the graph, so it cannot be started on robots yet; it plays everywhere else",
+        "one engine refuses the graph; the runner can lead several robots through it, and it plays everywhere else",
     ),
     "synchroniser": Code(
         "hazard", _WARNING, "several actors, and a profile that claims `synchronises`",

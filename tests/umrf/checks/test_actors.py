@@ -63,7 +63,7 @@ def test_a_graph_of_several_actors_plays_and_cannot_be_started_on_one_robot() ->
     assert told(graph) == [("actors", "")]
     assert [p.code for p in blocking(check(graph))] == ["actors"]
     assert blocking(check(graph), overridden=["actors"]) == []
-    assert "cannot be started on robots yet" in of_kind(graph, "actors").message
+    assert "the runner can lead several robots" in of_kind(graph, "actors").message
     assert "(Carrier, Scout)" in of_kind(graph, "actors").message
     assert told(graph, facts=SIMULATED) == []
 

@@ -38,7 +38,7 @@ class EveryCall:
     def __init__(self) -> None:
         self.going: dict[int, Call] = {}
 
-    def performs(self, name: str) -> bool:
+    def performs(self, action: Action) -> bool:
         return True
 
     def begin(self, call: Call) -> None:

@@ -3,6 +3,7 @@
 from typing import Any
 
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts
+from action_assistant.umrf.model import Action
 from action_assistant.umrf.semantics import (
     Call,
     Engine,
@@ -24,8 +25,8 @@ class Performing:
         self.told: list[tuple[str, int]] = []
         self.calls: list[Call] = []
 
-    def performs(self, name: str) -> bool:
-        return name in self.names
+    def performs(self, action: Action) -> bool:
+        return action.name in self.names
 
     def begin(self, call: Call) -> None:
         self.calls.append(call)

@@ -29,7 +29,8 @@ export interface RunnerApi {
     /**
      * ActionShown
      * @description One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
-     *     may have been missed. `visits` are the newest ones; `older`: how many are not listed.
+     *     may have been missed. `visits` are the newest ones; `older`: how many are not listed. `robot`:
+     *     the engine that plays it in a conducted run; `piece`: the id of the run of its newest piece.
      */
     ActionShown: {
         aid: string | null;
@@ -41,6 +42,10 @@ export interface RunnerApi {
         count?: number;
         /** @default false */
         at_least?: boolean;
+        /** @default  */
+        robot?: string;
+        /** @default  */
+        piece?: string;
     };
     /**
      * ActionStatistics
@@ -454,6 +459,15 @@ export interface RunnerApi {
         after: unknown;
     };
     /**
+     * GoOnRequest
+     * @description Lets a held run go on. `since`: the `since` of `held`, as the person saw it; a run that has gone
+     *     on meanwhile has another one.
+     */
+    GoOnRequest: {
+        /** Format: date-time */
+        since: string;
+    };
+    /**
      * GraphFile
      * @description A file that was written into an index folder. `kept`: the path to which the file that it
      *     replaced was moved.
@@ -494,6 +508,15 @@ export interface RunnerApi {
         subgraphs?: RunnerApi["SentSubgraph"][];
         /** @default null */
         tree_digest?: string | null;
+        /** @default {} */
+        robots?: {
+            [key: string]: string;
+        };
+        /**
+         * @default stop
+         * @enum {string}
+         */
+        lost?: "stop" | "wait";
     };
     /**
      * GroupShown
@@ -543,6 +566,17 @@ export interface RunnerApi {
         active: boolean;
         run: string | null;
         stopping: string | null;
+    };
+    /**
+     * HeldShown
+     * @description The hold of a conducted run, which begins nothing further: by whom (null: by the runner), why, and
+     *     since when.
+     */
+    HeldShown: {
+        by: RunnerApi["Author"] | null;
+        why: string;
+        /** Format: date-time */
+        since: string;
     };
     /**
      * Hello
@@ -688,6 +722,10 @@ export interface RunnerApi {
         detail: string;
         alarms: RunnerApi["AlarmShown"][];
         recorded: boolean;
+        robots: {
+            [key: string]: string;
+        } | null;
+        held: RunnerApi["HeldShown"] | null;
         cause: string;
         pinned: boolean;
         note: string;
@@ -1023,7 +1061,8 @@ export interface RunnerApi {
     /**
      * Registration
      * @description The data by which a robot is reached. `name` is the wake word that its engine answers to; an empty `rmw`
-     *     means the middleware of this process.
+     *     means the middleware of this process. `led`: its owner allows runs that the runner leads step by
+     *     step.
      */
     Registration: {
         name: string;
@@ -1037,6 +1076,8 @@ export interface RunnerApi {
         profile?: {
             [key: string]: unknown;
         };
+        /** @default false */
+        led?: boolean;
     };
     /**
      * RelationChange
@@ -1147,6 +1188,7 @@ export interface RunnerApi {
         profile: {
             [key: string]: unknown;
         };
+        led: boolean;
         heard_at: string | null;
         took_ms: number | null;
         restarted_at: string | null;
@@ -1175,6 +1217,8 @@ export interface RunnerApi {
         profile?: {
             [key: string]: unknown;
         } | null;
+        /** @default null */
+        led?: boolean | null;
     };
     /**
      * RobotKnowledge
@@ -1329,6 +1373,10 @@ export interface RunnerApi {
         detail: string;
         alarms: RunnerApi["AlarmShown"][];
         recorded: boolean;
+        robots: {
+            [key: string]: string;
+        } | null;
+        held: RunnerApi["HeldShown"] | null;
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -1339,7 +1387,9 @@ export interface RunnerApi {
     /**
      * RunSummary
      * @description A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
-     *     more, which is before the proof at `ended_at`; null if unknown.
+     *     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a conducted run, the
+     *     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
+     *     further.
      */
     RunSummary: {
         id: string;
@@ -1371,6 +1421,10 @@ export interface RunnerApi {
         detail: string;
         alarms: RunnerApi["AlarmShown"][];
         recorded: boolean;
+        robots: {
+            [key: string]: string;
+        } | null;
+        held: RunnerApi["HeldShown"] | null;
     };
     /**
      * RunWhole
@@ -1408,6 +1462,10 @@ export interface RunnerApi {
         detail: string;
         alarms: RunnerApi["AlarmShown"][];
         recorded: boolean;
+        robots: {
+            [key: string]: string;
+        } | null;
+        held: RunnerApi["HeldShown"] | null;
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -1510,7 +1568,8 @@ export interface RunnerApi {
      *     intended start. `like`: the robot whose engine the simulator plays, with its hazards.
      *     `behaviours`: actions with a Python behaviour on the runner do what that does, before what the
      *     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
-     *     the digest of the graph together with them.
+     *     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
+     *     of each actor ("" for actions without one); `lost`: see `Led`.
      */
     StartRequest: {
         version: string;
@@ -1534,6 +1593,15 @@ export interface RunnerApi {
         subgraphs?: RunnerApi["SentSubgraph"][];
         /** @default null */
         tree_digest?: string | null;
+        /** @default {} */
+        robots?: {
+            [key: string]: string;
+        };
+        /**
+         * @default stop
+         * @enum {string}
+         */
+        lost?: "stop" | "wait";
     };
     /**
      * StartShown
@@ -1679,6 +1747,17 @@ export interface RunnerApi {
         column?: number;
     };
     /**
+     * WordRequest
+     * @description The outcome of an action in a conducted run by the word of a person, with the reason. `action`:
+     *     its full name.
+     */
+    WordRequest: {
+        action: string;
+        /** @enum {string} */
+        outcome: "error" | "false" | "true";
+        reason: string;
+    };
+    /**
      * WritableGraph
      * @description A graph that can be written. `replaces`: the path, in the folder, of the file that it would
      *     replace; "" for none.
@@ -1725,6 +1804,12 @@ export interface RunnerPaths {
     };
     "/api/runs/{run}/at_rest": {
         post: RunnerOperations["confirmRest"];
+    };
+    "/api/runs/{run}/go_on": {
+        post: RunnerOperations["goOn"];
+    };
+    "/api/runs/{run}/outcome": {
+        post: RunnerOperations["giveOutcome"];
     };
     "/api/labels": {
         get: RunnerOperations["listLabels"];
@@ -2010,6 +2095,44 @@ interface RunnerOperations {
         requestBody: {
             content: {
                 "application/json": RunnerApi["RestRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    goOn: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["GoOnRequest"];
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    giveOutcome: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["WordRequest"];
             };
         };
         responses: {

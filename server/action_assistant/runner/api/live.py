@@ -152,14 +152,14 @@ class Hub:
         """Return a heartbeat as a message."""
         seen = {
             run: views.time(opened.watch.seen_at)
-            for run, opened in self.control.open.items()
+            for run, opened in self.control.shown.items()
             if opened.watch.seen_at is not None
         }
         heard = {name: views.time(at) for name, at in self.control.robots.last_answers().items()}
         return _text(Heartbeat(views.time(self.clock_us()), seen, heard))
 
     def _changed(self, opened: OpenRun) -> None:
-        for box in self.boxes:
+        for box in self.boxes if not opened.is_led else ():
             box.mark(opened)
 
     def frame(self, opened: OpenRun) -> EncodedRun:
@@ -182,9 +182,9 @@ class Hub:
     async def hello(self) -> str:
         """Return the first message for a page. The event loop stays free while large runs are
         prepared."""
-        for opened in tuple(self.control.open.values()):
+        for opened in tuple(self.control.shown.values()):
             await self.prepare_view(opened)
-        runs = [self.run_view(opened) for opened in self.control.open.values()]
+        runs = [self.run_view(opened) for opened in self.control.shown.values()]
         return msgspec.json.encode(Hello(self.control.robot_views(), runs)).decode()
 
     async def prepare_view(self, opened: OpenRun) -> None:

@@ -63,6 +63,7 @@ class RobotChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     rmw: str | None = None
     get_service: str | None = None
     profile: dict[str, object] | None = None
+    led: bool | None = None
 
 
 class KnownAction(msgspec.Struct, frozen=True):

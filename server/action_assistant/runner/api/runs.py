@@ -32,7 +32,13 @@ from action_assistant.runner.review import listing
 from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.run import Run, State
-from action_assistant.runner.start.admission import StartRequest, decoded, read_request
+from action_assistant.runner.start.admission import (
+    GoOnRequest,
+    StartRequest,
+    WordRequest,
+    decoded,
+    read_request,
+)
 from action_assistant.umrf.semantics import Script
 from action_assistant.web.auth.access import Needs, person_of, refuse, require
 from action_assistant.web.server.openapi import answer, exchanges, reads
@@ -177,7 +183,31 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         asked = decoded(await request.body(), RestRequest)
         return views.run_view(await services.control.confirm_rest(run, asked, author_of(request)))
 
-    return [stop_all, stop, pause, resume, modify, at_rest]
+    @post(
+        "/api/runs/{run:str}/go_on",
+        operation_id="goOn",
+        status_code=202,
+        summary="Let a held run go on: its robots may begin to move",
+        opt=reads(GoOnRequest),
+        guards=[Needs("operate")],
+    )
+    async def go_on(run: str, request: _Asking) -> views.RunShown:
+        asked = decoded(await request.body(), GoOnRequest)
+        return views.run_view(await services.control.go_on(run, asked, author_of(request)))
+
+    @post(
+        "/api/runs/{run:str}/outcome",
+        operation_id="giveOutcome",
+        status_code=200,
+        summary="Give the outcome of an action in a led run, where nothing shows it",
+        opt=reads(WordRequest),
+        guards=[Needs("operate")],
+    )
+    async def outcome(run: str, request: _Asking) -> views.RunShown:
+        asked = decoded(await request.body(), WordRequest)
+        return views.run_view(await services.control.give_outcome(run, asked, author_of(request)))
+
+    return [stop_all, stop, pause, resume, modify, at_rest, go_on, outcome]
 
 
 def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
@@ -214,7 +244,7 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         )
         open_runs = {
             run: views.summary(opened.run, recorded=opened.recorder.recorded)
-            for run, opened in services.control.open.items()
+            for run, opened in services.control.shown.items()
         }
         found = await services.worker_queries.text(listing.listed, wanted, limit, open_runs)
         return json_of(found, list[views.Listed])

@@ -32,6 +32,7 @@ log: Final = logging.getLogger(__name__)
 _GET_S: Final = 1.0
 _PATIENCE_S: Final = 3.0  # after which feedback counts although no answer confirms it
 _AGAIN_S: Final = 0.5
+_OVERTAKEN_US: Final = 3_000_000  # for which an answer may be under way
 _KEPT: Final = 200
 _LOG_ENTRIES: Final = 500  # newest entries of a robot's log
 
@@ -126,6 +127,8 @@ class LateActivity:
 
     async def _take_back(self, engine: KnownEngine, shown: Snapshot, run: str) -> None:
         opened, robot = self._runs.by_id.get(run), engine.registration.name
+        if opened is not None and _is_older(shown, opened.run):
+            return
         if opened is not None and opened.run.engine != robot:
             self._elsewhere.put((robot, run), True)
             return
@@ -136,7 +139,9 @@ class LateActivity:
         found = await self._known(run, robot)
         if found is None or not _is_of(found[0], engine):
             self._elsewhere.put((robot, run), True)
-        elif found[0].end is not None:  # else it is being adopted after a restart
+        elif found[0].end is None or _is_older(shown, found[0]):
+            return  # it is being adopted after a restart, or the answer tells of an earlier moment
+        else:
             self._runs.reopen(*found, self._moves_again(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
@@ -184,6 +189,15 @@ async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | N
                     (each for each in answer.graphs if each.run == run and each.active), None
                 )
     return shown
+
+
+def _is_older(shown: Snapshot, run: Run) -> bool:
+    """Return whether a snapshot is of an answer that was asked for just before the end of a run: the
+    answer that proved the end may have overtaken it. A clock that was set back hides nothing for
+    long."""
+    if shown.asked_at is None or run.ended_at is None:
+        return False
+    return 0 < run.ended_at - shown.asked_at < _OVERTAKEN_US
 
 
 def _is_of(run: Run, engine: KnownEngine) -> bool:

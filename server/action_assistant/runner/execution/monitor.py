@@ -34,6 +34,7 @@ from action_assistant.runner.stop.loading import (
     in_words,
 )
 from action_assistant.runner.stop.proof import RestProof, hash_of
+from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.triggers import NEVER_BEGAN
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -361,6 +362,8 @@ class Monitor:
         if look.order < self._disturbed:
             return
         own, at_rest = shown[0], self._rest.seen(shown, look.began)
+        if self._is_told_by_shape(changes.run, shown):
+            at_rest = True
         if any(each.active for each in ours):
             self._threads.see_moving()
         doubt = self._doubts.look(shown)
@@ -406,6 +409,13 @@ class Monitor:
             )
         else:
             self.trouble = f"{', '.join(run.active) or own.graph} has not stopped yet"
+
+    def _is_told_by_shape(self, run: Run, shown: Sequence[Snapshot]) -> bool:
+        """Return whether the states of a piece tell its outcome. It has one action, which nothing
+        can begin again, so one answer is enough; after a Stop its usual proof is asked for."""
+        if run.piece is None or run.desired == "stopped" or len(shown) > 1:
+            return False
+        return outcome_of(shown[0].state, shown[0].nodes.get(run.piece.node, "")) is not None
 
     def _threads_explain(self, ours: Sequence[Snapshot], process: EngineProcess | None) -> bool:
         """Return whether the threads of the engine prove that the code of all doubtful actions has

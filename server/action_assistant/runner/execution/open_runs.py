@@ -7,11 +7,11 @@ import anyio
 
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.logs.context import begin
-from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
 from action_assistant.runner.links.port import ForeignCommand, Link, Order
 from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs.events import MovesAgain
+from action_assistant.runner.runs.events import Author, MovesAgain
 from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
@@ -43,10 +43,20 @@ class OpenRuns:
 
     # --- opening and driving ------------------------------------------------------------------
 
-    def open(self, run: Run, link: Link | None, *, owns_link: bool, seq: int) -> OpenRun:
+    def open(
+        self,
+        run: Run,
+        link: Link | None,
+        *,
+        owns_link: bool,
+        seq: int,
+        piece: PieceHooks | None = None,
+        pressed: Callable[[Author], None] | None = None,
+    ) -> OpenRun:
         """Open a stored run on a link, and announce it. `seq` is the number of the run's last
         stored event; `owns_link` says that the link is closed with the run. A run without a
-        link, whose robot is not registered any more, gets a link that never answers."""
+        link, whose robot is not registered any more, gets a link that never answers. `piece`: ties
+        a piece to its conducted run; `pressed`: called first when somebody stops a conducted run."""
         opened = OpenRun(
             run,
             link=link
@@ -59,6 +69,8 @@ class OpenRuns:
             run_in_worker=self._runtime.run_in_worker,
             changed=self._changed,
             loading_times=self._loading_times,
+            piece=piece,
+            pressed=pressed,
         )
         self.by_id[run.id] = opened
         self._changed(opened)
@@ -106,7 +118,7 @@ class OpenRuns:
     def hear_of(self, robot: str, command: ForeignCommand) -> Run | None:
         """Pass a command that somebody else has sent to a robot on to the runs there. Return the run
         that it concerns, if any: one of its graph before others."""
-        opened = self.on(robot).values()
+        opened = [each for each in self.on(robot).values() if each.run.led is None]
         for each in opened:
             each.hear_of(command)
         runs = (each.run for each in opened)
@@ -127,11 +139,16 @@ class OpenRuns:
             run: each for run, each in found if engine in each.run.robots and each.run.end is None
         }
 
-    def occupying(self, engine: str, graph_name: str = "") -> Run | None:
+    def occupying(self, engine: str, graph_name: str = "", *, apart_from: str = "") -> Run | None:
         """Return the run that prevents a start of a graph of this name on an engine; None if it is
         free. A moving run comes before one that may only be loading, then one of this graph name
-        before others."""
-        runs = (each.run for each in self.on(engine).values())
+        before others. `apart_from`: the id of a conducted run that does not count, nor do its
+        pieces."""
+        runs = [
+            each.run
+            for each in self.on(engine).values()
+            if apart_from not in {each.run.id, each.run.piece and each.run.piece.run}
+        ]
         return min(
             runs, key=lambda run: (bool(run.loading), run.graph_name != graph_name), default=None
         )

@@ -78,6 +78,14 @@ class _HeldBack(NotSent):
     """A Stop was pressed before the start message left."""
 
 
+class PieceHooks(msgspec.Struct, frozen=True, kw_only=True):
+    """The tie of a piece to its conducted run. `changed` is called after each change of the piece;
+    `may_leave` right before its start leaves, and raises NotSent if it may not leave any more."""
+
+    changed: "Callable[[OpenRun], None]"
+    may_leave: Callable[[], None]
+
+
 class OpenRun:
     """A run that is not over. `changed` is called after every visible change, and must not change a
     run."""
@@ -94,8 +102,12 @@ class OpenRun:
         run_in_worker: RunInWorker,
         changed: "Callable[[OpenRun], None]",
         loading_times: LoadingTimes | None = None,
+        piece: PieceHooks | None = None,
+        pressed: Callable[[Author], None] | None = None,
     ) -> None:
         self.run = run
+        self._piece = piece
+        self._pressed = pressed
         self.revision = 0
         self.published = anyio.Event()
         self._store = store
@@ -120,12 +132,20 @@ class OpenRun:
         self._stopping = StopLoop(run, clock_us)
         self._early: list[Report] = []
 
+    @property
+    def is_led(self) -> bool:
+        """True for a piece that a conductor leads: people are shown its run instead."""
+        return self._piece is not None
+
     # --- what people want ---------------------------------------------------------------------
 
     def stop(self, author: Author, stop_id: str) -> None:
         """Record that a person wants the run stopped, and send stops until the run has ended. The
         call never waits and never fails."""
-        self._doubts.reach()
+        if self._pressed is not None:
+            self._pressed(author)
+        else:
+            self._doubts.reach()
         if pressed := self._stopping.press(author, stop_id):
             self.tell(pressed, author.id)
         self._handing.cancel()
@@ -245,6 +265,8 @@ class OpenRun:
 
     def _touch(self) -> None:
         self.revision += 1
+        if self._piece is not None:
+            self._piece.changed(self)
         self._changed(self)
 
     async def drive(self, order: Order | None, incarnation: str = "") -> None:
@@ -338,7 +360,7 @@ class OpenRun:
             if waited >= _UNCONFIRMED_S:
                 why = failed or self.watch.trouble or "no proof has come"
                 self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}.")
-            if self._owns_link and waited >= _SWITCH_OFF_S:
+            if self._owns_link and self._pressed is None and waited >= _SWITCH_OFF_S:
                 why = self._stopping.hung or f"It does not obey: {self.watch.trouble}."
                 self.end("lost", f"{why} The simulated engine was switched off.")
                 return
@@ -417,6 +439,8 @@ class OpenRun:
             """Let the message leave now, unless a Stop has been pressed by now."""
             if self.run.desired == "stopped":
                 raise _HeldBack
+            if self._piece is not None:
+                self._piece.may_leave()
             leaving.set()
 
         try:

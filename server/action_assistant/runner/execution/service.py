@@ -15,6 +15,8 @@ from sqlalchemy import Row
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution import interventions
+from action_assistant.runner.execution.conducted_steps import Word
+from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -32,12 +34,19 @@ from action_assistant.runner.runs.events import Author, Ended
 from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.views import time
 from action_assistant.runner.runtime import Runtime
-from action_assistant.runner.start.admission import GroupRequest, StartRequest
+from action_assistant.runner.start.admission import (
+    GoOnRequest,
+    GroupRequest,
+    StartRequest,
+    WordRequest,
+)
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import StopOrder
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
+from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
 
@@ -82,7 +91,12 @@ class ExecutionService:
             simulator=simulator,
             sources=sources,
         )
-        self._starts = StartPipeline(self._runs, self._checks, self._stops, runtime)
+        self._conductors = Conductors(
+            robots, self.foreign_stops, self._runs, self.history, simulator, runtime
+        )
+        self._starts = StartPipeline(
+            self._runs, self._checks, self._stops, self._conductors, runtime
+        )
 
     @classmethod
     @asynccontextmanager
@@ -158,7 +172,8 @@ class ExecutionService:
         """Begin to stop all runs and all graphs that others have started. Return which runs and
         graphs are being stopped. The call never waits."""
         self._stops.note("", author, stop_id)
-        runs = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
+        stopped = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
+        runs = [run for run in stopped if not self.open[run].is_led]
         self.foreign_stops.stop(author, self._runs.on)
         return StoppedAll(runs, self.foreign_stops.graphs(), self.robots.unheard())
 
@@ -168,12 +183,16 @@ class ExecutionService:
         registered."""
         graphs = self.foreign_stops.stop(author, self._runs.on, name)
         self._stops.note(name, author)
-        return [run for run in self._runs.on(name) if self._stop(run, author, "")], graphs
+        stopped = [run for run in self._runs.on(name) if self._stop(run, author, "")]
+        return [run for run in stopped if not self.open[run].is_led], graphs
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
         """Begin to stop a run, or all runs of a group, and return the ids of the runs that are
         being stopped. The list is empty if the run is over already. The call waits only to look
         up an id that is not open. Raise NotFound if there is no such run or group."""
+        piece = self.open[run].run.piece if run in self.open else None
+        if piece is not None and piece.run in self.open:  # nothing of its run shall go on
+            run = piece.run
         if run in self.open:
             return [run] if self._stop(run, author, stop_id) else []
         group = [each for each, opened in tuple(self.open.items()) if opened.run.group == run]
@@ -214,6 +233,32 @@ class ExecutionService:
             run_in_worker=self._runtime.run_in_worker,
         )
 
+    async def go_on(self, run: str, asked: GoOnRequest, author: Author) -> Run:
+        """Let a held run go on, which may start actions on its robots. Raise NotFound if there is no
+        such run, Conflict if it is over, or not held as the person has seen it."""
+        opened = await self._movable(run)
+        held = opened.run.held
+        if held is None:
+            raise Conflict("The run is not held; it goes on already.")
+        if time(held.at) != asked.since:
+            raise Conflict(
+                f"The run has gone on since and is held again: {held.why} Look at it first.",
+                where={"path": "/since"},
+            )
+        if opened.run.desired == "stopped":
+            raise Conflict("The run is being stopped.")
+        self._conductors.go_on(run, author)
+        return opened.run
+
+    async def give_outcome(self, run: str, asked: WordRequest, author: Author) -> Run:
+        """Take the outcome of an action in a conducted run from a person, where nothing shows it.
+        Raise NotFound if there is no such run, Conflict if it is not asked for."""
+        opened = await self._movable(run)
+        outcome: Precondition = f"on_{asked.outcome}"  # type: ignore[assignment]
+        word = Word(outcome=outcome, by=author, reason=asked.reason)
+        self._conductors.give_word(run, asked.action, word)
+        return opened.run
+
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
         """Record that a person has seen a run at rest, where its engine cannot prove that. Raise
         NotFound if there is no such run, and what `interventions.confirm_rest` raises."""
@@ -232,6 +277,11 @@ class ExecutionService:
     async def find(self, run: str) -> Run:
         """Return a run, open or over. Raise NotFound if there is no such run."""
         return await self._runs.find(run)
+
+    @property
+    def shown(self) -> dict[str, OpenRun]:
+        """The open runs that people see, by id: all but the pieces that a conductor leads."""
+        return {run: opened for run, opened in self.open.items() if not opened.is_led}
 
     def recorder_of(self, run: str) -> RunRecorder | None:
         """Return the recorder of an open run; None for any other id."""
@@ -331,13 +381,16 @@ class ExecutionService:
             if run is None or run.end is not None:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)
                 continue
-            self._adopt(run, seq, is_whole=is_whole)
+            await self._adopt(run, seq, is_whole=is_whole)
         await self.foreign_stops.take_up()
 
-    def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
+    async def _adopt(self, run: Run, seq: int, *, is_whole: bool) -> None:
         """Follow a run that an earlier process left open; nothing of the run is started. `seq` is
         the number of its last stored event; `is_whole` says that all of its events could be
         read."""
+        if run.led is not None and not run.simulated and is_whole:
+            await self._conductors.take_up(run, seq)
+            return
         link = self.robots.link(run.engine)
         opened = self._runs.open(run, link, owns_link=False, seq=seq)
         if run.simulated:

@@ -14,18 +14,26 @@ from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.random_ids import random_id
 from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.analysis.course_checks import CheckedCourses
+from action_assistant.runner.execution.conductor import CONDUCTED_FACTS
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
-from action_assistant.runner.links.port import SIMULATOR, Answer, Link, NoAnswer
-from action_assistant.runner.links.simulator import Simulator
+from action_assistant.runner.links.port import CONDUCTED, SIMULATOR, Answer, Link, NoAnswer
+from action_assistant.runner.links.simulator import LeadableLink, Simulator
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Overridden
 from action_assistant.runner.runs.sent_graphs import SentSubgraph
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start import preflight
-from action_assistant.runner.start.admission import GroupRequest, Prepared, StartRequest, prepared
+from action_assistant.runner.start.admission import (
+    GroupRequest,
+    Prepared,
+    PreparedPieces,
+    StartRequest,
+    prepared,
+    prepared_pieces,
+)
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
@@ -64,11 +72,27 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     is_simulated: bool
     incarnation: str
     despite: tuple[Overridden, ...] = ()
+    led: "LedStart | None" = None
 
     @property
     def overridden(self) -> tuple[str, ...]:
         """The codes of problems that the starter overrides."""
         return self.request.override.codes if self.request.override else ()
+
+
+class LedStart(msgspec.Struct, frozen=True, kw_only=True):
+    """The part of an accepted start that only a conducted run has. `lives`: the life of the engine
+    of each robot, as it was looked at; `engine`: plays the whole graph."""
+
+    pieces: PreparedPieces
+    lives: dict[str, str]
+    engine: LeadableLink
+
+
+def engines_of(request: StartRequest) -> tuple[str, ...]:
+    """Return the robots that a start is for, in the order of their names."""
+    named = request.robots.values() if request.engine == CONDUCTED else (request.engine,)
+    return tuple(sorted({*named} - {SIMULATOR}))
 
 
 class StartChecks:
@@ -102,12 +126,27 @@ class StartChecks:
         stage does."""
         if request.engine == SIMULATOR:
             return await self._accept_simulation(request)
+        if request.engine == CONDUCTED:
+            return await self._accept_conducted(request, starter)
         robot = self._robots.reachable(request.engine)
         if request.like is not None:
             raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
         if request.behaviours:
             raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
         ready = await self._run_in_worker(prepared, request, robot.facts, random_id())
+        return await self._accept_on(robot, request, ready, starter)
+
+    async def accept_all(
+        self, requests: Sequence[StartRequest], starter: str
+    ) -> list[AcceptedStart]:
+        """Accept the starts on several engines side by side. Raise Conflict, with the reasons of
+        all engines, if at least one start is refused."""
+        return await _all_accepted(requests, lambda each: self.accept(each, starter))
+
+    async def _accept_on(
+        self, robot: KnownEngine, request: StartRequest, ready: Prepared, starter: str
+    ) -> AcceptedStart:
+        """Take a prepared start through the stages that concern its robot."""
         await self._check(request, ready, robot, starter)
         try:
             view = await self._ask(robot)
@@ -118,30 +157,38 @@ class StartChecks:
             )
         return await self._decide(request, ready, robot, view)
 
-    async def accept_all(
-        self, requests: Sequence[StartRequest], starter: str
-    ) -> list[AcceptedStart]:
-        """Accept the starts on several engines side by side. Raise Conflict, with the reasons of
-        all engines, if at least one start is refused."""
-        accepted: dict[str, AcceptedStart] = {}
-        refused: dict[str, Refused] = {}
+    async def _accept_conducted(self, request: StartRequest, starter: str) -> AcceptedStart:
+        """Take the start of a conducted run through all stages, with all its robots side by side.
+        Raise Conflict, with the reasons of all robots, if a stage refuses it."""
+        ready = await self._run_in_worker(prepared_pieces, request, CONDUCTED_FACTS, random_id())
+        items = preflight.led_items(ready)
+        overridden = request.override.codes if request.override else ()
+        preflight.require_clear(items, overridden)
+        parts = [
+            msgspec.structs.replace(request, engine=name, robots={}) for name in engines_of(request)
+        ]
 
-        async def accept(each: StartRequest) -> None:
-            try:
-                accepted[each.engine] = await self.accept(each, starter)
-            except Refused as why:
-                refused[each.engine] = why
+        async def accept(part: StartRequest) -> AcceptedStart:
+            robot = self._robots.reachable(part.engine)
+            require_led(robot)
+            return await self._accept_on(robot, part, ready.by_robot[part.engine], starter)
 
-        async with anyio.create_task_group() as tasks:
-            for each in requests:
-                tasks.start_soon(accept, each)
-        if refused:
-            reasons = " ".join(f"{name}: {why.detail}" for name, why in sorted(refused.items()))
-            engines = {name: why.where or {} for name, why in refused.items()}
-            raise Conflict(
-                f"Nothing was started. {reasons}", where={"path": "/engines", "engines": engines}
-            )
-        return [accepted[each.engine] for each in requests]
+        accepted = await _all_accepted(parts, accept)
+        led = frozenset(ready.players)
+        engine = self._simulator(CONDUCTED_FACTS, ready.whole.script, self._clock_us, led=led)
+        return AcceptedStart(
+            request=request,
+            prepared=ready.whole,
+            link=engine,
+            is_simulated=not parts,
+            incarnation=ready.whole.run if parts else engine.standing.incarnation,
+            despite=_overridden(ready.whole, items),
+            led=LedStart(
+                pieces=ready,
+                lives={each.request.engine: each.incarnation for each in accepted},
+                engine=engine,
+            ),
+        )
 
     async def _accept_simulation(self, request: StartRequest) -> AcceptedStart:
         facts = self._simulated_facts(request)
@@ -215,18 +262,19 @@ class StartChecks:
         return accepted
 
     def require_free(self, accepted: AcceptedStart) -> None:
-        """Raise Conflict if a run keeps the robot from an accepted start by now: one that was over
+        """Raise Conflict if a run keeps a robot from an accepted start by now: one that was over
         may have moved again meanwhile."""
-        if not accepted.is_simulated:
-            item = self._free_item(accepted.request.engine, accepted.prepared.name)
-            preflight.require_clear([item], accepted.overridden)
+        name = accepted.prepared.name
+        items = [self._free_item(each, name) for each in engines_of(accepted.request)]
+        preflight.require_clear(items, accepted.overridden)
 
     def why_occupied(self, accepted: AcceptedStart) -> str:
-        """Return why a run keeps the robot from an accepted start by now; "" if none does."""
-        if accepted.is_simulated:
-            return ""
-        item = self._free_item(accepted.request.engine, accepted.prepared.name)
-        return item.text if preflight.is_blocking(item, accepted.overridden) else ""
+        """Return why a run keeps a robot from an accepted start by now; "" if none does."""
+        for engine in engines_of(accepted.request):
+            item = self._free_item(engine, accepted.prepared.name)
+            if preflight.is_blocking(item, accepted.overridden):
+                return item.text
+        return ""
 
     def _free_item(self, engine: str, graph_name: str) -> Item:
         """Return the item that says whether another run keeps a robot from starting a graph of this
@@ -266,6 +314,8 @@ class StartChecks:
         """Return the pre-flight of a start on each engine; `starter` is the id of the person who
         would start. A refusal becomes an item of the pre-flight. Nothing is stored, and only a
         get is sent."""
+        if CONDUCTED in group.engines:
+            return await self._look_conducted(group.for_engine(CONDUCTED), starter)
         found: dict[str, Preflight] = {}
         courses: list[Item] = []
 
@@ -280,6 +330,33 @@ class StartChecks:
             for engine in group.engines:
                 tasks.start_soon(look, engine)
         return [preflight.with_items(found[engine], courses) for engine in group.engines]
+
+    async def _look_conducted(self, request: StartRequest, starter: str) -> list[Preflight]:
+        """Return the pre-flight of a conducted run: first that of the whole graph, then that of each
+        robot."""
+        try:
+            ready = await self._run_in_worker(
+                partial(prepared_pieces, approved=False), request, CONDUCTED_FACTS, ""
+            )
+        except Refused as refused:
+            item = preflight.refusal_item("graph", refused)
+            return [preflight.with_verdict(CONDUCTED, [item])]
+        whole = ready.whole
+        items = [preflight.graph_item(whole), *preflight.led_items(ready)]
+        found = [preflight.with_verdict(CONDUCTED, items, whole.digest, whole.tree_digest)]
+        for name in engines_of(request):
+            try:
+                robot = self._robots.reachable(name)
+                require_led(robot)
+            except Refused as refused:
+                item = preflight.refusal_item("link", refused)
+                found.append(preflight.with_verdict(name, [item]))
+                continue
+            own = ready.by_robot[name]
+            listed = [self._free_item(name, own.name), *await self._engine_items(robot, own)]
+            listed += await self._approval_items(robot, own, starter)
+            found.append(preflight.with_verdict(name, listed, whole.digest, whole.tree_digest))
+        return found
 
     async def _look(self, request: StartRequest, starter: str) -> Preflight:
         """Return the pre-flight items of one engine. A refusal of one stage becomes an item, and
@@ -340,6 +417,42 @@ class StartChecks:
             return (preflight.unknown_courses_item(why),)
         except Refused as refused:
             return (preflight.unknown_courses_item(refused.detail),)
+
+
+def require_led(robot: KnownEngine) -> None:
+    """Raise Conflict unless the owner of a robot allows runs that the runner leads step by step."""
+    if not robot.registration.led:
+        name = robot.registration.name
+        raise Conflict(
+            f"Led runs are off for {name}: its owner can switch them on in its registration.",
+            where={"path": "/robots", "item": "led"},
+        )
+
+
+async def _all_accepted(
+    requests: Sequence[StartRequest], accept: Callable[[StartRequest], Awaitable[AcceptedStart]]
+) -> list[AcceptedStart]:
+    """Accept the starts on several engines side by side. Raise Conflict, with the reasons of all
+    engines, if at least one start is refused."""
+    accepted: dict[str, AcceptedStart] = {}
+    refused: dict[str, Refused] = {}
+
+    async def try_one(each: StartRequest) -> None:
+        try:
+            accepted[each.engine] = await accept(each)
+        except Refused as why:
+            refused[each.engine] = why
+
+    async with anyio.create_task_group() as tasks:
+        for each in requests:
+            tasks.start_soon(try_one, each)
+    if refused:
+        reasons = " ".join(f"{name}: {why.detail}" for name, why in sorted(refused.items()))
+        engines = {name: why.where or {} for name, why in refused.items()}
+        raise Conflict(
+            f"Nothing was started. {reasons}", where={"path": "/engines", "engines": engines}
+        )
+    return [accepted[each.engine] for each in requests]
 
 
 def _overridden(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:

@@ -22,10 +22,12 @@ import msgspec
 
 from action_assistant.errors import BadInput, Refused
 from action_assistant.random_ids import random_id
+from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.open_runs import OpenRuns
-from action_assistant.runner.execution.start_checks import AcceptedStart, StartChecks
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.start_checks import AcceptedStart, StartChecks, engines_of
 from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Order
-from action_assistant.runner.runs.events import Author, Requested
+from action_assistant.runner.runs.events import Author, Led, Requested
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import GroupRequest, StartRequest
@@ -52,9 +54,15 @@ class StartPipeline:
     """Carries out starts. `stops`: knows the Stops pressed since a start was requested."""
 
     def __init__(
-        self, runs: OpenRuns, checks: StartChecks, stops: StopOrder, runtime: Runtime
+        self,
+        runs: OpenRuns,
+        checks: StartChecks,
+        stops: StopOrder,
+        conductors: Conductors,
+        runtime: Runtime,
     ) -> None:
         self._runs = runs
+        self._conductors = conductors
         self._checks = checks
         self._stops = stops
         self._clock_us = runtime.clock_us
@@ -69,7 +77,7 @@ class StartPipeline:
             known = await self._known(request)
             if known is not None:
                 return Started(known, fresh=False)
-            async with self.turns(() if request.engine == SIMULATOR else (request.engine,)):
+            async with self.turns(engines_of(request)):
                 accepted = await self._checks.accept(request, author.id)
                 run = await self._store_and_hand_over(accepted, author, stops)
             return Started(run, fresh=True)
@@ -133,14 +141,19 @@ class StartPipeline:
         with anyio.CancelScope(shield=True):
             run = await self._claims.store(requested)
             occupied = self._checks.why_occupied(accepted)
-            opened = self._runs.open(run, accepted.link, owns_link=accepted.is_simulated, seq=1)
+            opened = self._open(accepted, requested, run)
             if occupied:
                 opened.end("refused", occupied)
-            if pressed := self._stops.since(stops, accepted.request.engine, group or ""):
+            if pressed := self._stops.since(stops, *engines_of(accepted.request), group or ""):
                 opened.stop(*pressed)
             self._runs.drive(opened, order, accepted.incarnation)
         await opened.published.wait()
         return opened.run
+
+    def _open(self, accepted: AcceptedStart, requested: Requested, run: Run) -> OpenRun:
+        if accepted.led is None or accepted.is_simulated:
+            return self._runs.open(run, accepted.link, owns_link=accepted.is_simulated, seq=1)
+        return self._conductors.open(requested, run, accepted.led.pieces.texts, accepted.led.engine)
 
     async def _hand_over_group(
         self, starts: Sequence[AcceptedStart], author: Author, stops: int
@@ -187,9 +200,23 @@ def _to_store(
         inner_laps=ready.inner_laps,
         subgraphs=ready.subgraphs,
         tree_digest=ready.tree_digest if request.subgraphs or request.tree_digest else None,
+        led=_led_of(accepted),
     )
-    targets = () if accepted.is_simulated else (request.engine,)
+    targets = () if accepted.is_simulated or accepted.led else (request.engine,)
     graph = GraphOutline(ready.name, ready.actions)
     inside = tuple(each.umrf for each in ready.subgraphs)
     order = Order(run=ready.run, graph=graph, umrf=ready.umrf, targets=targets, inside=inside)
     return requested, order
+
+
+def _led_of(accepted: AcceptedStart) -> Led | None:
+    if accepted.led is None:
+        return None
+    request = accepted.request
+    return Led(
+        robots=request.robots,
+        players=accepted.led.pieces.players,
+        lives=accepted.led.lives,
+        lost=request.lost,
+        together="two-at-once" in accepted.overridden,
+    )

@@ -16,9 +16,12 @@ from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import Exact, Snapshot
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import Call
 
 #: The engine that is always there.
 SIMULATOR: Final = "simulator"
+#: The engine of a run that the runner leads: it plays the whole graph, and robots its actions.
+CONDUCTED: Final = "conducted"
 _NAMED: Final = 3
 
 
@@ -163,7 +166,21 @@ class ForeignCommand(msgspec.Struct, frozen=True, kw_only=True):
     sender: str = ""
 
 
-Report: TypeAlias = Transitions | Feedback | EngineLog | EngineChanged | ForeignCommand
+class CallBegan(msgspec.Struct, frozen=True, kw_only=True):
+    """The engine of a conducted run has begun an action that a robot shall carry out."""
+
+    call: Call
+
+
+class CallStopped(msgspec.Struct, frozen=True, kw_only=True):
+    """The engine of a conducted run wants the call with this number to end."""
+
+    number: int
+
+
+Report: TypeAlias = (
+    Transitions | Feedback | EngineLog | EngineChanged | ForeignCommand | CallBegan | CallStopped
+)
 
 
 #: Is called right before a message leaves. It may raise NotSent, which holds the message back.
@@ -240,13 +257,15 @@ class Link(Protocol):
 
 class Registration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The data by which a robot is reached. `name` is the wake word that its engine answers to; an empty `rmw`
-    means the middleware of this process."""
+    means the middleware of this process. `led`: its owner allows runs that the runner leads step by
+    step."""
 
     name: str
     domain: Annotated[int, msgspec.Meta(ge=0, le=232)] = 0
     rmw: str = ""
     get_service: str = "umrf_graph_get"
     profile: dict[str, object] = {}
+    led: bool = False
 
 
 class Candidate(msgspec.Struct, frozen=True, kw_only=True):

@@ -28,6 +28,7 @@ from action_assistant.runner.links.behaviours.performer import (
     BehaviourPerformer,
     bound_address_space,
 )
+from action_assistant.runner.links.led_calls import LedCalls, LedCourse
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
     Answer,
@@ -46,6 +47,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.runner.links.simulator import SimulatorLink, engine_of
 from action_assistant.runner.workers import child
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.semantics import Returned
 
 log: Final = logging.getLogger(__name__)
 
@@ -63,7 +65,9 @@ _ENDING_S: Final = 4.0  # that an engine has to end its behaviours
 _GONE: Final = "The simulated engine was switched off."
 _DIED: Final = "The process of the simulated engine has died, and the engine with it."
 
-_COMMANDS: Final = frozenset({"start", "stop", "pause", "resume", "modify", "get"})
+_COMMANDS: Final = frozenset(
+    {"start", "stop", "pause", "resume", "modify", "get", "returned", "take_up"}
+)
 
 
 class Simulators:
@@ -80,9 +84,11 @@ class Simulators:
         script: str,
         clock_us: Callable[[], int],
         behaviours: BehaviourFolder | None = None,
+        led: frozenset[str] = frozenset(),
     ) -> "SimulatedLink":
-        """Return a link to a new simulated engine, whose process begins with its first start. Raise
-        TooMany if too many simulated engines are alive."""
+        """Return a link to a new simulated engine, whose process begins with its first start.
+        Actions with a full name in `led` are carried out elsewhere. Raise TooMany if too many
+        simulated engines are alive."""
         going = [each for each in self._links if each.is_alive]
         if len(going) >= MOST:
             raise TooMany(f"{MOST} simulated runs go on already; stop some, or wait.")
@@ -90,7 +96,7 @@ class Simulators:
         if behaviours is not None and with_behaviours >= MOST_WITH_BEHAVIOURS:
             most = MOST_WITH_BEHAVIOURS
             raise TooMany(f"{most} runs with behaviours go on already; stop some, or wait.")
-        link = SimulatedLink(_EngineConfig(facts, script, behaviours), clock_us, self.take)
+        link = SimulatedLink(_EngineConfig(facts, script, behaviours, led), clock_us, self.take)
         self._links.add(link)
         return link
 
@@ -108,6 +114,7 @@ class _EngineConfig(msgspec.Struct, frozen=True):
     facts: EngineFacts
     script: str
     behaviours: BehaviourFolder | None
+    led: frozenset[str] = frozenset()
 
 
 class SimulatedLink:
@@ -162,6 +169,19 @@ class SimulatedLink:
             if self._process is None and not self._why:
                 await self._begin()
             await self._request("start", order)
+
+    async def take_up(self, order: Order, course: LedCourse) -> None:
+        """Begin the process, and bring a graph to where an earlier engine had left it. Nothing of
+        that is reported except the calls that are still open. Raise NotSent if the process cannot
+        take it, EngineRefused if the engine refuses the graph."""
+        with anyio.CancelScope(shield=True):
+            await self._begin()
+            await self._request("take_up", order, course)
+
+    async def returned(self, returned: Returned) -> None:
+        """Take the end of a call that a robot carried out. Raise NotSent if the process has
+        ended."""
+        await self._request("returned", returned)
 
     async def stop(self, graph_name: str) -> None:
         """Tell the engine to stop a graph now."""
@@ -290,7 +310,7 @@ class SimulatedLink:
 
 def _born(theirs: socket.socket, made: _EngineConfig) -> Any:
     with theirs:
-        return child(_live, theirs, made, name="simulated engine", nice=_NICE)
+        return child(_live, theirs, made, name="simulated engine", nice=0 if made.led else _NICE)
 
 
 def _framed(value: object) -> bytes:
@@ -303,7 +323,7 @@ def _framed(value: object) -> bytes:
 
 def _live(wire: socket.socket, made: _EngineConfig) -> None:
     """Run one engine until the runner closes its end of the socket."""
-    performer = None
+    performer: BehaviourPerformer | LedCalls | None = LedCalls(made.led) if made.led else None
     if made.behaviours is not None:
         bound_address_space()
         performer = BehaviourPerformer(made.behaviours)
@@ -316,13 +336,13 @@ def _live(wire: socket.socket, made: _EngineConfig) -> None:
 
 
 async def _serve(
-    wire: socket.socket, made: _EngineConfig, performer: BehaviourPerformer | None
+    wire: socket.socket, made: _EngineConfig, performer: BehaviourPerformer | LedCalls | None
 ) -> None:
     reader, writer = await asyncio.open_connection(sock=wire)
     writer.transport.set_write_buffer_limits(high=_WAITING)
     engine = engine_of(made.facts, made.script, performer)
     link = SimulatorLink(engine, clock_us=utc_us, performer=performer)
-    if performer is not None:
+    if isinstance(performer, BehaviourPerformer):
         loop = asyncio.get_running_loop()
         performer.wake = partial(_woken, loop, link)
 

@@ -16,6 +16,7 @@ import msgspec
 from action_assistant.errors import Unavailable
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.behaviours.performer import BehaviourPerformer
+from action_assistant.runner.links.led_calls import LedCalls, LedCourse
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import (
     Exact,
@@ -29,6 +30,7 @@ from action_assistant.runner.links.observations import (
 from action_assistant.runner.links.parameter_texts import Values, values_of
 from action_assistant.runner.links.port import (
     Answer,
+    CallBegan,
     EngineChanged,
     EngineRefused,
     EngineState,
@@ -46,7 +48,7 @@ from action_assistant.umrf import semantics
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
-from action_assistant.umrf.semantics import Script
+from action_assistant.umrf.semantics import Returned, Script
 
 #: No simulated action is quicker: a loop of instant actions would never let go of the processor.
 _QUICKEST_S: Final = 0.01
@@ -54,6 +56,22 @@ _QUICKEST_S: Final = 0.01
 
 _GRAIN_MS: Final = 0.01  # what is due within this time is due now
 _SLICE: Final = 50  # engine steps between two turns of the event loop
+
+
+class LeadableLink(Link, Protocol):
+    """The link to an engine of this process's own, which can play a graph whose actions robots carry
+    out."""
+
+    async def returned(self, returned: Returned) -> None:
+        """Take the end of a call that a robot carried out. Raise NotSent if the engine cannot take
+        it."""
+        ...
+
+    async def take_up(self, order: Order, course: LedCourse) -> None:
+        """Start a graph and bring it to where an earlier engine had left it. Nothing of that is
+        reported except the calls that are still open. Raise EngineRefused or NotSent if that cannot
+        be done."""
+        ...
 
 
 class Simulator(Protocol):
@@ -65,9 +83,11 @@ class Simulator(Protocol):
         script: str,
         clock_us: Callable[[], int],
         behaviours: BehaviourFolder | None = None,
-    ) -> Link:
+        led: frozenset[str] = frozenset(),
+    ) -> "LeadableLink":
         """Return a link to an engine with these facts. Its actions follow the script (JSON; "" for
-        none), or their behaviour if they have one."""
+        none), or their behaviour if they have one. Actions with a full name in `led` are carried
+        out elsewhere."""
 
 
 def in_this_process(
@@ -75,16 +95,20 @@ def in_this_process(
     script: str,
     clock_us: Callable[[], int],
     behaviours: BehaviourFolder | None = None,
+    led: frozenset[str] = frozenset(),
 ) -> "SimulatorLink":
     """Return a simulated engine that shares the event loop, for tests in virtual time. Raises Unavailable for
     behaviours."""
     if behaviours is not None:
         raise Unavailable("Behaviours need a simulated engine in a process of its own.")
-    return SimulatorLink(engine_of(facts, script), clock_us=clock_us)
+    performer = LedCalls(led) if led else None
+    return SimulatorLink(
+        engine_of(facts, script, performer), clock_us=clock_us, performer=performer
+    )
 
 
 def engine_of(
-    facts: EngineFacts, script: str, performer: BehaviourPerformer | None = None
+    facts: EngineFacts, script: str, performer: BehaviourPerformer | LedCalls | None = None
 ) -> semantics.Engine:
     """Return an engine that follows a script (JSON), which has been checked before; "" for none."""
     chosen = slowed(semantics.script_from(msgspec.json.decode(script))) if script else None
@@ -102,7 +126,7 @@ class SimulatorLink:
         engine: semantics.Engine,
         *,
         clock_us: Callable[[], int],
-        performer: BehaviourPerformer | None = None,
+        performer: BehaviourPerformer | LedCalls | None = None,
     ) -> None:
         self._performer = performer
         self._engine = engine
@@ -172,6 +196,38 @@ class SimulatorLink:
             self._wake.set()
             raise EngineRefused(str(refused)) from refused
 
+    async def returned(self, returned: Returned) -> None:
+        """Take the end of a call that a robot carried out. Do nothing after a crash."""
+        if self._dead is None:
+            self._tell(self._engine.returned(returned, self._now()))
+
+    async def take_up(self, order: Order, course: LedCourse) -> None:
+        """Start a graph and bring it to where an earlier engine had left it. Nothing of that is
+        reported except the calls that are still open. Raise EngineRefused if the engine refuses the
+        graph."""
+        name = order.graph.name
+        self._runs[name] = order.run
+        self._engine.library = {**self._engine.library, **_inside(order)}
+        elapsed_us = max(0, self._clock_us() - course.began)
+        self._origin = anyio.current_time() - elapsed_us / 1e6
+        self._origin_wall = course.began
+        try:
+            self._engine.start(_whole(order), 0.0)
+        except semantics.GraphRefused as refused:
+            raise EngineRefused(str(refused)) from refused
+        over = {step.number for _, step in course.steps if isinstance(step, Returned)}
+        for at_ms, step in course.steps:
+            if isinstance(step, Returned):
+                self._engine.returned(step, at_ms)
+            else:
+                self._engine.stop(name, at_ms)
+        self._engine.advance(self._now())
+        self._wake.set()
+        for each in self._performer.news() if isinstance(self._performer, LedCalls) else ():
+            number = each.call.number if isinstance(each, CallBegan) else each.number
+            if number not in over:
+                self._subscribers.tell(each)
+
     async def get(self) -> Answer:
         """Return all graphs that the engine holds now. Raises NoAnswer, also while a behaviour is being killed,
         so that its action is not taken for ended."""
@@ -217,7 +273,7 @@ class SimulatorLink:
     async def aclose(self) -> None:
         """End the engine and its behaviours."""
         self._dead = "the simulated engine was switched off"
-        if self._performer is not None:
+        if isinstance(self._performer, BehaviourPerformer):
             await anyio.to_thread.run_sync(self._performer.end, abandon_on_cancel=True)
 
     def wake(self) -> None:
@@ -260,6 +316,9 @@ class SimulatorLink:
                 per_run.setdefault(run, []).append(seen)
         for run, changes in per_run.items():
             self._subscribers.tell(Transitions(run=run, changes=tuple(changes)))
+        if isinstance(self._performer, LedCalls):
+            for each in self._performer.news():
+                self._subscribers.tell(each)
         for trace in traces:
             if isinstance(trace, semantics.HazardEvent) and trace.effect in {"crash", "hang"}:
                 self._fail(trace)

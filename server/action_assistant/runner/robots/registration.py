@@ -10,7 +10,13 @@ from msgspec.structs import replace
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict
-from action_assistant.runner.links.port import SIMULATOR, EngineState, Generation, Registration
+from action_assistant.runner.links.port import (
+    CONDUCTED,
+    SIMULATOR,
+    EngineState,
+    Generation,
+    Registration,
+)
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.runs.views import time
 from action_assistant.umrf.facts import BadProfile, facts_of
@@ -39,6 +45,7 @@ class RobotRegistered(msgspec.Struct, frozen=True, kw_only=True):
     rmw: str
     get_service: str
     profile: dict[str, object]
+    led: bool = False
 
 
 class RobotRemoved(msgspec.Struct, frozen=True, kw_only=True):
@@ -78,6 +85,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     rmw: str = ""
     get_service: str = ""
     profile: dict[str, object] = {}
+    led: bool = False
     heard_at: datetime | None = None
     took_ms: float | None = None
     restarted_at: datetime | None = None
@@ -101,6 +109,8 @@ def check_registration(registration: Registration) -> None:
     Conflict if the name is that of the simulator."""
     if registration.name.lower() == SIMULATOR:
         raise Conflict("The simulator is always there; a robot needs a name of its own.")
+    if registration.name.lower() == CONDUCTED:
+        raise Conflict(f"“{CONDUCTED}” stands for runs of several robots; name this one otherwise.")
     if not _NAME.fullmatch(registration.name):
         raise BadInput(
             "A robot's name starts with a letter and has letters, digits, _ and - only, "

@@ -13,7 +13,9 @@ import msgspec
 from action_assistant.journal.events import BareEvent, Draft
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import Seen
+from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.laps import Laps
+from action_assistant.umrf.model import Precondition
 
 End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
 
@@ -56,6 +58,29 @@ class RunSubgraph(msgspec.Struct, frozen=True, omit_defaults=True):
     graph: str | None = None
 
 
+class Led(msgspec.Struct, frozen=True, kw_only=True):
+    """The robots of a conducted run. `robots`: the engine that plays each actor, "" being the actor
+    of actions that name none. `players`: the engine of each action, by full name. `lives`: the life of
+    each engine, as it was looked at before the start. `lost`: what
+    happens when a robot does not answer or its step fails, a Stop of everything or a wait for a
+    person. `together`: a person agreed that a robot may carry out two steps at once."""
+
+    robots: dict[str, str]
+    players: dict[str, str]
+    lives: dict[str, str] = {}
+    lost: Literal["stop", "wait"] = "stop"
+    together: bool = False
+
+
+class PieceOf(msgspec.Struct, frozen=True, kw_only=True):
+    """The place of a piece in its conducted run: the id of that run, the number of the call, and
+    the full name of the action."""
+
+    run: str
+    call: int
+    node: str
+
+
 class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A person asked for a start and it was accepted. Stored before anything is sent."""
 
@@ -84,6 +109,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     behaviours: bool = False  # whether the simulator had Python behaviours
     subgraphs: tuple[RunSubgraph, ...] = ()  # all graphs inside, by value
     tree_digest: str | None = None  # of the graph together with them; None: nobody told
+    led: Led | None = None  # of a conducted run
+    piece: PieceOf | None = None  # of a piece, which is no run of its own for people
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -276,6 +303,73 @@ class MovesAgain(msgspec.Struct, frozen=True):
     text: str
 
 
+class PieceBegan(msgspec.Struct, frozen=True, kw_only=True):
+    """A piece of a conducted run is about to be sent to a robot. Stored before it is sent; its own
+    stream, that of the run `piece`, says whether it left. A call whose piece certainly has not left
+    may get another one."""
+
+    kind: ClassVar[str] = "run.piece_began.v1"
+
+    at: int
+    call: int
+    node: str
+    engine: str
+    piece: str
+
+
+class PieceSeen(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """The robot that plays an action of a conducted run shows it in another state. `visit`: its
+    visit with the bounds that the observations of the robot allow; None before it was seen running
+    or over. `messages`: its newest messages."""
+
+    kind: ClassVar[str] = "run.piece_seen.v1"
+
+    at: int
+    call: int
+    node: str
+    state: str
+    visit: Visit | None = None
+    messages: tuple[str, ...] = ()
+
+
+class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """A call of a conducted run has its outcome. `how`: by the states of the piece in an answer that
+    was asked for after its end, by the word of a person, or because nothing of it was ever sent.
+    `hash`: the SHA-256 of that answer."""
+
+    kind: ClassVar[str] = "run.piece_ended.v1"
+
+    at: int
+    call: int
+    node: str
+    outcome: Precondition
+    how: Literal["shape", "word", "unsent"]
+    piece: str = ""
+    hash: str = ""
+    by: Author | None = None
+    reason: str = ""
+
+
+class Held(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """No further piece of a conducted run begins until a person lets it go on. `by`: None where the
+    runner itself holds it; `why`: the reason, as a sentence."""
+
+    kind: ClassVar[str] = "run.held.v1"
+
+    at: int
+    why: str
+    by: Author | None = None
+
+
+class Released(msgspec.Struct, frozen=True, kw_only=True):
+    """A person let a held run go on."""
+
+    kind: ClassVar[str] = "run.released.v1"
+
+    at: int
+    author: Author
+
+
 class Unknown(msgspec.Struct, frozen=True):
     """An event of a kind that this version does not know. It is kept and skipped."""
 
@@ -301,6 +395,11 @@ RunEvent: TypeAlias = (
     | Loading
     | Ended
     | MovesAgain
+    | PieceBegan
+    | PieceSeen
+    | PieceEnded
+    | Held
+    | Released
     | Unknown
 )
 
@@ -326,6 +425,11 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
         Loading,
         Ended,
         MovesAgain,
+        PieceBegan,
+        PieceSeen,
+        PieceEnded,
+        Held,
+        Released,
     )
 }
 
@@ -364,7 +468,7 @@ def decode(kind: str, body: bytes) -> RunEvent:
 
 #: Fields of events that are for programs, or too large to be read; people may search all other texts.
 _NOT_SEARCHED: Final = frozenset({
-    "actions", "address", "aid", "at", "by", "digest", "graph", "group", "hash", "id", "incarnation", "inner_laps",
+    "actions", "address", "aid", "at", "by", "digest", "piece", "graph", "group", "hash", "id", "incarnation", "inner_laps",
     "laps", "path", "process", "request_id", "run", "script", "stop_id", "subgraphs", "tree_digest", "type", "umrf",
     "version",
 })  # fmt: skip

@@ -26,14 +26,19 @@ from action_assistant.runner.runs.events import (
     Answered,
     Ended,
     EngineSaid,
+    Held,
     Loading,
     ModifyRefused,
     ModifyRequested,
     MovesAgain,
     Observed,
     PauseRequested,
+    PieceBegan,
+    PieceEnded,
+    PieceSeen,
     Proof,
     Published,
+    Released,
     Requested,
     ResumeRequested,
     RunEvent,
@@ -49,6 +54,8 @@ from action_assistant.runner.runs.visits import (
     ActionRun,
     Message,
     SnapshotEvidence,
+    after_outcome,
+    after_piece,
     after_result,
     after_snapshot,
     after_transition,
@@ -87,13 +94,16 @@ def replay(events: Iterable[RunEvent], run: Run | None = None) -> Run | None:
 def begin(event: Requested) -> Run:
     """Return the run after its first event."""
     known = event.laps if event.laps is not None else _laps(event.umrf)
+    players = event.led.players if event.led is not None else {}
     once, joined = frozenset(known.once), frozenset(known.barring_errors)
     return Run(
         **{name: getattr(event, name) for name in _AS_REQUESTED},
         id=event.run,
         requested_at=event.at,
         actions={
-            name: ActionRun(aid=aid, once=name in once, joined=name in joined)
+            name: ActionRun(
+                aid=aid, once=name in once, joined=name in joined, robot=players.get(name, "")
+            )
             for name, aid in event.actions.items()
         },
         inner=event.inner_laps,
@@ -152,6 +162,17 @@ def follow(run: Run, event: RunEvent) -> Run:
             return replace(run, loading=event.why, loading_since=since)
         case Ended():
             return _end(run, event)
+        case PieceSeen():
+            return _piece_seen(run, event)
+        case Held():
+            return replace(run, held=event)
+        case Released():
+            return replace(run, held=None)
+        case PieceEnded():
+            return _piece_ended(run, event)
+        case PieceBegan():
+            action = replace(run.actions.get(event.node, _UNSEEN), piece=event.piece)
+            return replace(run, actions=run.actions | {event.node: action})
         case Requested() | Unknown():
             return run
         case _:
@@ -335,6 +356,26 @@ def _end(run: Run, event: Ended) -> Run:
         moves_again_at=None,
         unknown_since=run.unknown_since if event.state == "lost" else None,
     )
+
+
+def _piece_seen(run: Run, event: PieceSeen) -> Run:
+    """Fold what a robot shows of an action that it plays in a conducted run. Each call is one visit,
+    whose bounds the piece's own run has found."""
+    known = run.actions.get(event.node, _UNSEEN)
+    action = after_piece(known, event.call, event.state, event.visit, event.at)
+    action = with_messages(action, event.messages, event.at)
+    return _timed(replace(run, actions=run.actions | {event.node: action}), event.at, event.at)
+
+
+def _piece_ended(run: Run, event: PieceEnded) -> Run:
+    """Fold the outcome of a call of a conducted run."""
+    action = after_outcome(
+        run.actions.get(event.node, _UNSEEN),
+        event.call,
+        event.outcome,
+        "inferred" if event.how == "word" else "observed",
+    )
+    return replace(run, actions=run.actions | {event.node: action})
 
 
 def observe(run: Run, seen: Iterable[Seen]) -> Run:

@@ -42,8 +42,9 @@ def of_run(run_id: str) -> Select[Any]:
 
 
 def by_request(request_id: str) -> Select[Any]:
-    """Return the query for the run that a request has become: id, digest, engine, tree_digest."""
-    fields = (run.c.id, run.c.digest, run.c.engine, run.c.tree_digest)
+    """Return the query for the run that a request has become: id, digest, engine, tree_digest,
+    summary."""
+    fields = (run.c.id, run.c.digest, run.c.engine, run.c.tree_digest, run.c.summary)
     return select(*fields).where(run.c.request_id == request_id)
 
 

@@ -6,7 +6,16 @@ import msgspec
 
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import ACTIVE, TERMINAL
-from action_assistant.runner.runs.events import AtRest, Author, End, Overridden, Override
+from action_assistant.runner.runs.events import (
+    AtRest,
+    Author,
+    End,
+    Held,
+    Led,
+    Overridden,
+    Override,
+    PieceOf,
+)
 from action_assistant.runner.runs.visits import ActionRun, Message
 from action_assistant.umrf.laps import Laps
 
@@ -76,6 +85,9 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     group: str | None = None
     like: str | None = None
     behaviours: bool = False
+    led: Led | None = None  # of a conducted run
+    piece: PieceOf | None = None  # of a piece of one
+    held: Held | None = None  # why a conducted run begins nothing further
     desired: Desired = "running"
     incarnation: str | None = None  # None: nothing has been sent, as far as is known
     process: EngineProcess | None = None  # of the engine, where it can be seen to end
@@ -139,7 +151,11 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def robots(self) -> tuple[str, ...]:
         """The robots that the run keeps for itself from its request until it is proven over."""
-        return () if self.simulated else (self.engine,)
+        if self.simulated:
+            return ()
+        if self.led is None:
+            return (self.engine,)
+        return tuple(sorted(set(self.led.players.values())))
 
     @property
     def doubt(self) -> str:

@@ -63,7 +63,8 @@ class MessageShown(msgspec.Struct, frozen=True):
 
 class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
     """One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
-    may have been missed. `visits` are the newest ones; `older`: how many are not listed."""
+    may have been missed. `visits` are the newest ones; `older`: how many are not listed. `robot`:
+    the engine that plays it in a conducted run; `piece`: the id of the run of its newest piece."""
 
     aid: str | None
     state: str
@@ -72,6 +73,8 @@ class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
     messages: list[MessageShown]
     count: int = 0
     at_least: bool = False
+    robot: str = ""
+    piece: str = ""
 
 
 class AlarmShown(msgspec.Struct, frozen=True):
@@ -94,9 +97,23 @@ class AtRestShown(msgspec.Struct, frozen=True):
     how: str
 
 
+class HeldShown(msgspec.Struct, frozen=True):
+    """The hold of a conducted run, which begins nothing further: by whom (null: by the runner), why, and
+    since when."""
+
+    by: Author | None
+    why: str
+    since: datetime
+
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
+
+
 class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     """A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
-    more, which is before the proof at `ended_at`; null if unknown."""
+    more, which is before the proof at `ended_at`; null if unknown. `robots`: of a conducted run, the
+    engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
+    further."""
 
     id: str
     number: int
@@ -124,6 +141,8 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     detail: str
     alarms: list[AlarmShown]
     recorded: bool
+    robots: dict[str, str] | None = None
+    held: HeldShown | None = None
 
     def __post_init__(self) -> None:
         hold_names(self, "unconfirmed", "detail")
@@ -276,6 +295,7 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
             AlarmShown(each["code"], time(each["at"]), each["text"]) for each in more["alarms"]
         ],
         recorded=True,
+        robots=more.get("robots"),
     )
 
 
@@ -335,7 +355,14 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "detail": run.detail or run.lost or run.doubt,
         "alarms": [AlarmShown(each.code, time(each.at), each.text) for each in run.alarms],
         "recorded": recorded,
+        "robots": None if run.led is None else run.led.robots,
+        "held": _held(run),
     }
+
+
+def _held(run: Run) -> HeldShown | None:
+    held = run.held
+    return None if held is None else HeldShown(held.by, held.why, time(held.at))
 
 
 def _at_rest(seen: AtRest | None) -> AtRestShown | None:
@@ -373,7 +400,15 @@ def _action_view(action: ActionRun, most: int, count: VisitCount) -> ActionShown
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]
     older = action.older + len(action.visits) - len(visits)
     return ActionShown(
-        action.aid, action.state, visits, older, messages, count.least, count.at_least
+        action.aid,
+        action.state,
+        visits,
+        older,
+        messages,
+        count.least,
+        count.at_least,
+        action.robot,
+        action.piece,
     )
 
 

@@ -164,7 +164,9 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     `changed_at`: what showed the present state first ("" for a transition), and when that came.
     `held`: it may have been paused during the visit. `joined`: it runs once unless an action fails.
     `doubted`: the present state is of feedback that may be older than the last answer; it may
-    contradict `visits` until the next one. `answers`, `feedback`: the changes that each has shown.
+    contradict `visits` until the next one. `call`: the number of the call that the last visit is,
+    in a conducted run; `robot`: the engine that plays the action there; `piece`: the id of its newest
+    piece. `answers`, `feedback`: the changes that each has shown.
     """
 
     aid: str | None = None
@@ -183,6 +185,9 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     held: bool = False
     rests: RestEvidence = RestEvidence()
     doubted: bool = False
+    call: int = 0
+    robot: str = ""
+    piece: str = ""
     answers: Changes = Changes()
     feedback: tuple[Changes, ...] = ()
 
@@ -237,6 +242,40 @@ def after_result(action: ActionRun, item: NodeResult) -> ActionRun:
     if item.message is not None:
         messages = _and(messages[1 - KEPT :], Message(item.at, item.message))
     return replace(action, visits=visits, messages=messages)
+
+
+def after_piece(
+    action: ActionRun, call: int, state: str, visit: Visit | None, at: int
+) -> ActionRun:
+    """Return an action of a conducted run after its robot showed another state of the call with this
+    number. `visit`: that call, None as long as nothing of it was seen."""
+    visits, older = action.visits, action.older
+    if visit is not None and action.call == call:
+        visits = _and(visits[:-1], visit)
+    elif visit is not None:
+        visits, older = _kept(visits, older, visit)
+    return replace(
+        action,
+        state=state,
+        seen_at=at,
+        visits=visits,
+        older=older,
+        call=call if visit is not None else action.call,
+        heard=0 if visit is not None and action.call != call else action.heard,
+        by="",
+        changed_at=at,
+    )
+
+
+def after_outcome(action: ActionRun, call: int, outcome: str, how: How) -> ActionRun:
+    """Return an action of a conducted run after the call with this number has an outcome. `how`: by
+    an answer of its robot, or else."""
+    if action.call != call or not action.visits:  # nothing of it was ever seen
+        return action
+    last = action.visits[-1]
+    known = how if last.how == "observed" else last.how
+    ended = replace(last, result=_OUTCOMES.get(outcome), how=known)
+    return replace(action, visits=_and(action.visits[:-1], ended))
 
 
 def with_possible_pause(action: ActionRun) -> ActionRun:

@@ -2,13 +2,14 @@
 Pure."""
 
 import re
-from collections.abc import Sequence
-from typing import Annotated, Final, TypeVar
+from collections.abc import Collection, Mapping, Sequence
+from datetime import datetime
+from typing import Annotated, Final, Literal, TypeVar
 
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, TooLarge
-from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.links.simulator import slowed
 from action_assistant.runner.runs.events import Override, RunSubgraph
 from action_assistant.runner.runs.sent_graphs import (
@@ -20,11 +21,14 @@ from action_assistant.runner.runs.sent_graphs import (
     tree_of,
 )
 from action_assistant.umrf.check import blocking, check, forbids_start, is_final
+from action_assistant.umrf.checks.actors import led_problems
 from action_assistant.umrf.digest import digest
-from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.json.text import pointer
 from action_assistant.umrf.laps import Laps, laps
-from action_assistant.umrf.model import Graph, Problem
+from action_assistant.umrf.model import Action, Graph, Problem
+from action_assistant.umrf.pieces import obstacles, performers, piece_name, piece_of
 from action_assistant.umrf.run_size import RunSize, excess
 from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 
@@ -44,7 +48,8 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     intended start. `like`: the robot whose engine the simulator plays, with its hazards.
     `behaviours`: actions with a Python behaviour on the runner do what that does, before what the
     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
-    the digest of the graph together with them.
+    the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
+    of each actor ("" for actions without one); `lost`: see `Led`.
     """
 
     version: str
@@ -59,6 +64,24 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     behaviours: bool = False
     subgraphs: tuple[SentSubgraph, ...] = ()
     tree_digest: str | None = None
+    robots: dict[str, str] = {}
+    lost: Literal["stop", "wait"] = "stop"
+
+
+class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Lets a held run go on. `since`: the `since` of `held`, as the person saw it; a run that has gone
+    on meanwhile has another one."""
+
+    since: datetime
+
+
+class WordRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The outcome of an action in a conducted run by the word of a person, with the reason. `action`:
+    its full name."""
+
+    action: str
+    outcome: Literal["true", "false", "error"]
+    reason: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
 
 
 class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -76,6 +99,8 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     behaviours: bool = False
     subgraphs: tuple[SentSubgraph, ...] = ()
     tree_digest: str | None = None
+    robots: dict[str, str] = {}
+    lost: Literal["stop", "wait"] = "stop"
 
     def for_engine(self, engine: str) -> StartRequest:
         """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
@@ -91,6 +116,8 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             behaviours=self.behaviours and engine == SIMULATOR,
             subgraphs=self.subgraphs,
             tree_digest=self.tree_digest,
+            robots=self.robots if engine == CONDUCTED else {},
+            lost=self.lost,
         )
 
 
@@ -267,3 +294,113 @@ def _placed(text: str) -> tuple[str, dict[str, object] | None]:
         return text, None
     path = re.sub(r"\[(\d+)\]", r"/\1", place.rstrip("`").replace(".", "/").replace("[...]", ""))
     return message, {"path": path}
+
+
+class PieceText(msgspec.Struct, frozen=True):
+    """The text of a piece, in parts between which the id of its run stands."""
+
+    parts: tuple[str, ...]
+
+    def for_run(self, run: str) -> str:
+        """Return the text with the id of this run."""
+        return run.join(self.parts)
+
+
+class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
+    """An admitted start of a conducted run: the whole graph, and what robots get of it.
+
+    `players`: the robot of each action that a robot plays, by full name; `texts`: the pieces;
+    `by_robot`: all actions of a robot as one graph without arrows, which is looked at
+    before the start and never sent. `problems`: what leading the graph means.
+    """
+
+    whole: Prepared
+    players: dict[str, str]
+    texts: dict[str, PieceText]
+    by_robot: dict[str, Prepared]
+    problems: tuple[Problem, ...]
+
+
+def prepared_pieces(
+    request: StartRequest, facts: EngineFacts, run: str, *, approved: bool = True
+) -> PreparedPieces:
+    """Admit the start of a conducted run and write the texts of its pieces. For workers. Raises what
+    `admit` raises, BadInput for an actor without a robot or a robot without an actor, Conflict for a
+    graph that cannot run as pieces."""
+    whole = prepared(request, facts, run, approved=approved)
+    graph = codec.read(whole.umrf).graph
+    actors = performers(graph)
+    _check_robots(request.robots, actors)
+    hindering = obstacles(graph, {each.name for each in whole.subgraphs})
+    if hindering:
+        more = f" (and {len(hindering) - 1} more)" if len(hindering) > 1 else ""
+        raise Conflict(
+            f"{hindering[0].text}{more}",
+            where={"path": "/umrf", "obstacles": msgspec.to_builtins(hindering[:_MOST_SHOWN])},
+        )
+    players = {
+        action.full_name: request.robots[actor]
+        for actor, actions in actors.items()
+        for action in actions
+    }
+    by_robot: dict[str, list[Action]] = {}
+    for actor, actions in actors.items():
+        if request.robots[actor] != SIMULATOR:
+            by_robot.setdefault(request.robots[actor], []).extend(actions)
+    return PreparedPieces(
+        whole=whole,
+        players={name: robot for name, robot in players.items() if robot != SIMULATOR},
+        texts=_texts_of(graph, codec.Stamp(whole.graph_id, request.version, run)),
+        by_robot={
+            robot: msgspec.structs.replace(
+                whole,
+                name=piece_name(graph.name, robot),
+                umrf=codec.write(
+                    Graph(
+                        name=piece_name(graph.name, robot),
+                        actions=tuple(msgspec.structs.replace(each, actor="") for each in actions),
+                    )
+                ),
+                actions={each.full_name: each.key for each in actions},
+            )
+            for robot, actions in by_robot.items()
+        },
+        problems=tuple(_led_problems(graph, request.robots)),
+    )
+
+
+def _check_robots(robots: Mapping[str, str], actors: Collection[str]) -> None:
+    """Raise BadInput unless exactly the actors of the graph have a robot."""
+    for actor in sorted(actors):
+        if not robots.get(actor):
+            who = f"{actor}'s actions" if actor else "the actions without an actor"
+            raise BadInput(f"Say which robot plays {who}.", where={"path": "/robots"})
+    for actor in sorted(robots):
+        if actor not in actors:
+            who = f"no action of {actor}" if actor else "no action without an actor"
+            raise BadInput(f"The graph has {who}.", where={"path": pointer("robots", actor)})
+
+
+def _led_problems(graph: Graph, robots: Mapping[str, str]) -> list[Problem]:
+    """Return what leading a graph means on these robots. Two actors on one robot count as one."""
+    placed = tuple(
+        msgspec.structs.replace(each, actor=robots.get(each.actor, each.actor))
+        for each in graph.actions
+    )
+    return led_problems(msgspec.structs.replace(graph, actions=placed), PINNED)
+
+
+def piece_texts(umrf: str) -> dict[str, PieceText]:
+    """Return the pieces of a graph as it was sent, by full name of their action. For workers."""
+    return _texts_of(codec.read(umrf).graph, codec.stamp_of(umrf))
+
+
+def _texts_of(graph: Graph, stamp: codec.Stamp) -> dict[str, PieceText]:
+    texts: dict[str, PieceText] = {}
+    for action in graph.actions:
+        if not action.missing:
+            text = codec.write(piece_of(graph, action), stamp)
+            texts[action.full_name] = PieceText(
+                tuple(text.split(stamp.run)) if stamp.run else (text,)
+            )
+    return texts

@@ -72,7 +72,9 @@ class IdempotentStarts:
             return None
         row = rows[0]
         other_tree = request.tree_digest and row.tree_digest not in {None, request.tree_digest}
-        if (row.digest, row.engine) != (request.digest, request.engine) or other_tree:
+        other_robots = request.robots != row.summary.get("robots", {})
+        other = (row.digest, row.engine) != (request.digest, request.engine)
+        if other or other_tree or other_robots:
             raise Conflict(
                 "This request_id belongs to another start.", where={"path": "/request_id"}
             )

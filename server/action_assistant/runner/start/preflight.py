@@ -31,7 +31,7 @@ from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.robots.engine import EngineIndex, foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import graphs_in
-from action_assistant.runner.start.admission import Admitted, Prepared
+from action_assistant.runner.start.admission import Admitted, Prepared, PreparedPieces
 from action_assistant.runner.start.built_libraries import older_libraries
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.check import check, forbids_start, is_final
@@ -48,6 +48,13 @@ _INDEX_CODES: Final = frozenset(
 )
 #: Codes that cannot be overridden: the engine refuses such a graph in any case.
 _NEVER_TAKEN: Final = frozenset({"recursion", "subgraph-twice"})
+#: What leading a graph step by step means: by code of its problems, whether a person has to accept it, and
+#: what the start does then.
+_LED: Final[tuple[tuple[str, Verdict, str], ...]] = (
+    ("two-at-once", "blocked", "Accept that, or let one robot do one thing at a time."),
+    ("stop-across", "blocked", ""),
+    ("loaded-anew", "warned", ""),
+)
 _SHOWN: Final = 20  # problems of one item
 _NAMED: Final = 3  # names in one sentence
 
@@ -201,6 +208,28 @@ def _is_only_loading(run: Run) -> bool:
     loading."""
     is_known = run.unknown_since is None and not run.lost and not run.unconfirmed
     return bool(run.loading) and is_known and not run.active
+
+
+def led_items(ready: PreparedPieces) -> tuple[Item, ...]:
+    """Return the items about a graph that is led step by step: they warn of what differs from handing
+    it over as a whole."""
+    found: list[Item] = []
+    for code, verdict, text in _LED:
+        problems = tuple(each for each in ready.problems if each.code == code)
+        if problems:
+            found.append(
+                Item(
+                    code=code,
+                    verdict=verdict,
+                    text=f"{problems[0].message} {text}".rstrip()
+                    if len(problems) == 1
+                    else f"{problems[0].message} (and {len(problems) - 1} more) {text}".rstrip(),
+                    codes=(code,) if verdict == "blocked" else (),
+                    overridable=verdict == "blocked",
+                    problems=problems[:_SHOWN],
+                )
+            )
+    return tuple(found)
 
 
 def answer_item(view: EngineView) -> Item:
@@ -445,8 +474,7 @@ def _actors(view: EngineView, graphs: Collection[Graph]) -> Item:
         return Item(code="actors", verdict="passed", text=f"The actions are {view.name}'s to do.")
     text = (
         f"Actions belong to {', '.join(foreign)}, not to {view.name}, and its engine cannot "
-        "synchronise with others: it refuses the graph. A graph of several robots cannot be started on "
-        "robots yet; the simulator plays it."
+        "synchronise with others: it refuses the graph. The runner can lead several robots through it."
     )
     return Item(code="actors", verdict="blocked", text=text, codes=("actors",), overridable=True)
 

@@ -13,8 +13,9 @@ import msgspec
 from action_assistant.umrf.checks.concurrency import Concurrency
 from action_assistant.umrf.checks.flow import Reachability
 from action_assistant.umrf.checks.places import Subject, joined, more
-from action_assistant.umrf.checks.subgraphs import SubGraphs, at_action, place_inside
+from action_assistant.umrf.checks.subgraphs import Resolution, SubGraphs, at_action, place_inside
 from action_assistant.umrf.components import Mask, nodes_in, reachable
+from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.laps import repeated
 from action_assistant.umrf.model import (
     ENTRY,
@@ -25,6 +26,7 @@ from action_assistant.umrf.model import (
     Key,
     PlaceInside,
     Precondition,
+    Problem,
     Relation,
 )
 from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
@@ -75,11 +77,19 @@ def check_actors(subject: Subject, graphs: SubGraphs) -> None:
         return
     message = (
         f"The actions belong to {len(named)} actors ({joined(named)}). Checks, dry-runs and the simulator "
-        "play this graph, but it cannot be started on robots yet: one engine cannot synchronise with "
-        "others and refuses it, and the runner does not lead several robots so far."
+        "play this graph. One robot cannot be given it, since its engine cannot synchronise with others; the "
+        "runner can lead several robots through it, step by step."
     )
     subject.report("actors", "warning", message)
     _LedGraph(graphs).check(subject, "", 0)
+
+
+def led_problems(graph: Graph, facts: EngineFacts) -> list[Problem]:
+    """Return what leading a graph step by step means, with the robot of each action as its actor. The
+    graph has no sub-graphs; it may have only one robot."""
+    subject = Subject(graph, facts)
+    _LedGraph(SubGraphs({}, (), Resolution())).check(subject, "", 0)
+    return subject.problems
 
 
 class _LedGraph:

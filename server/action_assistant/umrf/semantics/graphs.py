@@ -80,7 +80,7 @@ class Graphs(Core):
         running = Running(name, graph, above, home)
         behaviours = {
             a.key: (PERFORMED,)
-            if self._performed.performs(a.name)
+            if self._performed.performs(a)
             else self.script.calls_of(name, graph.name, a.full_name, a.name)
             for a in graph.actions
         }

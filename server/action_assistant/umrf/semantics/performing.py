@@ -8,6 +8,7 @@ from typing import Any, Final, Protocol
 
 import msgspec
 
+from action_assistant.umrf.model import Action
 from action_assistant.umrf.semantics.parts import Execution, Node, Running
 from action_assistant.umrf.semantics.script import Behaviour
 from action_assistant.umrf.semantics.values import Opaque
@@ -48,9 +49,8 @@ class Returned(msgspec.Struct, frozen=True, kw_only=True):
 class Performer(Protocol):
     """Carries out calls beside the engine. No method waits."""
 
-    def performs(self, name: str) -> bool:
-        """Return whether this performer carries out actions of this name, rather than the
-        script."""
+    def performs(self, action: Action) -> bool:
+        """Return whether this performer carries out this action, rather than the script."""
 
     def begin(self, call: Call) -> None:
         """Begin to carry out a call."""
@@ -81,9 +81,9 @@ class PerformedCalls:
         self._going: dict[int, tuple[Running, Node, Execution]] = {}
         self._newest = 0
 
-    def performs(self, name: str) -> bool:
-        """Return whether actions of this name are performed."""
-        return self._performer is not None and self._performer.performs(name)
+    def performs(self, action: Action) -> bool:
+        """Return whether this action is performed."""
+        return self._performer is not None and self._performer.performs(action)
 
     def begin(self, graph: Running, node: Node) -> None:
         """Begin a call of the action's code with its current inputs."""

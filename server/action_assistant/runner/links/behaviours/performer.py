@@ -10,6 +10,7 @@ from typing import Final
 
 from action_assistant.runner.links.behaviours.call_process import CallProcess
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
+from action_assistant.umrf.model import Action
 from action_assistant.umrf.semantics import Call, Returned
 
 log: Final = logging.getLogger(__name__)
@@ -50,9 +51,9 @@ class BehaviourPerformer:
         with self._lock:
             return bool(self._given_up)
 
-    def performs(self, name: str) -> bool:
+    def performs(self, action: Action) -> bool:
         """Return whether a file for actions of this name exists, usable or not."""
-        return self._folder.has(name)
+        return self._folder.has(action.name)
 
     def begin(self, call: Call) -> None:
         """Start the process of a call, on a thread of its own. A call that cannot be started ends with an error."""

@@ -1,0 +1,109 @@
+"""The steps of a conducted run, and the gate before them."""
+
+from collections.abc import Awaitable, Callable
+
+import anyio
+import msgspec
+
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.runs.events import Author, Held, RunEvent
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun
+from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.semantics import Call
+
+
+class Leading(msgspec.Struct, frozen=True, kw_only=True):
+    """The run that a conductor leads, as far as it needs it: `tell` shows and records an event, `stored` waits until all
+    told events are in the journal, `stop` begins a Stop of the whole run."""
+
+    tell: Callable[[RunEvent], None]
+    stored: Callable[[], Awaitable[None]]
+    stop: Callable[[Author], None]
+
+
+class Word(msgspec.Struct, frozen=True, kw_only=True):
+    """The outcome of an action by the word of a person, where no answer tells it."""
+
+    outcome: Precondition
+    by: Author
+    reason: str
+
+
+class Step:
+    """One call of an action that a robot carries out, until the engine has its outcome."""
+
+    def __init__(self, call: Call, engine: str) -> None:
+        self.call = call
+        self.engine = engine
+        self.piece: OpenRun | None = None
+        self.run: Run | None = None  # of its piece, as it is now
+        self.shown: ActionRun | None = None  # as it was passed on last
+        self.is_stopped = False  # the graph or a person wants it to end
+        self.has_not_left = False  # its piece was refused before it left, or by its robot
+        self.lacks_output = False
+        self.troubles: set[str] = set()  # those that were told
+        self.alarms: set[tuple[str, str]] = set()  # those of its piece that were passed on
+        self.word: Word | None = None
+        self.decided = anyio.Event()  # it is to end, or a person has given its outcome
+        self.over = anyio.Event()  # its piece has ended
+        self._waiting = anyio.CancelScope()  # while nothing was sent
+
+    @property
+    def node(self) -> str:
+        """The full name of its action."""
+        return self.call.node
+
+    @property
+    def is_open(self) -> bool:
+        """True while its piece may move: it was handed over and is not proven at rest."""
+        return self.run is not None and self.run.end is None
+
+    def waiting(self) -> anyio.CancelScope:
+        """Return a scope that is cancelled when the step is to end."""
+        self._waiting = anyio.CancelScope()
+        return self._waiting
+
+    def end(self) -> None:
+        """Let the step end; whatever waits to send its piece is cancelled."""
+        self.is_stopped = True
+        self.decided.set()
+        self._waiting.cancel()
+
+    def renew(self) -> None:
+        """Forget a piece that has not left, so that another one can be sent."""
+        self.piece, self.run, self.shown, self.has_not_left = None, None, None, False
+        self.over = anyio.Event()
+
+
+class Gate:
+    """Decides whether a further piece may begin. `held`: why none may; `is_final`: none ever will."""
+
+    def __init__(self, held: Held | None = None) -> None:
+        self.held = held
+        self.is_final = False
+        self._opened = anyio.Event()
+
+    @property
+    def is_open(self) -> bool:
+        """True if a piece may begin now."""
+        return self.held is None and not self.is_final
+
+    def close(self) -> None:
+        """Close the gate for good."""
+        self.is_final = True
+
+    def hold(self, held: Held) -> None:
+        """Hold all pieces that have not begun."""
+        self.held = held
+
+    def release(self) -> None:
+        """Let the pieces go on, unless the gate is closed for good."""
+        self.held = None
+        self._opened.set()
+        self._opened = anyio.Event()
+
+    async def wait(self) -> None:
+        """Wait until the gate is open."""
+        while not self.is_open:
+            await self._opened.wait()

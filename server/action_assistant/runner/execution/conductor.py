@@ -1,0 +1,698 @@
+"""Leads one run on several robots: plays the whole graph, and sends each robot one action at a time.
+
+The engine of the whole graph (`LeadableLink`) says which action begins and which one has to stop; it
+moves nothing. For each action that begins, the conductor sends a piece, a graph of that action
+alone, to the robot that plays it. A piece is a run like any other (`OpenRun`), with its own stream,
+monitor, Stop and proof. Its states tell the outcome, which goes back to the engine.
+
+The run sees the conductor as its link: it is started, stopped and asked like an engine. A graph that
+has ended is shown as such only when no piece is open, so that the proof of rest of the run is made of
+those of its pieces.
+
+Nothing begins while the gate is closed. It is looked at in the same step of the event loop in which a
+start message leaves. A Stop closes it for good before any stop message leaves.
+"""
+
+import logging
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, ExitStack, suppress
+from typing import Final, Literal
+
+import anyio
+import msgspec
+from anyio.abc import TaskGroup
+
+from action_assistant.errors import Conflict, Refused
+from action_assistant.kit.clock import ClockUs
+from action_assistant.runner.execution.conducted_steps import Gate, Leading, Step, Word
+from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
+from action_assistant.runner.links.led_calls import LedCourse
+from action_assistant.runner.links.listeners import Listeners
+from action_assistant.runner.links.observations import (
+    ACTIVE,
+    TERMINAL,
+    Exact,
+    GraphResult,
+    GraphState,
+    NodeResult,
+    NodeState,
+    Snapshot,
+)
+from action_assistant.runner.links.port import (
+    Answer,
+    CallBegan,
+    CallStopped,
+    EngineChanged,
+    EngineRefused,
+    GraphOutline,
+    Leaves,
+    NoAnswer,
+    NotSent,
+    Order,
+    Report,
+    Standing,
+    Transitions,
+    unwatched,
+)
+from action_assistant.runner.links.simulator import LeadableLink
+from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import (
+    AlarmRaised,
+    Author,
+    Held,
+    PieceBegan,
+    PieceEnded,
+    PieceOf,
+    PieceSeen,
+    Released,
+    Requested,
+)
+from action_assistant.runner.runs.recorder import RunRecorder
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.visits import ActionRun
+from action_assistant.runner.start.admission import PieceText
+from action_assistant.runner.start.idempotency import IdempotentStarts
+from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.umrf.facts import SIMULATED
+from action_assistant.umrf.laps import Laps
+from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.pieces import outcome_of, piece_name
+from action_assistant.umrf.semantics import Returned
+
+log: Final = logging.getLogger(__name__)
+
+_GET_S: Final = 2.0  # before a piece leaves, its robot has to answer within this time
+_FRESH_S: Final = 3.0  # for which a look at a robot counts
+_TICK_S: Final = 0.5
+_STALL_S: Final = 3.0  # for which nothing may have stood still before a piece leaves
+_MOST_ENGINES: Final = 3  # that are begun for one run after the first
+_UNSET_S: Final = 1.0  # a piece whose action has ended and whose graph goes on lacks an output
+_FOREIGN: Final = frozenset({"foreign_start", "foreign_stop", "foreign_pause", "foreign_modify"})
+#: Facts of the engine that plays the whole graph: only a proof ends what a robot does.
+CONDUCTED_FACTS: Final = msgspec.structs.replace(
+    SIMULATED, synchronises=True, stop_timeout_ms=10**12
+)
+#: Who stops an action in the name of the graph: an arrow of it, or its end.
+GRAPH: Final = Author("graph", "the graph itself", "program")
+#: Who stops a conducted run whose robot is lost, as the starter has chosen.
+RUNNER: Final = Author("runner", "the runner", "program")
+
+
+class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
+    """A conducted run that an earlier process left: its start, how far it got, how many pieces it had
+    sent, and those of calls without an outcome, by number of the call, each with the seq of its last
+    event."""
+
+    order: Order
+    course: LedCourse
+    sent: int
+    pieces: dict[int, tuple[Run, int]]
+
+
+class Conductor:
+    """The link of a conducted run. `first`: its first event; `texts`: the pieces by full name of
+    their action; `engine`: plays the whole graph, and `make_engine` makes another one if it fails;
+    `left`: how far an earlier process led the run."""
+
+    simulated: Final = False
+    pauses: Final = False
+
+    def __init__(
+        self,
+        first: Requested,
+        texts: Mapping[str, PieceText],
+        engine: LeadableLink,
+        *,
+        make_engine: Callable[[], LeadableLink],
+        robots: Robots,
+        foreign_stops: ForeignStopLoop,
+        runs: OpenRuns,
+        claims: IdempotentStarts,
+        clock_us: ClockUs,
+        left: "LeftOpen | None" = None,
+    ) -> None:
+        assert first.led is not None
+        self._first = first
+        self._led = first.led
+        self._texts = texts
+        self._engine = engine
+        self._make_engine = make_engine
+        self._failed = anyio.Event()  # the engine has ended by itself
+        self._course: list[tuple[float, Returned | Literal["stop"]]] = []
+        self._began = first.at
+        self._robots = robots
+        self._foreign_stops = foreign_stops
+        self._runs = runs
+        self._claims = claims
+        self._clock_us = clock_us
+        self._gate = Gate()
+        self._left = left
+        self._leading: Leading | None = None
+        self._steps: dict[int, Step] = {}
+        self._turns = {name: anyio.Lock() for name in self._led.robots.values()}
+        self._pieces = left.sent if left is not None else 0
+        self._left_pieces = dict(left.pieces) if left is not None else {}
+        self._subscribers = Listeners[Report]()
+        self._listening = ExitStack()
+        self._tasks: TaskGroup | None = None
+        self._waiting: list[Exact] = []  # the end of the graph, while pieces are open
+        self._state = "UNINITIALIZED"  # of the graph, as it was reported
+        self._states: dict[str, str] = {}  # of the actions that robots play
+        self._stopped_by = GRAPH
+        self._is_told_to_stop = False
+        self._replaced = 0
+        self._again: dict[str, OpenRun] = {}  # pieces that had ended and move again
+        self._ticked = anyio.current_time()
+        self._unstored: set[RunRecorder] = set()  # of pieces that have ended
+
+    def leads(self, leading: Leading) -> None:
+        """Name the run that is led. Call this before the run is driven."""
+        self._leading = leading
+        self._listening.enter_context(self._engine.listen(self._hear))
+
+    # --- the link -----------------------------------------------------------------------------
+
+    @property
+    def standing(self) -> Standing:
+        """The standing of the engine that plays the whole graph. Its life is that of the run: another
+        engine may take over."""
+        return msgspec.structs.replace(self._engine.standing, incarnation=self._first.run)
+
+    async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
+        """Start the whole graph. Raise EngineRefused if its engine refuses it, NotSent or NoAnswer
+        if it cannot be started."""
+        self._began = self._clock_us()
+        await self._engine.start(order, leaves)
+
+    async def stop(self, graph_name: str) -> None:
+        """Stop the whole graph. Nothing begins any more, and every piece gets a Stop that is repeated
+        until it is proven."""
+        self.close(self._stopped_by)
+        if not self._is_told_to_stop:
+            self._is_told_to_stop = True
+            self._course.append((self._now_ms(), "stop"))
+        await self._engine.stop(graph_name)
+
+    def close(self, author: Author) -> None:
+        """Let nothing begin any more, and begin to stop every piece. The call never waits. `author`
+        has pressed Stop."""
+        self._stopped_by = author
+        self._gate.close()
+        for step in self._steps.values():
+            self._end_step(step, author)
+
+    async def pause(self, graph_name: str) -> None:
+        """Raise NotSent: a conducted run is held, not paused."""
+        raise NotSent("a conducted run is held, not paused")
+
+    async def resume(self, graph_name: str, continue_from: str = "") -> None:
+        """Raise NotSent: a conducted run is held, not paused."""
+        raise NotSent("a conducted run is held, not paused")
+
+    async def modify(self, order: Order, continue_from: str = "") -> None:
+        """Raise NotSent: the graph of a conducted run cannot be changed while it runs."""
+        raise NotSent("the graph of a conducted run cannot be changed while it runs")
+
+    async def get(self) -> Answer:
+        """Return the whole graph, with the states of actions as their robots showed them. Raise
+        NoAnswer if the engine of the whole graph has ended."""
+        answer = await self._engine.get()
+        return msgspec.structs.replace(
+            answer,
+            incarnation=self._first.run,
+            graphs=tuple(self._as_shown(each) for each in answer.graphs),
+        )
+
+    def _as_shown(self, graph: Snapshot) -> Snapshot:
+        state = self._state if self._is_going and graph.state in TERMINAL else graph.state
+        nodes = {
+            name: self._states.get(name, "UNINITIALIZED") if name in self._led.players else own
+            for name, own in graph.nodes.items()
+        }
+        return msgspec.structs.replace(graph, state=state, nodes=nodes)
+
+    async def run(self) -> None:
+        """Lead the run until cancelled."""
+        async with anyio.create_task_group() as tasks:
+            self._tasks = tasks
+            tasks.start_soon(self._engine.run)
+            for step in self._steps.values():  # begun before this task
+                tasks.start_soon(self._lead, step)
+            tasks.start_soon(self._watch_time)
+            left, self._left = self._left, None
+            if left is not None:
+                self._began, self._course = left.course.began, list(left.course.steps)
+                await self._engine.take_up(left.order, left.course)
+            while True:
+                await self._failed.wait()
+                self._failed = anyio.Event()
+                await self._replace_engine(tasks)
+
+    def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
+        """Call `hear` with every change of the whole graph until the end of the block."""
+        return self._subscribers.listening(hear)
+
+    async def aclose(self) -> None:
+        """End the engine of the whole graph. Pieces that are still open go on as runs."""
+        self._listening.close()
+        await self._engine.aclose()
+
+    # --- the engine of the whole graph --------------------------------------------------------
+
+    def _hear(self, report: Report) -> None:
+        match report:
+            case CallBegan(call=call) if call.number not in self._steps:
+                step = self._steps[call.number] = Step(call, self._led.players[call.node])
+                if self._tasks is not None:
+                    self._tasks.start_soon(self._lead, step)
+            case CallStopped(number=number) if number in self._steps:
+                self._end_step(self._steps[number], GRAPH)
+            case Transitions(run=run, changes=changes):
+                self._show(run, changes)
+            case EngineChanged(state=("gone" | "busy"), why=why):
+                self.hold(f"What leads this run has failed, and was begun again. {why}")
+                self._failed.set()
+            case _:
+                return
+
+    async def _replace_engine(self, tasks: TaskGroup) -> None:
+        """Bring another engine to where the one that has ended had been. The gate is closed."""
+        if self._replaced >= _MOST_ENGINES:
+            return  # the graph itself ends its engine: only a Stop of the pieces is left
+        self._replaced += 1
+        old, self._engine = self._engine, self._make_engine()
+        self._listening.enter_context(self._engine.listen(self._hear))
+        tasks.start_soon(self._engine.run)
+        course = LedCourse(began=self._began, steps=tuple(self._course))
+        try:
+            await self._engine.take_up(order_of(self._first), course)
+        except (EngineRefused, NotSent) as why:
+            self._alarm("led_failed", f"What leads this run cannot be begun again: {why}")
+        await old.aclose()
+
+    async def _watch_time(self) -> None:
+        """Hold the run when this computer, this process or its clock has jumped: what was looked at
+        before is old then."""
+        offset = self._clock_us() / 1e6 - anyio.current_time()
+        while True:
+            await anyio.sleep(_TICK_S)
+            now = anyio.current_time()
+            jumped = self._clock_us() / 1e6 - now - offset
+            if now - self._ticked > _STALL_S:
+                self.hold(f"The runner stood still for {now - self._ticked:.0f} s.")
+            elif abs(jumped) > _STALL_S:
+                self.hold(f"The clock of the runner's computer jumped by {jumped:.0f} s.")
+                offset += jumped
+            self._ticked = now
+
+    def _now_ms(self) -> float:
+        return (self._clock_us() - self._began) / 1000
+
+    def _show(self, run: str, changes: tuple[Exact, ...]) -> None:
+        """Pass on what the engine of the whole graph shows, without the actions that robots play."""
+        shown: list[Exact] = []
+        for each in changes:
+            is_robots = isinstance(each, NodeState | NodeResult) and each.node in self._led.players
+            if not is_robots:
+                shown.append(each)
+        self._waiting += shown
+        self._show_what_may_be(run)
+        if (
+            self._ends(self._waiting) and not self._gate.is_final
+        ):  # the graph is over: nothing may go on
+            for step in self._steps.values():
+                self._end_step(step, GRAPH)
+
+    @staticmethod
+    def _ends(changes: list[Exact]) -> bool:
+        return any(isinstance(each, GraphState) and each.state in TERMINAL for each in changes)
+
+    def _show_what_may_be(self, run: str) -> None:
+        """Report what waits; the end of the graph, and what follows it, only when no piece is open."""
+        ready: list[Exact] = []
+        while self._waiting:
+            first = self._waiting[0]
+            is_end = isinstance(first, GraphResult) or (
+                isinstance(first, GraphState) and first.state in TERMINAL
+            )
+            if is_end and self._is_going:
+                break
+            ready.append(self._waiting.pop(0))
+            if isinstance(first, GraphState) and first.graph == self._first.graph_name:
+                self._state = first.state
+        if ready:
+            self._subscribers.tell(Transitions(run=run, changes=tuple(ready)))
+
+    @property
+    def _is_going(self) -> bool:
+        moving = any(piece.run.end is None for piece in self._again.values())
+        return moving or any(step.is_open for step in self._steps.values())
+
+    # --- one step -----------------------------------------------------------------------------
+
+    async def _lead(self, step: Step) -> None:
+        """Lead one step to its outcome: send its piece when its robot is free, and wait for the end."""
+        self._take_up_piece(step)
+        try:
+            async with anyio.Lock() if self._led.together else self._turns[step.engine]:
+                await self._lead_in_turn(step)
+        except Exception as error:  # the other steps go on; nothing further begins
+            log.exception("run %s: %s cannot be led", self._first.run, step.node)
+            self.hold(f"The runner has a fault at {step.node}: {error!r}")
+
+    async def _lead_in_turn(self, step: Step) -> None:
+        while True:
+            while step.run is None and not step.is_stopped:
+                with step.waiting():
+                    await self._hand_over(step)
+            if step.run is None:
+                await self._finish(step, "on_stopped", "unsent")
+                return
+            await step.over.wait()
+            outcome = self._outcome(step)
+            if outcome is not None:
+                await self._finish(step, outcome, "shape")
+                return
+            if not step.has_not_left:  # a Stop or the word of a person ends it
+                await step.decided.wait()
+                if step.word is not None:
+                    await self._finish(step, step.word.outcome, "word")
+                else:
+                    await self._finish(step, "on_stopped", "shape")
+                return
+            step.renew()  # nothing has left: a person may let it go on
+
+    async def _hand_over(self, step: Step) -> None:
+        """Send the piece of a step once the gate is open and its robot may begin it; do what the
+        starter has chosen if it may not."""
+        await self._gate.wait()
+        robot = self._robots.reachable(step.engine)
+        try:
+            answer = await self._look(robot)
+        except NoAnswer as why:
+            self._trouble(step, "silent", f"{step.engine} was not given {step.node}: {why}")
+            return
+        await self._run.stored()  # nothing begins while its causes are not in the journal
+        for recorder in tuple(self._unstored):
+            await recorder.flushed()
+            self._unstored.discard(recorder)
+        with anyio.CancelScope(shield=True):
+            self._pieces += 1
+            requested, order = self._to_send(step, f"{self._first.run}.{self._pieces}")
+            try:
+                run = await self._claims.store(requested)
+            except Refused as refused:
+                self._trouble(step, "unstored", refused.detail)
+                return
+            looked_at = anyio.current_time()
+            hooks = PieceHooks(
+                changed=lambda piece: self._piece_changed(step, piece),
+                may_leave=lambda: self._may_leave(step, robot, answer.incarnation, looked_at),
+            )
+            step.piece = self._runs.open(run, robot, owns_link=False, seq=1, piece=hooks)
+            step.run = run
+            at = self._clock_us()
+            self._run.tell(
+                PieceBegan(
+                    at=at, call=step.call.number, node=step.node, engine=step.engine, piece=run.id
+                )
+            )
+            if step.is_stopped:
+                step.piece.stop(self._stopped_by, "")
+            self._runs.drive(step.piece, order, answer.incarnation)
+
+    def _take_up_piece(self, step: Step) -> None:
+        """Follow the piece that an earlier process has sent for a step, if there is one."""
+        found = self._left_pieces.pop(step.call.number, None)
+        if found is None:
+            return
+        run, seq = found
+        if run.end is not None:
+            self._run_changed(step, run)
+            return
+        hooks = PieceHooks(
+            changed=lambda piece: self._piece_changed(step, piece), may_leave=unwatched
+        )
+        link = self._robots.link(step.engine)
+        step.piece = self._runs.open(run, link, owns_link=False, seq=seq, piece=hooks)
+        self._run_changed(step, run)
+        if step.is_stopped:
+            step.piece.stop(self._stopped_by, "")
+        self._runs.drive(step.piece)
+
+    async def _look(self, robot: KnownEngine) -> Answer:
+        """Ask a robot, and return its answer if a piece may begin on it. Raise NoAnswer with the
+        reason if not."""
+        name = robot.registration.name
+        await robot.indexed()
+        try:
+            with anyio.fail_after(_GET_S):
+                answer = await robot.get()
+        except TimeoutError as late:
+            raise NoAnswer(f"it has not answered for {_GET_S:.0f} s. {robot.why}") from late
+        if answer.incarnation != self._led.lives.get(name):
+            raise NoAnswer("its engine was restarted since the start of this run")
+        if robot.standing.doubt:
+            raise NoAnswer(robot.standing.doubt)
+        if self._foreign_stops.is_stopping(name):
+            raise NoAnswer("something that others have started is being stopped there")
+        others = foreign_graphs(answer, self._runs.on(name))
+        if others:
+            raise NoAnswer(f"somebody else runs {others[0]} there")
+        taken = self._runs.occupying(name, apart_from=self._first.run)
+        if taken is not None:
+            raise NoAnswer(f"run {taken.number} is {taken.state} there")
+        return answer
+
+    def _may_leave(self, step: Step, robot: KnownEngine, life: str, looked_at: float) -> None:
+        """Look at the gate and the robot in the step of the event loop in which the message leaves.
+        Raise NotSent if the piece may not begin any more."""
+        if not self._gate.is_open or step.is_stopped:
+            raise NotSent("the run was held or stopped before it left")
+        if anyio.current_time() - self._ticked > _STALL_S:
+            raise NotSent("the runner stood still before it left")
+        if robot.standing.incarnation not in {"", life} or robot.standing.doubt:
+            raise NotSent("its robot has changed before it left")
+        if anyio.current_time() - looked_at > _FRESH_S:
+            raise NotSent("its turn came too late after its robot was looked at")
+
+    def _to_send(self, step: Step, piece: str) -> tuple[Requested, Order]:
+        first, node = self._first, step.node
+        name, umrf = piece_name(first.graph_name, node), self._texts[node].for_run(piece)
+        actions = {node: first.actions[node]}
+        requested = Requested(
+            at=self._clock_us(),
+            run=piece,
+            number=first.number,
+            request_id=f"{first.request_id}/{piece}",
+            author=first.author,
+            graph=first.graph,
+            graph_name=name,
+            version=first.version,
+            digest=first.digest,
+            engine=step.engine,
+            simulated=False,
+            actions=actions,
+            umrf=umrf,
+            laps=Laps(once=(node,)),
+            inner_laps=first.inner_laps,
+            piece=PieceOf(run=first.run, call=step.call.number, node=node),
+        )
+        return requested, Order(
+            run=piece, graph=GraphOutline(name, actions), umrf=umrf, targets=(step.engine,)
+        )
+
+    def _piece_changed(self, step: Step, piece: OpenRun) -> None:
+        """Show what a robot shows of its piece, and act on its end and on its troubles."""
+        if step.piece is not piece:  # it had not left, and another one was sent
+            return
+        if step.call.number not in self._steps and piece.run.end is None:
+            self.moves_again(piece)
+        if piece.run.end is not None and not step.over.is_set():
+            self._unstored.add(piece.recorder)
+        self._run_changed(step, piece.run)
+
+    def _run_changed(self, step: Step, run: Run) -> None:
+        step.run, action = run, run.actions[step.node]
+        # Where a person has seen rest, the last state that the robot showed may be one of motion.
+        unseen = run.end is not None and action.state in ACTIVE
+        state = "ERROR" if unseen else action.state
+        if action is not step.shown or state != self._states.get(step.node):
+            step.shown = action
+            self._states[step.node] = state
+            self._run.tell(_seen(step, action, state, self._clock_us()))
+        if run.end is None:
+            self._find_trouble(step, run)
+            self._find_lacking_output(step, run)
+            return
+        step.over.set()
+        self._show_what_may_be(self._first.run)
+
+    def _find_trouble(self, step: Step, run: Run) -> None:
+        where = f"{step.node} on {step.engine}"
+        if run.unknown_since is not None:
+            self._trouble(step, "silent", f"{where}: the robot does not answer.")
+        if run.lost or run.unconfirmed:
+            self._trouble(step, "lost", f"{where}: {run.lost or run.unconfirmed}")
+        for alarm in run.alarms:
+            if alarm.code in _FOREIGN:
+                self._trouble(step, alarm.code, f"{where}: {alarm.text}")
+            elif (alarm.code, alarm.text) not in step.alarms:
+                step.alarms.add((alarm.code, alarm.text))
+                self._alarm(alarm.code, f"{where}: {alarm.text}")
+
+    def _find_lacking_output(self, step: Step, run: Run) -> None:
+        """Stop a piece whose action has ended with an output unset: its graph would run for ever."""
+        ended = run.graph_state == "RUNNING" and run.actions[step.node].state == "FINISHED"
+        if ended and not step.lacks_output and self._tasks is not None:
+            step.lacks_output = True
+            self._tasks.start_soon(self._end_without_output, step)
+
+    async def _end_without_output(self, step: Step) -> None:
+        await anyio.sleep(_UNSET_S)
+        run = step.run
+        if run is None or run.end is not None or step.is_stopped or step.piece is None:
+            step.lacks_output = False
+        elif run.graph_state == "RUNNING" and run.actions[step.node].state == "FINISHED":
+            step.piece.stop(GRAPH, "")
+        else:
+            step.lacks_output = False
+
+    def _outcome(self, step: Step) -> Precondition | None:
+        """Return the outcome of a piece that has ended; None if its states tell none, after that was
+        said."""
+        assert step.run is not None
+        run = step.run
+        outcome = outcome_of(run.graph_state, run.actions[step.node].state)
+        if step.is_stopped:
+            return outcome or "on_stopped"
+        where = f"{step.node} on {step.engine}"
+        if run.end == "refused":
+            step.has_not_left = True
+            if self._gate.is_open:
+                self._trouble(step, "refused", f"{where} was not begun: {run.detail}")
+            return None
+        if outcome == "on_stopped" and step.lacks_output:
+            return "on_true"
+        if outcome is None or outcome == "on_stopped":
+            self._trouble(step, "ended", f"{where} has ended without an outcome: {run.state}.")
+            return None
+        return outcome
+
+    async def _finish(
+        self, step: Step, outcome: Precondition, how: Literal["shape", "word", "unsent"]
+    ) -> None:
+        """Tell the engine of the whole graph the outcome of a step."""
+        self._steps.pop(step.call.number, None)
+        piece = step.run.id if step.run is not None else ""
+        self._run.tell(
+            PieceEnded(
+                at=self._clock_us(),
+                call=step.call.number,
+                node=step.node,
+                outcome=outcome,
+                how=how,
+                piece=piece,
+                by=step.word.by if step.word is not None else None,
+                reason=step.word.reason if step.word is not None else "",
+            )
+        )
+        result = "on_true" if outcome == "on_stopped" else outcome
+        returned = Returned(number=step.call.number, result=result)
+        self._course.append((self._now_ms(), returned))
+        with suppress(NotSent):  # another engine is told by its course
+            await self._engine.returned(returned)
+
+    def _end_step(self, step: Step, author: Author) -> None:
+        """Let a step end: its piece is stopped until that is proven, or never begins."""
+        if step.is_stopped:
+            return
+        step.end()
+        if step.is_open and step.piece is not None:
+            step.piece.stop(author, "")
+
+    # --- trouble ------------------------------------------------------------------------------
+
+    def _trouble(self, step: Step, code: str, why: str) -> None:
+        """Say what is wrong with a step, once, and do what the starter has chosen for that."""
+        if code in step.troubles or step.is_stopped:
+            return
+        step.troubles.add(code)
+        self._act_on(why, f"led_{code}")
+
+    def _act_on(self, why: str, code: str) -> None:
+        self._alarm(code, why)
+        if self._led.lost == "stop":
+            self._run.stop(RUNNER)
+        else:
+            self.hold(why)
+
+    def _alarm(self, code: str, text: str) -> None:
+        self._run.tell(AlarmRaised(self._clock_us(), code, text))
+
+    # --- the gate -----------------------------------------------------------------------------
+
+    def hold(self, why: str, by: Author | None = None) -> None:
+        """Begin nothing further until somebody lets the run go on."""
+        if self._gate.held is None and not self._gate.is_final:
+            held = Held(at=self._clock_us(), why=why, by=by)
+            self._gate.hold(held)
+            self._run.tell(held)
+
+    def go_on(self, author: Author) -> None:
+        """Let a held run go on."""
+        for step in self._steps.values():
+            step.troubles &= {"ended"}
+        self._run.tell(Released(at=self._clock_us(), author=author))
+        self._gate.release()
+
+    def give_word(self, node: str, word: Word) -> None:
+        """Take the outcome of an action from a person. Raise Conflict unless its robot is proven or
+        was seen at rest and its states tell no outcome."""
+        step = next((each for each in self._steps.values() if each.node == node), None)
+        if step is None or step.run is None:
+            raise Conflict(f"{node} waits for no outcome.", where={"path": "/action"})
+        if step.is_open:
+            raise Conflict(
+                f"{node} on {step.engine} is not known to be at rest. Look at the robot, and confirm "
+                "that first.",
+                where={"path": "/action", "run": step.run.id},
+            )
+        if "ended" not in step.troubles:
+            raise Conflict(f"The outcome of {node} is known already.", where={"path": "/action"})
+        step.word = word
+        step.decided.set()
+
+    def moves_again(self, piece: OpenRun) -> None:
+        """Act on a piece that had ended and moves."""
+        if piece.run.id not in self._again:
+            self._again[piece.run.id] = piece
+            self._act_on(
+                f"{piece.run.graph_name} moves again on {piece.run.engine}.", "moves_again"
+            )
+
+    @property
+    def _run(self) -> Leading:
+        assert self._leading is not None
+        return self._leading
+
+
+def _seen(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:
+    visit = action.visits[-1] if action.visits else None
+    return PieceSeen(
+        at=at,
+        call=step.call.number,
+        node=step.node,
+        state=state,
+        visit=visit,
+        messages=tuple(each.text for each in action.messages),
+    )
+
+
+def order_of(first: Requested) -> Order:
+    """Return the order that starts the whole graph of a conducted run."""
+    graph = GraphOutline(first.graph_name, first.actions)
+    inside = tuple(each.umrf for each in first.subgraphs)
+    return Order(run=first.run, graph=graph, umrf=first.umrf, inside=inside)

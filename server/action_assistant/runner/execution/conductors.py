@@ -1,0 +1,171 @@
+"""Opens conducted runs: new ones, and those that an earlier process left."""
+
+from collections.abc import Mapping
+from typing import Final, Literal
+from weakref import WeakValueDictionary
+
+from action_assistant.errors import Conflict
+from action_assistant.runner.execution.conducted_steps import Leading, Word
+from action_assistant.runner.execution.conductor import (
+    CONDUCTED_FACTS,
+    Conductor,
+    LeftOpen,
+    order_of,
+)
+from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.links.led_calls import LedCourse
+from action_assistant.runner.links.simulator import LeadableLink, Simulator
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import (
+    Author,
+    PieceBegan,
+    PieceEnded,
+    Published,
+    Requested,
+    StopRequested,
+    decode,
+)
+from action_assistant.runner.runs.history import RunHistory
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runtime import Runtime
+from action_assistant.runner.start.admission import PieceText, piece_texts
+from action_assistant.runner.start.idempotency import IdempotentStarts
+from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.umrf.semantics import Returned
+
+_PAGE: Final = 500  # events read at once
+
+
+class Conductors:
+    """Opens conducted runs, and finds the conductor of each that is open."""
+
+    def __init__(
+        self,
+        robots: Robots,
+        foreign_stops: ForeignStopLoop,
+        runs: OpenRuns,
+        history: RunHistory,
+        simulator: Simulator,
+        runtime: Runtime,
+    ) -> None:
+        self._robots = robots
+        self._foreign_stops = foreign_stops
+        self._runs = runs
+        self._history = history
+        self._simulator = simulator
+        self._runtime = runtime
+        self._claims = IdempotentStarts(runtime.journal, runtime.tasks, runtime.clock_us)
+        self._open: WeakValueDictionary[str, Conductor] = WeakValueDictionary()
+        runs.watch(self._see)
+
+    def open(
+        self,
+        first: Requested,
+        run: Run,
+        texts: Mapping[str, PieceText],
+        engine: LeadableLink,
+        *,
+        seq: int = 1,
+        left: LeftOpen | None = None,
+    ) -> OpenRun:
+        """Open a stored conducted run. `first`: its first event; `seq`: the number of its last one;
+        `texts`: its pieces by full name of their action; `engine` plays the whole graph; `left`: how
+        far an earlier process led it."""
+        conductor = Conductor(
+            first,
+            texts,
+            engine,
+            make_engine=lambda: self._engine_for(first),
+            robots=self._robots,
+            foreign_stops=self._foreign_stops,
+            runs=self._runs,
+            claims=self._claims,
+            clock_us=self._runtime.clock_us,
+            left=left,
+        )
+        opened = self._runs.open(run, conductor, owns_link=True, seq=seq, pressed=conductor.close)
+        conductor.leads(
+            Leading(
+                tell=opened.tell,
+                stored=opened.recorder.flushed,
+                stop=lambda author: opened.stop(author, ""),
+            )
+        )
+        self._open[run.id] = conductor
+        return opened
+
+    async def take_up(self, run: Run, seq: int) -> None:
+        """Lead a run further that an earlier process left. Nothing begins until a person lets it go
+        on; what the robots still do is followed. Raise Unavailable if the journal cannot be read."""
+        first = await self._history.requested(run.id)
+        left = await _left_open(self._history, first)
+        texts = await self._runtime.run_in_worker(piece_texts, first.umrf)
+        opened = self.open(first, run, texts, self._engine_for(first), seq=seq, left=left)
+        if run.desired != "stopped":
+            self._open[run.id].hold("The runner was restarted while it led this run.")
+        self._runs.drive(opened)
+
+    def _engine_for(self, first: Requested) -> LeadableLink:
+        led = frozenset(first.led.players if first.led is not None else ())
+        return self._simulator(CONDUCTED_FACTS, first.script, self._runtime.clock_us, led=led)
+
+    def go_on(self, run: str, author: Author) -> None:
+        """Let a held run go on."""
+        self._open[run].go_on(author)
+
+    def give_word(self, run: str, node: str, word: Word) -> None:
+        """Take the outcome of an action from a person. Raise Conflict if it is not asked for."""
+        conductor = self._open.get(run)
+        if conductor is None:
+            raise Conflict("Only the outcome of an action in a conducted run can be given.")
+        conductor.give_word(node, word)
+
+    def _see(self, opened: OpenRun) -> None:
+        """Tell a conductor of a piece that was over and closed, and moves again."""
+        piece = opened.run.piece
+        if piece is not None and not opened.is_led and opened.run.end is None:
+            conductor = self._open.get(piece.run)
+            if conductor is not None:
+                conductor.moves_again(opened)
+
+
+async def _left_open(history: RunHistory, first: Requested) -> LeftOpen:
+    """Return how far an earlier process led a conducted run. Raise Unavailable if the journal cannot be
+    read."""
+    ends: list[tuple[int, Returned | Literal["stop"]]] = []
+    began, sent, calls = first.at, 0, dict[int, int]()
+    after = 0
+    while events := await history.events(first.run, after, _PAGE):
+        after = events[-1].seq
+        for stored in events:
+            match decode(stored.kind, stored.body):
+                case Published(at=at):
+                    began = at
+                case PieceBegan(call=call, piece=piece):
+                    sent = max(sent, int(piece.rpartition(".")[2]))
+                    calls[call] = sent
+                case PieceEnded(at=at, call=call, outcome=outcome):
+                    calls.pop(call, None)
+                    result = "on_true" if outcome == "on_stopped" else outcome
+                    ends.append((at, Returned(number=call, result=result)))
+                case StopRequested(at=at):
+                    ends.append((at, "stop"))
+    pieces: dict[int, tuple[Run, int]] = {}
+    for call, number in calls.items():
+        run, seq, _ = await history.left(f"{first.run}.{number}")
+        if run is not None:
+            pieces[call] = run, seq
+    while True:  # those that were sent, and not noted any more
+        run, seq, _ = await history.left(f"{first.run}.{sent + 1}")
+        if run is None or run.piece is None:
+            break
+        sent += 1
+        pieces[run.piece.call] = run, seq
+    steps = tuple(((at - began) / 1000, step) for at, step in ends)
+    return LeftOpen(
+        order=order_of(first),
+        course=LedCourse(began=began, steps=steps),
+        sent=sent,
+        pieces=pieces,
+    )

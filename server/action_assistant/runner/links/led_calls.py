@@ -1,0 +1,74 @@
+"""The performer of a conducted run: tells which actions the engine of the whole graph begins and stops.
+
+The engine of a conducted run carries out nothing itself. Each call of an action becomes a report,
+and whoever conducts the run reports the end of the call with `returned`.
+"""
+
+from collections.abc import Collection
+from typing import Literal
+
+import msgspec
+
+from action_assistant.runner.links.port import CallBegan, CallStopped
+from action_assistant.umrf.model import Action
+from action_assistant.umrf.semantics import Call, Returned
+
+
+class LedCourse(msgspec.Struct, frozen=True, kw_only=True):
+    """The course of a conducted run so far, from which a new engine gets to the same states.
+
+    `began`: when the graph was started, in microseconds UTC. `steps`: in order, the ends of calls
+    and the Stop, each with its time in milliseconds after the start.
+    """
+
+    began: int
+    steps: tuple[tuple[float, Returned | Literal["stop"]], ...]
+
+
+class LedCalls:
+    """Collects the calls of one engine until its link reports them. `led`: the full names of the
+    actions that are carried out elsewhere; the script says how the others behave."""
+
+    is_killing = False
+    has_returned = False
+
+    def __init__(self, led: Collection[str]) -> None:
+        self._led = frozenset(led)
+        self._news: list[CallBegan | CallStopped] = []
+
+    def performs(self, action: Action) -> bool:
+        """Return whether this action is carried out elsewhere."""
+        return action.full_name in self._led
+
+    def begin(self, call: Call) -> None:
+        """Note that a call has begun."""
+        self._news.append(CallBegan(call=call))
+
+    def stop(self, number: int) -> None:
+        """Note that a call is to end."""
+        self._news.append(CallStopped(number=number))
+
+    def pause(self, number: int) -> None:
+        """Do nothing: a conducted run pauses by holding what has not begun."""
+
+    def resume(self, number: int) -> None:
+        """Do nothing: a conducted run pauses by holding what has not begun."""
+
+    def give_up(self, number: int) -> str | None:
+        """Return None: only a proof ends a call that a robot carries out."""
+        return None
+
+    def news(self) -> list[CallBegan | CallStopped]:
+        """Return the calls that began or were stopped since the last time, oldest first."""
+        news, self._news = self._news, []
+        return news
+
+    def taken(self) -> list[Returned]:
+        """Return nothing: the ends of calls come as commands."""
+        return []
+
+    def kill_all(self) -> None:
+        """Do nothing: the robots go on, and each has a Stop of its own."""
+
+    def end(self) -> None:
+        """Do nothing: the robots go on, and each has a Stop of its own."""

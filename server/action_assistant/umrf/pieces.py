@@ -1,0 +1,141 @@
+"""Cuts a graph into pieces of one action each, and reads the outcome of a piece from its states.
+
+A conducted run sends each robot one piece at a time (docs/umrf-and-the-engine.md 5). The exit of a
+piece runs only for `on_true`, so the states of the graph and of its action tell the outcome, which
+an engine otherwise never reports. Pure.
+"""
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Final
+
+import msgspec
+
+from action_assistant.umrf.model import (
+    ENTRY,
+    ENTRY_CONDITIONS,
+    EXIT,
+    PRECONDITIONS,
+    Action,
+    Conditions,
+    Graph,
+    Key,
+    Precondition,
+    Relation,
+)
+from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
+
+#: The exit of a piece: only `on_true` reaches it, so that each outcome has states of its own.
+TELLING: Final = Conditions(on_true="run")
+#: The outcome of a piece by the state of its graph and of its action.
+_OUTCOMES: Final[Mapping[tuple[str, str], Precondition]] = {
+    ("FINISHED", "FINISHED"): "on_true",
+    ("HALTED", "FINISHED"): "on_false",
+    ("HALTED", "ERROR"): "on_error",
+    ("STOPPED", "FINISHED"): "on_stopped",
+}
+
+
+class Obstacle(msgspec.Struct, frozen=True, kw_only=True):
+    """A reason why a graph cannot be cut into pieces. `code` names the rule, `text` is a sentence
+    for people, `aid` is the key of the action that it concerns."""
+
+    code: str
+    text: str
+    aid: Key | None = None
+
+
+def piece_name(graph: str, action: str) -> str:
+    """Return the name under which a robot runs the piece of an action. `action`: its full name. A
+    sub-graph of the whole graph never has this name."""
+    return f"{graph}--{action}"
+
+
+def piece_of(graph: Graph, action: Action) -> Graph:
+    """Return the graph that has only this action of `graph`, with the values that stand in it."""
+    alone = msgspec.structs.replace(action, actor="", position=None)
+    return Graph(
+        name=piece_name(graph.name, action.full_name),
+        actions=(alone,),
+        relations=(
+            Relation(parent=ENTRY, child=action.key, conditions=ENTRY_CONDITIONS),
+            Relation(parent=action.key, child=EXIT, conditions=TELLING),
+        ),
+    )
+
+
+def outcome_of(graph_state: str | None, action_state: str) -> Precondition | None:
+    """Return the outcome that the states of a piece tell; None while it is not over, and for states
+    that tell no outcome, such as ERROR of the graph."""
+    return _OUTCOMES.get((graph_state or "", action_state))
+
+
+def performers(graph: Graph) -> dict[str, tuple[Action, ...]]:
+    """Return the actions of a graph by their actor, "" for those without one."""
+    found: dict[str, list[Action]] = {}
+    for action in graph.actions:
+        if not action.missing:
+            found.setdefault(action.actor, []).append(action)
+    return {actor: tuple(actions) for actor, actions in sorted(found.items())}
+
+
+def obstacles(graph: Graph, subgraphs: Collection[str] = ()) -> tuple[Obstacle, ...]:
+    """Return the reasons why a graph cannot run as pieces; empty if it can. `subgraphs`: the names of
+    the graphs inside."""
+    return (
+        *_subgraphs(graph, subgraphs),
+        *_values_across(graph),
+        *_spontaneous(graph),
+        *_pauses(graph),
+    )
+
+
+def _subgraphs(graph: Graph, names: Collection[str]) -> Iterator[Obstacle]:
+    for action in graph.actions:
+        if action.name in names and not action.missing:
+            text = f"{action.full_name} is a sub-graph: flatten it, so that its steps can be led."
+            yield Obstacle(code="subgraph-across", text=text, aid=action.key)
+
+
+def _values_across(graph: Graph) -> Iterator[Obstacle]:
+    """Yield each arrow that hands a value to another action: the engine clears the outputs of a
+    piece at its end, so they cannot be read."""
+    actions = {action.key: action for action in graph.actions if not action.missing}
+    for relation in graph.relations:
+        parent, child = actions.get(relation.parent), actions.get(relation.child)
+        if parent is None or child is None:
+            continue
+        inputs = slots_of(child.inputs)
+        try:
+            given = renamed(slots_of(parent.outputs), relation.remap, inputs)
+        except RemapUnknown:
+            continue  # a problem of the graph itself
+        if given:
+            names = ", ".join(f"“{name}”" for name in sorted(given)[:3])
+            text = (
+                f"{parent.full_name} hands {names} to {child.full_name}: a value cannot be handed "
+                "from one step to the next yet."
+            )
+            yield Obstacle(code="values-across", text=text, aid=child.key)
+
+
+def _spontaneous(graph: Graph) -> Iterator[Obstacle]:
+    for action in graph.actions:
+        if action.type == "spontaneous" and not action.missing:
+            text = (
+                f"{action.full_name} is spontaneous: it begins again by itself, which cannot be led "
+                "step by step."
+            )
+            yield Obstacle(code="spontaneous-across", text=text, aid=action.key)
+
+
+def _pauses(graph: Graph) -> Iterator[Obstacle]:
+    """Yield each arrow that pauses an action, which no engine does safely for one piece."""
+    actions = {action.key: action for action in graph.actions if not action.missing}
+    for relation in graph.relations:
+        child, conditions = actions.get(relation.child), relation.conditions
+        if child is not None and "pause" in map(conditions.answer, PRECONDITIONS):
+            text = (
+                f"An arrow pauses {child.full_name}: an action that a robot carries out alone can "
+                "only be started and stopped."
+            )
+            yield Obstacle(code="pause-across", text=text, aid=child.key)

@@ -1,0 +1,269 @@
+"""A run on several robots, led by the runner: what each robot is sent, when, and what ends it."""
+
+import random
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import anyio
+import msgspec
+import pytest
+
+from action_assistant.errors import Conflict, Refused
+from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.views import time
+from action_assistant.runner.start.admission import GoOnRequest, WordRequest
+from action_assistant.umrf.model import Graph
+from runner.harness import (
+    ANN,
+    BEN,
+    Harness,
+    Robot,
+    ended,
+    engine,
+    order,
+    sequence,
+    two_ends,
+    until,
+    virtual,
+)
+
+
+def shared(graph: Graph, *actors: str) -> Graph:
+    """The graph with its actions given to these actors in turn."""
+    actions = tuple(
+        msgspec.structs.replace(each, actor=actors[number % len(actors)])
+        for number, each in enumerate(graph.actions)
+    )
+    return msgspec.structs.replace(graph, actions=actions)
+
+
+class Lab:
+    """Two robots that may be led."""
+
+    def __init__(self, script: dict[str, Any] | None = None) -> None:
+        self.david = Robot(engine(script), random.Random(1))
+        self.carol = Robot(engine(script), random.Random(2))
+        self.harness = Harness({"David": self.david, "Carol": self.carol})
+
+    @asynccontextmanager
+    async def runner(self) -> AsyncIterator[ExecutionService]:
+        """A runner whose robots may be led, with their engines running."""
+        async with self.harness.runner() as control, anyio.create_task_group() as engines:
+            engines.start_soon(self.david.engine.run)
+            engines.start_soon(self.carol.engine.run)
+            for name in ("David", "Carol"):
+                control.robots.add(Registration(name=name, led=True))
+            await anyio.sleep(1)
+            yield control
+            engines.cancel_scope.cancel()
+
+
+def led(graph: Graph, **more: Any) -> Any:
+    """A start of a conducted run in which Scout is David and Carrier is Carol."""
+    robots = {"Scout": "David", "Carrier": "Carol"}
+    return order(graph, engine="conducted", robots=robots, **more)
+
+
+@virtual
+async def test_each_robot_gets_its_own_actions_one_after_the_other() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    async with lab.runner() as control:
+        started = await control.start(led(shared(sequence("task", 3), "Scout", "Carrier")), ANN)
+        run = started.run.id
+        assert await ended(control, run) == "finished"
+        found = lab.harness.journal.history(run)
+        assert [each.graph.name for each in lab.david.starts] == ["task--Work_0", "task--Work_2"]
+        assert [each.graph.name for each in lab.carol.starts] == ["task--Work_1"]
+        assert found.result == "on_true"
+        times = [found.actions[f"Work_{n}"].visits[-1] for n in range(3)]
+        assert [each.result for each in times] == ["true", "true", "true"]
+        assert times[0].not_after <= times[1].start <= times[2].start
+        assert all(each.state == "FINISHED" for each in found.actions.values())
+
+
+@virtual
+async def test_a_stop_reaches_the_robot_that_moves_and_lets_nothing_further_begin() -> None:
+    lab = Lab({"*": [{"never": True, "stop_s": 0.5}]})
+    async with lab.runner() as control:
+        started = await control.start(led(shared(sequence("task", 3), "Scout", "Carrier")), ANN)
+        run = started.run.id
+        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+        assert not await lab.david.moving("task--Work_0")
+        assert lab.carol.starts == []
+        assert [name for _, name in lab.david.stops] == ["task--Work_0"] * len(lab.david.stops)
+
+
+@virtual
+async def test_a_silent_robot_holds_the_run_until_a_person_lets_it_go_on() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 4), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+        await until(lambda: bool(lab.david.starts))
+        lab.carol.silent = True
+        await anyio.sleep(20)
+        lab.carol.silent = False
+        await anyio.sleep(20)
+        found = control.open[run].run
+        assert found.held is not None
+        assert "Carol" in found.held.why
+        assert found.state == "running"
+        assert lab.carol.starts == []
+        await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
+        assert await ended(control, run) == "finished"
+        assert len(lab.carol.starts) == 2
+
+
+@virtual
+async def test_a_silent_robot_stops_everything_where_the_starter_chose_that() -> None:
+    lab = Lab({"*": [{"after_s": 30}]})
+    async with lab.runner() as control:
+        run = (
+            await control.start(led(shared(sequence("task", 4), "Scout", "Carrier")), ANN)
+        ).run.id
+        await until(lambda: bool(lab.david.starts))
+        lab.david.silent = True
+        await anyio.sleep(20)
+        found = control.open[run].run
+        assert found.state == "stopping"
+        assert found.stopped_by is not None
+        assert lab.david.stops
+        lab.david.silent = False
+        assert await ended(control, run) == "stopped"
+        assert lab.carol.starts == []
+
+
+@virtual
+async def test_a_restarted_runner_follows_what_moves_and_begins_nothing_by_itself() -> None:
+    lab = Lab({"*": [{"after_s": 8}]})
+    graph = shared(sequence("task", 4), "Scout", "Carrier")
+    async with lab.runner() as control:
+        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+        await until(lambda: bool(lab.carol.starts))
+        await anyio.sleep(2)
+    async with lab.runner() as control:
+        await anyio.sleep(60)
+        found = control.open[run].run
+        assert found.held is not None
+        assert found.actions["Work_1"].state == "FINISHED"
+        assert found.actions["Work_1"].visits[-1].result == "true"
+        assert len(lab.david.starts) == len(lab.carol.starts) == 1
+        await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
+        assert await ended(control, run) == "finished"
+        assert [each.graph.name for each in lab.david.starts] == ["task--Work_0", "task--Work_2"]
+        assert [each.graph.name for each in lab.carol.starts] == ["task--Work_1", "task--Work_3"]
+
+
+@virtual
+async def test_a_restarted_runner_goes_on_with_a_stop() -> None:
+    lab = Lab({"*": [{"never": True, "stop_s": 3}]})
+    graph = shared(sequence("task", 4), "Scout", "Carrier")
+    async with lab.runner() as control:
+        run = (await control.start(led(graph), ANN)).run.id
+        await until(lambda: bool(lab.david.starts))
+        await anyio.sleep(2)
+        await control.stop(run, BEN)
+        await anyio.sleep(0.05)
+    async with lab.runner() as control:
+        assert await ended(control, run) == "stopped"
+        assert not await lab.david.moving("task--Work_0")
+        assert lab.carol.starts == []
+
+
+async def refused(control: ExecutionService, request: Any) -> str:
+    """Return why a start is refused."""
+    with pytest.raises(Refused) as why:
+        await control.start(request, ANN)
+    return why.value.detail
+
+
+@virtual
+async def test_a_start_that_cannot_be_led_is_refused_and_nothing_is_sent() -> None:
+    lab = Lab()
+    graph = shared(sequence("task", 3), "Scout", "Carrier")
+    async with lab.runner() as control:
+        none = order(graph, engine="conducted", robots={"Scout": "David"})
+        assert "Carrier's actions" in await refused(control, none)
+        more = {"Scout": "David", "Carrier": "Carol", "Ghost": "Carol"}
+        assert "Ghost" in await refused(control, order(graph, engine="conducted", robots=more))
+        control.robots.add(Registration(name="Carol"))
+        assert "Led runs are off for Carol" in await refused(control, led(graph))
+        assert lab.david.starts == lab.carol.starts == []
+
+
+@virtual
+async def test_two_steps_of_one_robot_at_once_have_to_be_accepted() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    graph = shared(two_ends("task"), "Scout")
+    async with lab.runner() as control:
+        robots = {"Scout": "David"}
+        assert "at the same time" in await refused(
+            control, order(graph, engine="conducted", robots=robots)
+        )
+        codes = ("two-at-once", "H12")
+        request = order(
+            graph, engine="conducted", robots=robots, override=Override(codes, "I look.")
+        )
+        run = (await control.start(request, ANN)).run.id
+        await until(lambda: len(lab.david.starts) == 2)
+        assert {each.code for each in control.open[run].run.despite} >= {"two-at-once"}
+        assert await ended(control, run) == "finished"
+
+
+@virtual
+async def test_a_robot_is_kept_for_its_run_until_the_end() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 3), "Scout", "Carrier")
+        run = (await control.start(led(graph), ANN)).run.id
+        assert "Carol is taken by run 1" in await refused(
+            control, order(sequence("other"), engine="Carol")
+        )
+        assert "is taken by run 1" in await refused(control, led(graph))
+        assert await ended(control, run) == "finished"
+        other = await control.start(order(sequence("other"), engine="Carol"), ANN)
+        assert await ended(control, other.run.id) == "finished"
+
+
+@virtual
+async def test_a_stop_of_one_robot_stops_the_whole_run() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        run = (
+            await control.start(led(shared(sequence("task", 3), "Scout", "Carrier")), ANN)
+        ).run.id
+        await until(lambda: bool(lab.david.starts))
+        runs, _ = control.stop_robot("Carol", BEN)
+        assert runs == [run]
+        assert await ended(control, run) == "stopped"
+        assert lab.carol.starts == []
+
+
+@virtual
+async def test_the_word_of_a_person_counts_once_rest_is_seen_and_is_not_called_observed() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 2), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        lab.david.engine = engine({"*": [{"after_s": 5}]})
+        await until(lambda: bool(control.open[run].run.held))
+        word = WordRequest(action="Work_0", outcome="true", reason="It stands at the door.")
+        with pytest.raises(Conflict, match="not known to be at rest"):
+            await control.give_outcome(run, word, BEN)
+        piece = control.open[run].run.actions["Work_0"].piece
+        await control.confirm_rest(piece, RestRequest("I stand beside it."), BEN)
+        await until(lambda: "without an outcome" in control.open[run].run.alarms[-1].text)
+        await control.give_outcome(run, word, BEN)
+        held = control.open[run].run.held
+        assert held is not None
+        await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+        assert await ended(control, run) == "finished"
+        visit = lab.harness.journal.history(run).actions["Work_0"].visits[-1]
+        assert (visit.result, visit.how) == ("true", "inferred")
