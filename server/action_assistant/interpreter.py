@@ -32,7 +32,8 @@ class Interpreter(msgspec.Struct, frozen=True, kw_only=True):
     remark: str = ""
 
     def environment(self, environ: Mapping[str, str]) -> dict[str, str]:
-        """Return the environment variables for processes of this interpreter."""
+        """Return `environ` without the variables that processes of this interpreter must not
+        get."""
         drop = {
             "this": (),
             "named": (_ANEW,),

@@ -193,7 +193,8 @@ def serve(plan: ServePlan) -> int:
 
 
 def _children(plan: ServePlan) -> list[Child]:
-    """Return the processes; the runner is the last, since it ends last."""
+    """Return the processes in the order in which they are started and, later, ended: the editor,
+    then the runner."""
     address = ["--data", str(plan.data), "--host", plan.host]
     address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
     database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}

@@ -213,7 +213,10 @@ def insisting(server: Server, method: str, path: str) -> Any:
 
 
 def _stop(options: argparse.Namespace) -> int:
-    """Request a Stop, then wait for the proof that nothing moves; return the exit code."""
+    """Request a Stop of one run or of everything. Wait until nothing moves or a Stop is
+    unconfirmed, for `options.wait` seconds at most; print each doubt that is left. Return 0 if
+    nothing is in doubt, else 1. Raise RequestRefused if the Stop is refused, CannotStart if the
+    server does not answer."""
     with running(options) as server:
         path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
         asked = insisting(server, "POST", path)

@@ -178,7 +178,8 @@ def _script(path: Path | None) -> Script:
 
 
 def _index(folder: Path) -> EmulatedIndex:
-    """Return what an engine would index in a folder. Raise CannotStart if there is no folder."""
+    """Return the index of actions and graphs that an engine would make of the UMRF files in a
+    folder; files that cannot be read are skipped. Raise CannotStart if there is no such folder."""
     if not folder.is_dir():
         raise CannotStart(f"There is no folder {folder}.")
     return _found(folder)

@@ -30,7 +30,9 @@ class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def verify(options: argparse.Namespace) -> int:
-    """Simulate every expectation again; 1 when any takes another course."""
+    """Simulate every expected run again, with its graph of then and with the present one, and print
+    the verdicts. Return 0 if all go the same course, else 1. Raise RequestRefused or CannotStart if
+    the server does not give the runs."""
     with running(options) as server:
         verdicts = list(_verdicts(server, options))
     if options.json:

@@ -113,7 +113,8 @@ def _compared(connection: sqlite3.Connection, branch: Branch) -> Findings:
 
 
 def _may_go(found: SchemaObject, ours: Iterable[SchemaObject]) -> bool:
-    """Return whether a foreign object can be dropped by its name, since no object of ours has it."""
+    """Return whether a foreign object can be dropped by its name: if it is a trigger, or no object
+    of ours has the same name."""
     return found.kind == "trigger" or found.name not in {each.name for each in ours}
 
 

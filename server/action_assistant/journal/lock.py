@@ -44,8 +44,8 @@ def own(path: Path) -> int:
 
 
 def holder(path: Path) -> Holder | None:
-    """Return the process that has locked a database; None if unknown. Linux shows it for visible
-    processes."""
+    """Return the process that has locked a database; None if no process is known to hold it. Linux
+    shows it for visible processes."""
     return _holder(path.with_name(f"{path.name}.lock"))
 
 
@@ -100,7 +100,8 @@ def _user_of(pid: int) -> int:
 
 
 def _holder(lock: Path) -> Holder | None:
-    """Return the process that holds a lock file; None if unknown."""
+    """Return the process that holds a lock file, as Linux lists it in /proc/locks; None if no
+    process is listed or the list cannot be read."""
     try:
         there = lock.stat()
         place = f"{os.major(there.st_dev):02x}:{os.minor(there.st_dev):02x}:{there.st_ino}"

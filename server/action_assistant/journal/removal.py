@@ -46,8 +46,9 @@ def taken_out(event: Event) -> tuple[str, Head] | None:
 
 
 def delete_some(connection: Connection, stream: str, by: int) -> bool:
-    """Delete the newest events of a stream, one slice of them; return whether any are left. `by` is
-    the number of the removal event that names the stream; raise Conflict if it does not."""
+    """Delete the newest events of a stream, `_SLICE` of them at most, and its snapshots. Return
+    whether any events are left. `by`: the seq of the event that records the removal of the stream.
+    Raise Conflict if there is no such event or it names another stream."""
     event = editor_event.c
     said = select(event.body).where(event.stream == STREAM, event.seq == by)
     body = connection.execute(said).scalar()

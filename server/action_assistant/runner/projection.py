@@ -92,7 +92,8 @@ def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
 
 
 def _open_again(id_: str, moves: MovesAgain) -> Sequence[Executable]:
-    """Reopen a run that was over; it is summed up again at its next end."""
+    """Return the statements that reopen a run that was over, with an alarm, and have it summed up
+    for reviews again at its next end."""
     text = msgspec.json.encode({"code": "moves_again", "at": moves.at, "text": moves.text})
     more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
     summary = func.json_remove(more, "$.proof_at", "$.unknown_since", "$.detail", "$.at_rest")

@@ -103,7 +103,8 @@ CODES: Final[Mapping[str, Severity]] = {
 
 
 def found(code: str, where: object, message: str, remedy: str) -> Diagnostic:
-    """Return the diagnostic of a fault, with the severity of its code."""
+    """Return the diagnostic of a fault, with the severity of its code. `where`: the path, address
+    or setting with the fault; it becomes text. Raise KeyError for a code that is not in `CODES`."""
     return Diagnostic(
         code=code, severity=CODES[code], where=str(where), message=message, remedy=remedy
     )

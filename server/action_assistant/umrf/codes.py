@@ -227,7 +227,8 @@ def rank(problem: Problem) -> tuple[Severity, int]:
 
 
 def table() -> str:
-    """Return the table of all codes for the documentation, as Markdown."""
+    """Return a Markdown table of the codes of all problems that graphs and their texts can have,
+    for the documentation."""
     lines = [
         "| code | severity | what it is | what happens | fix |",
         "|---|---|---|---|---|",

@@ -43,8 +43,10 @@ class Findings:
 
 
 def rehearse(source: Path, data: Path) -> int:
-    """Run the command; return 1 if anything is wrong with the backup. Raise CannotStart if that
-    cannot be determined."""
+    """Unpack the backup file `source` into a scratch folder, verify it as a restore would, and
+    print the findings; record them in the folder `data` if it exists. Return 0 if the backup is
+    sound, else 1. Raise CannotStart if there is no such file or the disk of the scratch folder
+    fails or is full."""
     if not source.is_file():
         raise CannotStart(f"There is no file {source}.")
     begun, at, progress, found = time.monotonic(), time.time(), Progress(), Findings()

@@ -203,8 +203,10 @@ def _put_rows(data: Path, copy: UpgradeCopy, url: str, progress: Progress) -> No
 def _exchanged(
     connection: Connection, copy: UpgradeCopy, aside: Path, progress: Progress
 ) -> tuple[int, int]:
-    """Replace all our tables by the tables of the copy, after copying the present ones to `aside`.
-    Return how many events there are now, and were before."""
+    """Copy the present tables of the branch to a file in the folder `aside`, if there are any, then
+    replace them by the tables of the copy. Return how many events there are now, and how many there
+    were before. Raise CannotStart, and change nothing, if a newer version made the tables or they
+    cannot be copied."""
     try:
         current = recognize(connection)
     except NewerSchema as error:  # none of its tables may stay behind, and we do not know them

@@ -100,8 +100,8 @@ class _CheckThread(threading.Thread):
             ]
 
     def seen(self, until: float) -> list[Diagnostic]:
-        """Return the findings, or a finding that says that the check did not end before `until`
-        (monotonic clock)."""
+        """Wait for the end of the check, until `until` (monotonic clock) at most. Return its
+        findings, or one finding that says that it has not ended."""
         self.join(max(0.0, until - time.monotonic()))
         if not self.is_alive():
             return self._found

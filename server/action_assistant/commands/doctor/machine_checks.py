@@ -314,8 +314,8 @@ def _trouble(state: BackupState, last: float, now: float) -> str:
 
 
 def _used_since(place: Installation) -> float | None:
-    """Return the time of the first event of graphs or runs, in seconds since 1970; None without
-    events."""
+    """Return the time of the first event in the SQLite databases of the editor and the runner, in
+    seconds since 1970; None if there is no event. A database that cannot be read is skipped."""
     found_at: list[int] = []
     for name in ("editor.db", "runner.db"):
         file = place.data / name

@@ -331,7 +331,8 @@ def clock_differs(name: str, where: str, ahead_s: float) -> Diagnostic:
 
 
 def _held(place: Installation, name: str, *, runs: bool) -> Iterator[Diagnostic]:
-    """Yield a finding if another process than the one that answers holds the lock of a database."""
+    """Yield a finding if the process that holds the lock of a database is of another program, or of
+    this program but does not answer at its port. `runs`: one of this program answers there."""
     file = place.data / f"{name}.db"
     holder = lock.holder(file)
     if holder is None:

@@ -277,8 +277,9 @@ def _regenerated(
 
 
 def prevented_in(source: Path, packages: Iterable[str]) -> tuple[str, ...]:
-    """Return sentences about what prevents these packages in a source folder. Raise CannotStart if
-    there is no such folder, or one in which colcon finds no packages."""
+    """Return a sentence for each package of one of these names that is below a source folder, but
+    not in its folder NAME: colcon accepts each name once. Raise CannotStart if there is no such
+    source folder, or if colcon looks for no packages in it."""
     if not source.is_dir():
         raise CannotStart(
             f"{source} is no folder. --into wants the source folder of a workspace that is there, as "

@@ -45,7 +45,7 @@ def tell_refusals(root: Path, plan: PackagesPlan) -> None:
 
 
 def tell_refused(plan: PackagesPlan) -> None:
-    """Print the last lines of a call that could not write."""
+    """Print that nothing was written, and what to do about files that were changed by hand."""
     _tell("Nothing was written.")
     if any(each.conflicts or each.broken for each in plan.regenerations.values()):
         _tell("Take over by hand what `--diff` shows for these files, and call again.")

@@ -148,7 +148,8 @@ class _Directly:
             self._turn_end.do(self._write)
 
     def _write_now(self, framed: bytes) -> bool:
-        """Write framed messages at once, if nothing waits to be written before them."""
+        """Write framed messages at once, and return True; return False if other messages have to be
+        written before them or the socket takes none now."""
         return not self._is_due and not self._unsent and self._socket.write_framed(framed)
 
     def _write(self) -> None:

@@ -93,7 +93,9 @@ async def _chosen(
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes that make sub-graphs of actions, unpack them, and flatten graphs."""
+    """Return the routes that make a sub-graph of chosen actions, say what would replace an action
+    that stands for a graph, give the actions that stand for a graph its new name, and flatten a
+    graph."""
     # If two people make a sub-graph of the same name at once, the second is refused.
     making = asyncio.Lock()
 

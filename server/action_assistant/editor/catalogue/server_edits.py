@@ -15,7 +15,12 @@ async def rename(
     kind: DocumentKind = "graph",
     run_in_worker: RunInWorker = run_here,
 ) -> int:
-    """Give the graph or action another name or description; the seq."""
+    """Give the graph or action another name or description; None keeps the old one. Return the seq
+    up to which its log is committed then.
+
+    Raise BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable
+    if the room is closed or the edit cannot be stored.
+    """
     state = await room.read(lambda replica, _: replica.state())
     update = await run_in_worker(renaming, state, name, description, kind)
     return await room.submit(update, author)
@@ -33,7 +38,11 @@ async def call_actions(
 async def restore(
     room: Room, author: str, then: bytes, *, run_in_worker: RunInWorker = run_here
 ) -> int:
-    """Restore a graph to the content of the document `then`, as an ordinary edit that can be
-    undone; return the seq. Comments stay."""
+    """Restore a graph to the content of the document `then` by an ordinary edit, which can be
+    undone. Its comments stay as they are now. Return the seq up to which its log is committed then.
+
+    Raise BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable
+    if the room is closed or the edit cannot be stored.
+    """
     state = await room.read(lambda replica, _: replica.state())
     return await room.submit(await run_in_worker(restoring, state, then), author)

@@ -50,6 +50,9 @@ def apply_updates(doc: "Doc[Any]", *updates: bytes) -> None:
     """Apply updates in one transaction, with the same result as `doc.apply_update` for each. The
     caller must have no other transaction open. Errors of observers are dropped.
 
+    Raise ValueError or RuntimeError if the library refuses an update; those before it stay applied.
+    `applying` translates these errors.
+
     The function calls the library's core, since its Python layer costs more than the change itself.
     That saves a twentieth of the cost of an edit, and a quarter where many updates are applied
     together.

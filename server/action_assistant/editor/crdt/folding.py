@@ -33,7 +33,8 @@ def _folded(replica: Replica, seq: int, damaged: StreamDamage | None = None) -> 
 
 def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
     """Fold events that rooms have accepted, with the result of `fold` with `learn`, but without
-    reading every event completely. Other events could crash the process."""
+    reading every event completely. Return None if `document` is not readable as a snapshot. Other
+    events could crash the process."""
     replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None

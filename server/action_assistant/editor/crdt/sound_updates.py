@@ -75,7 +75,8 @@ def lies_deep(bodies: Sequence[bytes]) -> bool:
 
 
 def _doubtful(bodies: Sequence[bytes]) -> list[int]:
-    """Return the indices of the updates in which the pattern of a nested struct may occur."""
+    """Return the indices of the updates whose bytes look as if a struct lay inside another one. All
+    updates with such a struct are among them, and some without."""
     text = _APART.join([body[:-1] for body in bodies]).translate(_KINDS)
     found: set[int] = set()
     starts: list[int] = []

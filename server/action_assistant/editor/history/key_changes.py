@@ -36,7 +36,7 @@ class LoggedChange(NamedTuple):
 
     @property
     def place(self) -> Place:
-        """The key that was changed, with its root."""
+        """The root map and its key that was changed."""
         return self.root, self.key
 
 
@@ -57,7 +57,7 @@ class OverwrittenValue(NamedTuple):
 
     @property
     def place(self) -> Place:
-        """The key that was set, with its root."""
+        """The root map and its key that was set."""
         return self.root, self.key
 
 

@@ -71,11 +71,12 @@ def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, ow
 def reverting(
     state: bytes, changes: Sequence[LoggedChange], latest: Mapping[Place, int]
 ) -> RevertedEdits:
-    """Revert the changes of one person in a session, given in order of time. `latest`: the last
-    change by anybody of each key, since the session began.
+    """Return the update that reverts the changes of one person in a sitting, given in order of
+    time, and what it leaves. `latest`: the last change by anybody of each key, since the sitting
+    began.
 
-    A field that was set since stays; one that another person set during the session gets that
-    person's value. A thing made in the session is removed only if nobody has changed it or
+    A field that was set since stays; one that another person set during the sitting gets that
+    person's value. A thing made in the sitting is removed only if nobody has changed it or
     connected an arrow to it since; its position does not matter.
     """
     session = _EditSession(changes, places_of(state), latest)

@@ -82,8 +82,9 @@ def renaming(
 
 
 def calling_actions(state: bytes, before: str, name: str) -> bytes:
-    """Return the update that renames every action called `before`, key by key. Equal numbers are
-    resolved when the document is read."""
+    """Return the update that renames every action called `before` and changes nothing else. Of
+    actions that then share a name and an instance number, all but one get another number when the
+    document is read."""
 
     def edit(doc: Doc[Any]) -> None:
         actions = doc.get("actions", type=Map)

@@ -97,7 +97,9 @@ def names(body: bytes) -> tuple[str, tuple[str, ...]]:
 
 
 def preview(body: bytes, inside: Inside = NOTHING_INSIDE) -> bytes:
-    """Read a file and return JSON of its `Preview`. Raises as `imported` does."""
+    """Return the JSON of the `Preview` of a file. `inside`: the graphs that its actions stand for,
+    for the checks. Raise BadInput, NotUmrf or TooLarge, with the place, for a file that cannot be
+    imported."""
     found = fitting(read_graph(body))
     graph = found.graph
     own = check(graph, graphs=graphs_of(inside), resolution=inside.resolution)
@@ -109,7 +111,8 @@ def preview(body: bytes, inside: Inside = NOTHING_INSIDE) -> bytes:
 
 
 def pieces(body: bytes) -> bytes:
-    """Return the JSON of `Pieces` for a UMRF text. Raises as `imported` does."""
+    """Return the JSON of `Pieces` for a UMRF text. Raise BadInput, NotUmrf or TooLarge, with the
+    place, for a text that cannot be imported."""
     found = fitting(read(body))
     maps = document.flatten(document.with_aids(found.graph))
     return msgspec.json.encode(

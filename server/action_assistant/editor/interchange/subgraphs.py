@@ -207,7 +207,8 @@ def zipped(graphs: Iterable[tuple[str, bytes]]) -> bytes:
 
 
 def _free_name(graph: str, taken: set[str]) -> str:
-    """Return a file name that is not taken, also where a file system ignores case."""
+    """Return a file name that is not in `taken`, and add it there in lower case, since some file
+    systems ignore case."""
     number = 1
     while (name := graph_file_name(graph, number)).lower() in taken:
         number += 1

@@ -8,5 +8,5 @@ DEFERRED: Final = "graph.deferred.v1"  # one that waits for others, which come l
 
 
 def when(at: int) -> datetime:
-    """Return a time in microseconds since 1970 as a datetime."""
+    """Return the datetime, in UTC, of a time in microseconds since 1970."""
     return datetime.fromtimestamp(at / 1_000_000, UTC)

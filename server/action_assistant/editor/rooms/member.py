@@ -224,7 +224,9 @@ class Member:
             self.on_news()
 
     def refuse(self, code: int, text: str | None = None) -> None:
-        """Close the socket for what it sent, and ignore everything it sends after that."""
+        """Close the socket with a code and text, since the client has sent something that is not
+        allowed, and ignore all later messages. If the socket is closed already, its first code and
+        text stay."""
         self.refused = True
         self.close_text = self.close_text if self.closed else text
         self.close(code)

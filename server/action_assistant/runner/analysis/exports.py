@@ -73,9 +73,10 @@ def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
 
 
 def intervals(run: Run) -> bytes:
-    """Return CSV with a line per visit, sorted by begin. Cells of unknown values are empty, also
-    `seconds` if only bounds are known, which have columns of their own. `missed`: how many
-    visits of the action have no line, "none" or "N or more"."""
+    """Return CSV with a line per visit of an action, sorted by its begin. A cell is empty if its
+    value is unknown. If only bounds of a duration are known, `seconds` is empty, and
+    `seconds_least` and `seconds_most` have the bounds. `missed`: how many visits of the action have
+    no line, "none" or "N or more"."""
     text = io.StringIO()
     sheet = csv.writer(text)
     sheet.writerow(_COLUMNS)

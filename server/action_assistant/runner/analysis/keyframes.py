@@ -215,8 +215,10 @@ def fold(
     events: Sequence[Event],
     see: "Callable[[Event, RunEvent, Run | None, Run], None]",
 ) -> Run | None:
-    """Fold events, going on from `run`; call `see` after each with the event, its decoded body, and
-    the run before and after it."""
+    """Fold events, going on from `run`, and return the run after the last one. If `run` is None,
+    the first `Requested` begins it; events before that are skipped, and the result is None without
+    one. Call `see` after each event with the event, its decoded body, and the run before and after
+    it."""
     for event in events:
         decoded = decode(event.kind, event.body)
         before = run

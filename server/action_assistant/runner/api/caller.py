@@ -57,7 +57,8 @@ async def body_of(
 
 async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -> bytes:
     """Return the first `most` bytes of a body, or the part of them that arrives within so many
-    seconds."""
+    seconds. Raise Litestar's HTTPException if the client disconnects before, or the body is too
+    large."""
     found = b""
     with anyio.move_on_after(seconds):
         async for part in request.stream():

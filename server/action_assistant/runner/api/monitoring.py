@@ -112,7 +112,8 @@ class RunMetrics(Collector):
 
     @property
     def unconfirmed(self) -> Counter[str]:
-        """The number of runs with STOP UNCONFIRMED on the page, by engine."""
+        """The number of unconfirmed Stops by engine: of open runs, counting lost ones, and of
+        graphs that others have started, once it is known why the proof is missing."""
         open_runs = (each.run for each in self._control.open.values() if each.run.end is None)
         found = Counter(
             run.engine

@@ -93,8 +93,9 @@ class ArchiveFile:
             self._write(_line(event))
 
     def close(self) -> str:
-        """Verify the complete file, rename it to its name and return its SHA-256. Raises Damaged
-        when it differs from the journal's chain, OSError."""
+        """Verify the complete file, rename it to its name and return its SHA-256. Raise Damaged if
+        it differs from the journal's chain or from its own checksums, OSError if it cannot be
+        written or read. After an error the unfinished file is removed."""
         try:
             if self._end_so_far != self._end:
                 raise Damaged("The journal does not hold what its chain says; `verify` tells more.")

@@ -71,7 +71,8 @@ class ArchiveStore:
         return await self._journal.append(stream, drafts, expected=expected)
 
     async def newest(self, stream: str) -> int:
-        """Return the last seq of a stream, also of an archived one."""
+        """Return the seq of the last event of a stream, also of an archived one; 0 if the stream is
+        empty."""
         return await self._journal.newest(stream)
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:

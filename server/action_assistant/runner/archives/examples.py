@@ -48,7 +48,8 @@ def read(text: bytes) -> tuple[Requested, tuple[Draft, ...]]:
 
 
 def numbered(first: Requested, number: int) -> Draft:
-    """Return the first event of an example as it is stored on this runner, with this run number."""
+    """Return the draft of an example's first event for this runner: with this run number and a
+    request id of its own, as a simulated run without a graph."""
     here = msgspec.structs.replace(
         first, number=number, simulated=True, graph=None, request_id=f"example/{first.run}"
     )

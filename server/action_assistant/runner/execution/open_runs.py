@@ -140,10 +140,10 @@ class OpenRuns:
         }
 
     def occupying(self, engine: str, graph_name: str = "", *, apart_from: str = "") -> Run | None:
-        """Return the run that prevents a start of a graph of this name on an engine; None if it is
-        free. A moving run comes before one that may only be loading, then one of this graph name
-        before others. `apart_from`: the id of a conducted run that does not count, nor do its
-        pieces."""
+        """Return the run that keeps an engine occupied; None if the engine is free. Of several
+        runs, a moving one comes before one that may only be loading, then one of the graph
+        `graph_name` before others. `apart_from`: the id of a conducted run that does not count, nor
+        do its pieces."""
         runs = [
             each.run
             for each in self.on(engine).values()

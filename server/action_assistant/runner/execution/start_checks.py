@@ -284,8 +284,9 @@ class StartChecks:
         return preflight.free_item(engine, other, graph_name, longest_ms, self._clock_us())
 
     async def _behaviours_for(self, ready: Prepared) -> BehaviourFolder:
-        """Return the folder of behaviours, after a check that the behaviours of all actions of a
-        graph can be used. Raise Conflict if there is no folder or a behaviour cannot be used."""
+        """Return the folder of behaviours, after a check that those in it for actions of the graph
+        and its sub-graphs can be used; an action needs none. Raise Conflict if this runner has no
+        such folder, or the folder or a behaviour cannot be used."""
         where: dict[str, object] = {"path": "/behaviours"}
         folder = self._sources.behaviours
         if folder is None:

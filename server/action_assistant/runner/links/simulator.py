@@ -250,7 +250,8 @@ class SimulatorLink:
         return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=graphs)
 
     async def run(self, heard: Callable[[], Awaitable[None]] | None = None) -> None:
-        """Run the engine until cancelled, no faster than `heard` returns after each batch of reports."""
+        """Run the engine until cancelled. After each batch of reports, wait until `heard` returns;
+        without `heard`, let other tasks run once."""
         heard = heard or anyio.lowlevel.checkpoint
         while True:
             due = self._engine.due

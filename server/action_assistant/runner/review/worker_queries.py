@@ -125,7 +125,8 @@ class WorkerQueries:
 def answered(
     paths: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[Any, list[StreamSnapshot]]:
-    """Answer a question in the worker; return the answer and the snapshots to store."""
+    """Answer a question about stored runs in the worker. Return the answer, and the snapshots made
+    for it, which the caller stores. Raise the errors of the question."""
     stored_runs, file = _reading(paths)
     found = asyncio.run(_asked(question, stored_runs, args))
     return found, file.given()
@@ -134,7 +135,8 @@ def answered(
 def encoded(
     paths: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[bytes, list[StreamSnapshot]]:
-    """Answer a question in the worker, as JSON; return it and the snapshots to store."""
+    """Answer a question about stored runs in the worker. Return the answer as JSON, and the
+    snapshots made for it, which the caller stores. Raise the errors of the question."""
     found, snapshots = answered(paths, question, args)
     return msgspec.json.encode(found), snapshots
 

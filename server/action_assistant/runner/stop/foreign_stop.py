@@ -120,6 +120,8 @@ class ForeignStopLoop:
         return stopped
 
     def _stop_graph(self, engine: KnownEngine, graph: str, author: Author) -> None:
+        """Begin to stop a graph, and return at once. If it is being stopped already, only wait
+        longer for the proof."""
         robot = engine.registration.name
         known = self._going.get((robot, graph))
         if known is not None:

@@ -267,8 +267,10 @@ def _stays(finding: _Finding) -> bool:
 
 
 def _findings(inside: Subject) -> tuple[_Finding, ...]:
-    """Return the findings about a sub-graph for the graph around it: its errors, the final ones
-    first; without errors, the first problem of each code that affects the graph around."""
+    """Return the findings about a sub-graph for the graph around it. With errors: the first
+    `_ERRORS` of them, those that nobody can override before others; the last one says how many are
+    left. Without errors: the first problem of each code that affects the graph around, with the
+    number of further problems of this code."""
     problems = sorted(inside.problems, key=rank)
     errors = [each for each in problems if each.severity == "error"]
     errors.sort(key=lambda each: each.code not in FINAL)  # final errors are always among them

@@ -68,7 +68,9 @@ def graph_attributes(file: dict[str, Json]) -> tuple[dict[str, Json], str | None
 def action_attributes(
     item: dict[str, Json],
 ) -> tuple[Position | None, str | None, str | None]:
-    """Return position and identity from an action's `gui_attributes`, and the text of the rest."""
+    """Return the position and the identity (aid) in an action's `gui_attributes`, and the remainder
+    of the attributes as JSON text. Each is None if it is missing or invalid; an invalid position
+    stays in the text."""
     if "gui_attributes" not in item:
         return None, None, None
     value = item["gui_attributes"]

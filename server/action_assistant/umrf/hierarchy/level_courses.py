@@ -209,7 +209,9 @@ class _Courses:
         return list(found.values())
 
     def run(self, budget: int) -> None:
-        """Follow all courses until the budget is used up."""
+        """Follow all courses from the start of the graph, and collect their results and troubles.
+        If more than `budget` states of single actions would be examined, note the trouble
+        `undecided` and end."""
         net = self.net
         first = _LevelState(tuple(State(has=has) for has in net.has), 0, 0, 0)
         instant = _LevelInstant(net, first, self.watched)

@@ -144,8 +144,8 @@ def key_of(token: str) -> str:
 
 
 def doubled_in(text: str) -> tuple[str, int] | None:
-    """Return the pointer of the first key that occurs twice in one object, and the offset of its
-    second occurrence; else None."""
+    """Return the JSON pointer of the first key that occurs twice in one object of a JSON text, and
+    the offset in characters of its second occurrence; None if there is none."""
     for path, offset, fresh in _members(text):
         if not fresh:
             return path, offset

@@ -69,7 +69,9 @@ Json: TypeAlias = "dict[str, Json] | list[Json] | str | bool | Number | None"
 
 
 def parse(text: str | bytes) -> Json:
-    """Parse a JSON text. Raise `Unreadable` if it is too large, no JSON, or has a key twice."""
+    """Parse a JSON text. Raise `Unreadable` if it is not UTF-8 or no JSON, has a key twice in one
+    object, is too large or nested too deeply, or has a number too big for the engine or a lone
+    surrogate."""
     text = decoded(text)
     _bound(text)
     hooks = _Hooks(text)

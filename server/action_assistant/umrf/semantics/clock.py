@@ -87,7 +87,8 @@ class Clock:
         self._out.append(HazardEvent(self._t(), graph.name, code, effect, name, message))
 
     def _crash(self, graph: Running, code: str, message: str, node: Node | None = None) -> None:
-        """End the engine's process with all of its graphs."""
+        """Let the simulated engine crash, which ends all of its graphs, and report the hazard with
+        this code and message at the graph or the action `node`."""
         self._hazard(graph, code, "crash", message, node)
         self.crashed = code
         self._halt_time()

@@ -419,8 +419,9 @@ class Core(Clock):
             self._soon(partial(self._stop_failed, graph, node, node.token))
 
     def _stop_code(self, node: Node, held: bool) -> float:
-        """Call `onStop`, and return the time at which the action's own code returns; inf if it does
-        not."""
+        """Call `onStop` of an action. Return the time (ms) at which the code of its `onRun`
+        returns; inf if it never does. `held`: the action is paused, so that the remainder of its
+        call counts from now."""
         self._performed.stop(node)
         ends = self.now + node.rest_ms if held and node.rest_ms is not None else node.due_ms
         if ends is None:

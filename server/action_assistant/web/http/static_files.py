@@ -129,7 +129,9 @@ class Page:
         return self._rooted[root]
 
     def knows(self, path: str, accepts_html: bool) -> bool:
-        """Return whether a path is public: a file of the page or one of its addresses."""
+        """Return whether the page answers a path, which needs no session: `/`, a file of the page
+        or, for a browser that wants HTML (`accepts_html`), any path that begins with none of
+        `_NOT_PAGES`."""
         if path in self._files or path == "/":
             return True
         return accepts_html and not path.startswith(_NOT_PAGES)

@@ -60,7 +60,8 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
         self.queue.put_nowait({"type": "websocket.disconnect", "code": _RESTARTING})
 
     def send_500_response(self) -> None:
-        """Answer a request for an upgrade that the application did not answer."""
+        """Answer a request for an upgrade with the status 500, since the application did not answer
+        it. If it was refused already, do nothing."""
         if not self.conn.eof_sent:  # else it was refused already, by the parser perhaps
             super().send_500_response()
 
@@ -188,7 +189,8 @@ class DirectSocket(WebSocketProtocol):
         return self.writable.is_set()
 
     def write_framed(self, data: bytes) -> bool:
-        """Send whole frames at once, where little enough waits; whether they were sent."""
+        """Send whole frames at once, and return True; return False if the socket is closing or its
+        send buffer is full."""
         if (
             self.close_sent
             or self.disconnected

@@ -158,8 +158,9 @@ class Lane:
 
     @contextmanager
     def _queued(self, person: str) -> Iterator[anyio.Lock]:
-        """Hold a place in the queue, and yield the lock of this person's requests. Raise TooMany if
-        too many wait."""
+        """Count this request as waiting until the end of the block, and yield the lock of this
+        person's requests. Raise TooMany if too many requests of this person or of all people wait;
+        one without a person ("") is always taken."""
         waiting = self._waiting.get(person, 0)
         if person and (waiting >= _WAITING or sum(self._waiting.values()) >= _ALL_WAITING):
             raise TooMany("Too much waits to be worked on already; wait some seconds.")

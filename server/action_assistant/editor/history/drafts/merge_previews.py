@@ -299,7 +299,8 @@ class _Teller:
 
 
 def _words(root: str, key: str) -> str:
-    """Name the field that a key holds, in words."""
+    """Return the words for people that name a field of the document, given by its root map and key,
+    such as “input speed”."""
     field = key if root == "meta" else key.partition("|")[2]
     if root == "positions":
         return "text"
