@@ -73,9 +73,9 @@ export function handOverWords(graph: Graph, relation: Relation): readonly string
     const verb = HANDED[response];
     if (verb === undefined) return [];
     const ends = any(outcomes.map((outcome) => ENDINGS[outcome]));
-    const who = hand.to === "" ? "Any robot" : isolated(hand.to);
+    const starter = hand.to === "" ? "Any robot" : isolated(hand.to);
     const inCase = response === "stop" || response === "pause" ? ", if it runs," : "";
-    return `${who} ${verb} ${isolated(child)}${inCase} when ${robotWord(hand.from)}’s ${isolated(parent)} ${ends}.`;
+    return `${starter} ${verb} ${isolated(child)}${inCase} when ${robotWord(hand.from)}’s ${isolated(parent)} ${ends}.`;
   });
 }
 
@@ -89,8 +89,8 @@ const HANDED: Readonly<Partial<Record<Response, string>>> = {
 /** Return an action of another robot in words, as one waits for it: "Carrier: DriveTo". */
 export function robotActionWords(graph: Graph, key: Key): string {
   const robot = graph.actions.find((action) => action.key === key)?.actor ?? "";
-  const name = isolated(nameOf(graph, key));
-  return robot === "" ? name : `${isolated(robot)}: ${name}`;
+  const own = isolated(nameOf(graph, key));
+  return robot === "" ? own : `${isolated(robot)}: ${own}`;
 }
 
 /** Returns when an action runs, or the graph ends: by all its arrows, and how they wait for each other. */
