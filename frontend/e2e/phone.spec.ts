@@ -41,7 +41,7 @@ async function add(page: Page, name: string): Promise<void> {
   await page.getByRole("button", { name: "Add an action" }).tap();
   await page.getByRole("combobox", { name: "Name of an action" }).fill(name);
   await page.getByRole("option", { name: `New action “${name}”` }).tap();
-  await expect(page.getByRole("row", { name: new RegExp(`^${name} `) })).toBeVisible();
+  await expect(page.getByRole("row", { name: new RegExp(`^${name}\\b`) })).toBeVisible();
 }
 
 test("a graph is made in the outline", async ({ browser }) => {
@@ -73,7 +73,7 @@ test("a graph is made in the outline", async ({ browser }) => {
   await page.getByRole("option", { name: "run", exact: true }).tap();
 
   await page
-    .getByRole("row", { name: /^Take / })
+    .getByRole("row", { name: /^Take\b/ })
     .getByText("Take", { exact: true })
     .first()
     .tap();
