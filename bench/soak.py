@@ -131,6 +131,14 @@ PARTS: Final[dict[str, Part]] = {
             "tests/test_stop_latency.py",
         ),
     ),
+    "conducted": Part(
+        "10,000 random graphs led on three robots, and 2,000 histories of led runs with faults",
+        {"TEST_EXAMPLES": "250"},
+        (
+            "tests/runner/execution/test_conducted_courses.py",
+            "tests/runner/execution/test_conducted_faults.py",
+        ),
+    ),
     "sync": Part(
         "1,000 schedules of a folder that is edited while it is kept in step with a server, with and "
         "without hard links; and rounds of it that end at each of their steps",
