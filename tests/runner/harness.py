@@ -35,7 +35,7 @@ from action_assistant.runner.links.port import (
     Standing,
     unwatched,
 )
-from action_assistant.runner.links.simulator import SimulatorLink
+from action_assistant.runner.links.simulator import Simulator, SimulatorLink, in_this_process
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author, RunEvent, decode
 from action_assistant.runner.runs.fold import replay
@@ -332,13 +332,18 @@ class Harness:
     def __init__(self, robots: dict[str, Link] | None = None) -> None:
         self.journal = MemoryJournal()
         self.links = robots or {}
+        self.simulator: Simulator = in_this_process
         self.shown: list[tuple[float, Run]] = []
 
     @asynccontextmanager
     async def runner(self) -> AsyncIterator[ExecutionService]:
         """A runner, up to its end."""
         async with ExecutionService.opened(
-            self.journal, Robots(self.links), clock_us=clock_us, run_in_worker=at_once
+            self.journal,
+            Robots(self.links),
+            clock_us=clock_us,
+            run_in_worker=at_once,
+            simulator=self.simulator,
         ) as control:
             control.watch(self._saw)
             yield control

@@ -12,7 +12,8 @@ import pytest
 from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Registration
+from action_assistant.runner.links.port import EngineChanged, Registration
+from action_assistant.runner.links.simulator import SimulatorLink, in_this_process
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest, WordRequest
@@ -22,6 +23,7 @@ from runner.harness import (
     BEN,
     Harness,
     Robot,
+    clock_us,
     ended,
     engine,
     order,
@@ -267,3 +269,118 @@ async def test_the_word_of_a_person_counts_once_rest_is_seen_and_is_not_called_o
         assert await ended(control, run) == "finished"
         visit = lab.harness.journal.history(run).actions["Work_0"].visits[-1]
         assert (visit.result, visit.how) == ("true", "inferred")
+
+
+class Dying:
+    """Makes the engines that lead a run: each dies when it is told to, and a further one needs
+    `begins_s` seconds until it is where the run is."""
+
+    def __init__(self, begins_s: float = 0.0) -> None:
+        self.begins_s = begins_s
+        self.made: list[SimulatorLink] = []
+
+    def __call__(self, *facts: Any, **more: Any) -> SimulatorLink:
+        """Return the next engine."""
+        made = in_this_process(*facts, **more)
+        take_up = made.take_up
+
+        async def late(*what: Any) -> None:
+            await anyio.sleep(self.begins_s)
+            await take_up(*what)
+
+        made.take_up = late  # type: ignore[method-assign]
+        self.made.append(made)
+        return made
+
+    def die(self) -> None:
+        """Let the newest one die, as the process of an engine does."""
+        dead, why = self.made[-1], "It was killed."
+        dead._dead = why
+        dead._subscribers.tell(EngineChanged(at=clock_us(), state="gone", why=why))
+
+
+@virtual
+async def test_a_run_can_be_stopped_when_nothing_leads_it_any_more() -> None:
+    lab, engines = Lab({"*": [{"after_s": 60, "stop_s": 1}]}), Dying()
+    lab.harness.simulator = engines
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 3), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        for _ in range(5):
+            engines.die()
+            await anyio.sleep(2)
+        found = control.open[run].run
+        assert found.state == "running"
+        assert found.held is not None
+        with pytest.raises(Conflict, match="only Stop"):
+            await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
+        await control.stop(run, BEN)
+        await anyio.sleep(0.5)
+        assert control.open[run].run.state == "stopping"
+        assert await ended(control, run) == "stopped"
+        assert not await lab.david.moving("task--Work_0")
+        assert lab.carol.starts == []
+
+
+@virtual
+async def test_an_action_that_ends_while_the_run_gets_another_engine_is_not_sent_again() -> None:
+    lab, engines = Lab({"*": [{"after_s": 5}]}), Dying(begins_s=3)
+    lab.harness.simulator = engines
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 2), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        await anyio.sleep(3)
+        engines.die()
+        await anyio.sleep(6)
+        found = control.open[run].run
+        assert found.actions["Work_0"].state == "FINISHED"
+        assert found.unknown_since is None
+        assert found.alarms == ()
+        assert found.held is not None
+        await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
+        assert await ended(control, run) == "finished"
+        assert [each.graph.name for each in lab.david.starts] == ["task--Work_0"]
+        assert [each.graph.name for each in lab.carol.starts] == ["task--Work_1"]
+
+
+@virtual
+async def test_a_restarted_runner_shows_what_was_done_as_done() -> None:
+    lab, engines = Lab({"*": [{"after_s": 3}]}), Dying(begins_s=2)
+    lab.harness.simulator = engines
+    graph = shared(sequence("task", 3), "Scout", "Carrier")
+    async with lab.runner() as control:
+        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+        await until(lambda: bool(lab.carol.starts))
+        await anyio.sleep(1)
+    async with lab.runner() as control:
+        await anyio.sleep(10)
+        found = lab.harness.journal.history(run)
+        assert found.actions["Work_0"].state == "FINISHED"
+        assert found.actions["Work_0"].visits[-1].result == "true"
+        assert found.alarms == ()
+        assert found.lost == ""
+        assert found.held is not None
+        await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
+        assert await ended(control, run) == "finished"
+        assert len(lab.david.starts) == 2
+
+
+@virtual
+async def test_a_run_is_not_at_rest_by_word_while_a_robot_may_move_in_it() -> None:
+    lab, engines = Lab({"*": [{"after_s": 60}]}), Dying(begins_s=20)
+    lab.harness.simulator = engines
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 2), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        engines.die()
+        await anyio.sleep(10)
+        assert control.open[run].run.state == "unknown"
+        with pytest.raises(Conflict, match="David may still move"):
+            await control.confirm_rest(run, RestRequest("I stand beside it."), BEN)
+        assert control.open[run].run.end is None
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+        assert not await lab.david.moving("task--Work_0")

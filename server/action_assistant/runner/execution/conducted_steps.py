@@ -6,10 +6,21 @@ import anyio
 import msgspec
 
 from action_assistant.runner.execution.run_loop import OpenRun
-from action_assistant.runner.runs.events import Author, Held, RunEvent
+from action_assistant.runner.links.led_calls import LedCourse
+from action_assistant.runner.links.port import GraphOutline, Order
+from action_assistant.runner.runs.events import (
+    Author,
+    Held,
+    PieceOf,
+    PieceSeen,
+    Requested,
+    RunEvent,
+)
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
+from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.pieces import piece_name
 from action_assistant.umrf.semantics import Call
 
 
@@ -28,6 +39,18 @@ class Word(msgspec.Struct, frozen=True, kw_only=True):
     outcome: Precondition
     by: Author
     reason: str
+
+
+class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
+    """A conducted run that an earlier process left: its start, how far it got, how many pieces it had
+    sent, those of calls without an outcome, by number of the call, each with the seq of its last
+    event, and the states of the actions that robots play."""
+
+    order: Order
+    course: LedCourse
+    sent: int
+    pieces: dict[int, tuple[Run, int]]
+    states: dict[str, str]
 
 
 class Step:
@@ -107,3 +130,51 @@ class Gate:
         """Wait until the gate is open."""
         while not self.is_open:
             await self._opened.wait()
+
+
+def seen_of(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:
+    """Return the event that shows an action of a conducted run in this state."""
+    visit = action.visits[-1] if action.visits else None
+    return PieceSeen(
+        at=at,
+        call=step.call.number,
+        node=step.node,
+        state=state,
+        visit=visit,
+        messages=tuple(each.text for each in action.messages),
+    )
+
+
+def order_of(first: Requested) -> Order:
+    """Return the order that starts the whole graph of a conducted run."""
+    graph = GraphOutline(first.graph_name, first.actions)
+    inside = tuple(each.umrf for each in first.subgraphs)
+    return Order(run=first.run, graph=graph, umrf=first.umrf, inside=inside)
+
+
+def piece_to_send(
+    first: Requested, step: Step, piece: str, umrf: str, at: int
+) -> tuple[Requested, Order]:
+    """Return the event that stores the piece of a step, and the order that its robot is sent.
+    `piece`: its id; `umrf`: its text."""
+    name, actions = piece_name(first.graph_name, step.node), {step.node: first.actions[step.node]}
+    requested = Requested(
+        at=at,
+        run=piece,
+        number=first.number,
+        request_id=f"{first.request_id}/{piece}",
+        author=first.author,
+        graph=first.graph,
+        graph_name=name,
+        version=first.version,
+        digest=first.digest,
+        engine=step.engine,
+        simulated=False,
+        actions=actions,
+        umrf=umrf,
+        laps=Laps(once=(step.node,)),
+        inner_laps=first.inner_laps,
+        piece=PieceOf(run=first.run, call=step.call.number, node=step.node),
+    )
+    graph = GraphOutline(name, actions)
+    return requested, Order(run=piece, graph=graph, umrf=umrf, targets=(step.engine,))

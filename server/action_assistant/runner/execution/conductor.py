@@ -24,7 +24,16 @@ from anyio.abc import TaskGroup
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.kit.clock import ClockUs
-from action_assistant.runner.execution.conducted_steps import Gate, Leading, Step, Word
+from action_assistant.runner.execution.conducted_steps import (
+    Gate,
+    Leading,
+    LeftOpen,
+    Step,
+    Word,
+    order_of,
+    piece_to_send,
+    seen_of,
+)
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
 from action_assistant.runner.links.led_calls import LedCourse
@@ -45,7 +54,6 @@ from action_assistant.runner.links.port import (
     CallStopped,
     EngineChanged,
     EngineRefused,
-    GraphOutline,
     Leaves,
     NoAnswer,
     NotSent,
@@ -64,21 +72,17 @@ from action_assistant.runner.runs.events import (
     Held,
     PieceBegan,
     PieceEnded,
-    PieceOf,
-    PieceSeen,
     Released,
     Requested,
 )
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.runs.visits import ActionRun
 from action_assistant.runner.start.admission import PieceText
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.facts import SIMULATED
-from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.model import Precondition
-from action_assistant.umrf.pieces import outcome_of, piece_name
+from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.semantics import Returned
 
 log: Final = logging.getLogger(__name__)
@@ -98,17 +102,6 @@ CONDUCTED_FACTS: Final = msgspec.structs.replace(
 GRAPH: Final = Author("graph", "the graph itself", "program")
 #: Who stops a conducted run whose robot is lost, as the starter has chosen.
 RUNNER: Final = Author("runner", "the runner", "program")
-
-
-class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
-    """A conducted run that an earlier process left: its start, how far it got, how many pieces it had
-    sent, and those of calls without an outcome, by number of the call, each with the seq of its last
-    event."""
-
-    order: Order
-    course: LedCourse
-    sent: int
-    pieces: dict[int, tuple[Run, int]]
 
 
 class Conductor:
@@ -140,7 +133,10 @@ class Conductor:
         self._engine = engine
         self._make_engine = make_engine
         self._failed = anyio.Event()  # the engine has ended by itself
+        self._has_engine = left is None  # one that is where the run is
+        self._is_past_help = False  # none can be had any more: only Stop is left
         self._course: list[tuple[float, Returned | Literal["stop"]]] = []
+        self._over: set[int] = set()  # the calls whose outcome is known
         self._began = first.at
         self._robots = robots
         self._foreign_stops = foreign_stops
@@ -159,7 +155,9 @@ class Conductor:
         self._tasks: TaskGroup | None = None
         self._waiting: list[Exact] = []  # the end of the graph, while pieces are open
         self._state = "UNINITIALIZED"  # of the graph, as it was reported
-        self._states: dict[str, str] = {}  # of the actions that robots play
+        #: The states of the actions that robots play.
+        self._states = dict(left.states) if left is not None else dict[str, str]()
+        self._others: dict[str, str] = {}  # the states of the other actions
         self._stopped_by = GRAPH
         self._is_told_to_stop = False
         self._replaced = 0
@@ -178,7 +176,10 @@ class Conductor:
     def standing(self) -> Standing:
         """The standing of the engine that plays the whole graph. Its life is that of the run: another
         engine may take over."""
-        return msgspec.structs.replace(self._engine.standing, incarnation=self._first.run)
+        life = self._first.run
+        if self._is_past_help:
+            return Standing(state="answering", incarnation=life, generation="current", servers=1)
+        return msgspec.structs.replace(self._engine.standing, incarnation=life)
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
         """Start the whole graph. Raise EngineRefused if its engine refuses it, NotSent or NoAnswer
@@ -217,13 +218,30 @@ class Conductor:
 
     async def get(self) -> Answer:
         """Return the whole graph, with the states of actions as their robots showed them. Raise
-        NoAnswer if the engine of the whole graph has ended."""
+        NoAnswer while the engine of the whole graph has ended and no other one has its place."""
+        if self._is_past_help:
+            return self._answer_without_engine()
+        if not self._has_engine:
+            raise NoAnswer("What leads this run is being begun again.")
         answer = await self._engine.get()
         return msgspec.structs.replace(
             answer,
             incarnation=self._first.run,
             graphs=tuple(self._as_shown(each) for each in answer.graphs),
         )
+
+    def _answer_without_engine(self) -> Answer:
+        """Return the whole graph where no engine knows it any more: stopped once nothing can begin and
+        no piece is open."""
+        at, is_over = self._clock_us(), self._gate.is_final and not self._is_going
+        others = {
+            name: "UNINITIALIZED" if state in ACTIVE else state  # they ended with their engine
+            for name, state in self._others.items()
+        }
+        nodes = dict.fromkeys(self._first.actions, "UNINITIALIZED") | others | self._states
+        state = self._state if self._state in TERMINAL else "STOPPED" if is_over else "RUNNING"
+        shown = Snapshot(at, self._first.graph_name, state, nodes, asked_at=at, run=self._first.run)
+        return Answer(asked_at=at, at=at, incarnation=self._first.run, graphs=(shown,))
 
     def _as_shown(self, graph: Snapshot) -> Snapshot:
         state = self._state if self._is_going and graph.state in TERMINAL else graph.state
@@ -244,7 +262,8 @@ class Conductor:
             left, self._left = self._left, None
             if left is not None:
                 self._began, self._course = left.course.began, list(left.course.steps)
-                await self._engine.take_up(left.order, left.course)
+                self._over |= {each.number for _, each in self._course if each != "stop"}
+                await self._bring_back()
             while True:
                 await self._failed.wait()
                 self._failed = anyio.Event()
@@ -263,7 +282,7 @@ class Conductor:
 
     def _hear(self, report: Report) -> None:
         match report:
-            case CallBegan(call=call) if call.number not in self._steps:
+            case CallBegan(call=call) if call.number not in {*self._steps, *self._over}:
                 step = self._steps[call.number] = Step(call, self._led.players[call.node])
                 if self._tasks is not None:
                     self._tasks.start_soon(self._lead, step)
@@ -279,18 +298,38 @@ class Conductor:
 
     async def _replace_engine(self, tasks: TaskGroup) -> None:
         """Bring another engine to where the one that has ended had been. The gate is closed."""
+        if self._is_past_help:
+            return
+        self._has_engine = False
         if self._replaced >= _MOST_ENGINES:
-            return  # the graph itself ends its engine: only a Stop of the pieces is left
+            self._is_past_help = True
+            text = "What leads this run has failed too often, and is not begun again: stop the run."
+            self._alarm("led_failed", text)
+            return
         self._replaced += 1
         old, self._engine = self._engine, self._make_engine()
         self._listening.enter_context(self._engine.listen(self._hear))
         tasks.start_soon(self._engine.run)
-        course = LedCourse(began=self._began, steps=tuple(self._course))
-        try:
-            await self._engine.take_up(order_of(self._first), course)
-        except (EngineRefused, NotSent) as why:
-            self._alarm("led_failed", f"What leads this run cannot be begun again: {why}")
+        await self._bring_back()
         await old.aclose()
+
+    async def _bring_back(self) -> None:
+        """Bring a new engine to where the run is, with the ends that become known meanwhile. Have it
+        replaced if that fails."""
+        known = len(self._course)
+        try:
+            course = LedCourse(began=self._began, steps=tuple(self._course))
+            await self._engine.take_up(order_of(self._first), course)
+            self._has_engine = True
+            for _, each in self._course[known:]:
+                if each == "stop":
+                    await self._engine.stop(self._first.graph_name)
+                else:
+                    await self._engine.returned(each)
+        except (EngineRefused, NotSent, NoAnswer) as why:
+            log.warning("run %s: no engine leads it: %s", self._first.run, why)
+            self.hold(f"What leads this run cannot be begun again: {why}")
+            self._failed.set()
 
     async def _watch_time(self) -> None:
         """Hold the run when this computer, this process or its clock has jumped: what was looked at
@@ -317,6 +356,8 @@ class Conductor:
             is_robots = isinstance(each, NodeState | NodeResult) and each.node in self._led.players
             if not is_robots:
                 shown.append(each)
+                if isinstance(each, NodeState):
+                    self._others[each.node] = each.state
         self._waiting += shown
         self._show_what_may_be(run)
         if (
@@ -400,7 +441,9 @@ class Conductor:
             self._unstored.discard(recorder)
         with anyio.CancelScope(shield=True):
             self._pieces += 1
-            requested, order = self._to_send(step, f"{self._first.run}.{self._pieces}")
+            piece, at = f"{self._first.run}.{self._pieces}", self._clock_us()
+            text = self._texts[step.node].for_run(piece)
+            requested, order = piece_to_send(self._first, step, piece, text, at)
             try:
                 run = await self._claims.store(requested)
             except Refused as refused:
@@ -478,32 +521,6 @@ class Conductor:
         if anyio.current_time() - looked_at > _FRESH_S:
             raise NotSent("its turn came too late after its robot was looked at")
 
-    def _to_send(self, step: Step, piece: str) -> tuple[Requested, Order]:
-        first, node = self._first, step.node
-        name, umrf = piece_name(first.graph_name, node), self._texts[node].for_run(piece)
-        actions = {node: first.actions[node]}
-        requested = Requested(
-            at=self._clock_us(),
-            run=piece,
-            number=first.number,
-            request_id=f"{first.request_id}/{piece}",
-            author=first.author,
-            graph=first.graph,
-            graph_name=name,
-            version=first.version,
-            digest=first.digest,
-            engine=step.engine,
-            simulated=False,
-            actions=actions,
-            umrf=umrf,
-            laps=Laps(once=(node,)),
-            inner_laps=first.inner_laps,
-            piece=PieceOf(run=first.run, call=step.call.number, node=node),
-        )
-        return requested, Order(
-            run=piece, graph=GraphOutline(name, actions), umrf=umrf, targets=(step.engine,)
-        )
-
     def _piece_changed(self, step: Step, piece: OpenRun) -> None:
         """Show what a robot shows of its piece, and act on its end and on its troubles."""
         if step.piece is not piece:  # it had not left, and another one was sent
@@ -522,7 +539,7 @@ class Conductor:
         if action is not step.shown or state != self._states.get(step.node):
             step.shown = action
             self._states[step.node] = state
-            self._run.tell(_seen(step, action, state, self._clock_us()))
+            self._run.tell(seen_of(step, action, state, self._clock_us()))
         if run.end is None:
             self._find_trouble(step, run)
             self._find_lacking_output(step, run)
@@ -586,6 +603,7 @@ class Conductor:
     ) -> None:
         """Tell the engine of the whole graph the outcome of a step."""
         self._steps.pop(step.call.number, None)
+        self._over.add(step.call.number)
         piece = step.run.id if step.run is not None else ""
         self._run.tell(
             PieceEnded(
@@ -602,7 +620,7 @@ class Conductor:
         result = "on_true" if outcome == "on_stopped" else outcome
         returned = Returned(number=step.call.number, result=result)
         self._course.append((self._now_ms(), returned))
-        with suppress(NotSent):  # another engine is told by its course
+        with suppress(NotSent, NoAnswer):  # another engine is told by its course
             await self._engine.returned(returned)
 
     def _end_step(self, step: Step, author: Author) -> None:
@@ -642,7 +660,9 @@ class Conductor:
             self._run.tell(held)
 
     def go_on(self, author: Author) -> None:
-        """Let a held run go on."""
+        """Let a held run go on. Raise Conflict if nothing can lead it any more."""
+        if self._is_past_help:
+            raise Conflict("What leads this run has failed too often: only Stop is left.")
         for step in self._steps.values():
             step.troubles &= {"ended"}
         self._run.tell(Released(at=self._clock_us(), author=author))
@@ -677,22 +697,3 @@ class Conductor:
     def _run(self) -> Leading:
         assert self._leading is not None
         return self._leading
-
-
-def _seen(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:
-    visit = action.visits[-1] if action.visits else None
-    return PieceSeen(
-        at=at,
-        call=step.call.number,
-        node=step.node,
-        state=state,
-        visit=visit,
-        messages=tuple(each.text for each in action.messages),
-    )
-
-
-def order_of(first: Requested) -> Order:
-    """Return the order that starts the whole graph of a conducted run."""
-    graph = GraphOutline(first.graph_name, first.actions)
-    inside = tuple(each.umrf for each in first.subgraphs)
-    return Order(run=first.run, graph=graph, umrf=first.umrf, inside=inside)

@@ -5,12 +5,10 @@ from typing import Final, Literal
 from weakref import WeakValueDictionary
 
 from action_assistant.errors import Conflict
-from action_assistant.runner.execution.conducted_steps import Leading, Word
+from action_assistant.runner.execution.conducted_steps import Leading, LeftOpen, Word, order_of
 from action_assistant.runner.execution.conductor import (
     CONDUCTED_FACTS,
     Conductor,
-    LeftOpen,
-    order_of,
 )
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -99,7 +97,7 @@ class Conductors:
         """Lead a run further that an earlier process left. Nothing begins until a person lets it go
         on; what the robots still do is followed. Raise Unavailable if the journal cannot be read."""
         first = await self._history.requested(run.id)
-        left = await _left_open(self._history, first)
+        left = await _left_open(self._history, first, run)
         texts = await self._runtime.run_in_worker(piece_texts, first.umrf)
         opened = self.open(first, run, texts, self._engine_for(first), seq=seq, left=left)
         if run.desired != "stopped":
@@ -111,7 +109,7 @@ class Conductors:
         return self._simulator(CONDUCTED_FACTS, first.script, self._runtime.clock_us, led=led)
 
     def go_on(self, run: str, author: Author) -> None:
-        """Let a held run go on."""
+        """Let a held run go on. Raise Conflict if nothing can lead it any more."""
         self._open[run].go_on(author)
 
     def give_word(self, run: str, node: str, word: Word) -> None:
@@ -130,9 +128,9 @@ class Conductors:
                 conductor.moves_again(opened)
 
 
-async def _left_open(history: RunHistory, first: Requested) -> LeftOpen:
-    """Return how far an earlier process led a conducted run. Raise Unavailable if the journal cannot be
-    read."""
+async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpen:
+    """Return how far an earlier process led a conducted run; `now`: the run as its events show it. Raise
+    Unavailable if the journal cannot be read."""
     ends: list[tuple[int, Returned | Literal["stop"]]] = []
     began, sent, calls = first.at, 0, dict[int, int]()
     after = 0
@@ -168,4 +166,5 @@ async def _left_open(history: RunHistory, first: Requested) -> LeftOpen:
         course=LedCourse(began=began, steps=steps),
         sent=sent,
         pieces=pieces,
+        states={name: each.state for name, each in now.actions.items() if each.robot},
     )

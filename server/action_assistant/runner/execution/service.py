@@ -263,6 +263,14 @@ class ExecutionService:
         """Record that a person has seen a run at rest, where its engine cannot prove that. Raise
         NotFound if there is no such run, and what `interventions.confirm_rest` raises."""
         opened = await self._movable(run)
+        for each in self.open.values():
+            piece = each.run.piece
+            if piece is not None and piece.run == run and each.run.end is None:
+                raise Conflict(
+                    f"{each.run.engine} may still move in it. Look at {each.run.engine}, and confirm "
+                    f"that {piece.node} is at rest.",
+                    where={"path": "/how", "run": each.run.id},
+                )
         return interventions.confirm_rest(opened, asked, author)
 
     async def _movable(self, run: str) -> OpenRun:
