@@ -69,7 +69,9 @@ test("two people draw what Scout does when Carrier has arrived, and play it to i
   // The start says where it can go before anything is pressed.
   await saved(page);
   await page.getByRole("button", { name: "Choose where to start" }).click();
-  await expect(page.getByRole("note")).toContainText("robots cannot be given it yet");
+  const lead = page.getByRole("radio", { name: /^Lead it step by step/ });
+  await expect(lead).toBeChecked();
+  await expect(page.getByRole("combobox", { name: "Robot for Scout" })).toHaveValue("simulator");
   await page.keyboard.press("Escape");
 
   // A dry-run says for whom it waits, and goes to its end.

@@ -2,6 +2,7 @@
 import { hearStamp, tick } from "../clock/server-clock";
 import { isEqual, newAid } from "../graph/stop-basics";
 import { errorText, isFinal, isSignedIn, sessionEnd } from "./http";
+import { isPieceOf } from "./led-runs";
 import { pageUrl } from "./page-url";
 import type { HeldGraph, Robot } from "./robots";
 import { getRun, postStop } from "./run-stop";
@@ -455,7 +456,8 @@ function isPart(graph: string, top: string): boolean {
 function isOurs(now: LiveState, robot: Robot, held: HeldGraph): boolean {
   return openRuns(now).some(
     (run) =>
-      run.engine === robot.name && (run.id === held.run || isPart(held.graph, run.graph_name)),
+      isPieceOf(run, robot.name, held.graph) ||
+      (run.engine === robot.name && (run.id === held.run || isPart(held.graph, run.graph_name))),
   );
 }
 
@@ -464,6 +466,12 @@ export function unheardRobots(now: LiveState): Robot[] {
   return now.engines.filter(
     ({ simulated, state }) => !simulated && state !== "answering" && state !== "restarted",
   );
+}
+
+/** Return the names of all robots of which nothing is known now. */
+export function silentRobots(now: LiveState): ReadonlySet<string> {
+  const silent = now.link === "live" ? unheardRobots(now) : now.engines;
+  return new Set(silent.map(({ name }) => name));
 }
 
 /** The runs that a Stop is about, as far as this page knows them. */

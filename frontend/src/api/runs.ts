@@ -3,6 +3,7 @@
 import { useQuery } from "@tanstack/react-query";
 import { isolated } from "../words/isolated";
 import { runnerAt } from "./client";
+import { enginesOf, type LedOrder } from "./led-runs";
 import { getRun, type Run } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
 
@@ -26,8 +27,9 @@ export function requesterPlace(asker: Requester | null): string {
   return ` · by ${isolated(asker.by)}, from ${asker.address ?? "this computer"}`;
 }
 
-/** Return in a few words on which engine a run ran. */
+/** Return in a few words on which engines a run ran. */
 export function runPlace(run: Run): string {
+  if (run.robots) return enginesOf(run).join(", ");
   if (!run.simulated) return run.engine;
   return run.engine === "simulator" ? "simulator" : `${isolated(run.engine)} (simulated)`;
 }
@@ -62,8 +64,9 @@ export interface StartOrder {
   /** JSON text, sent exactly as the editor gave it. */
   umrf: string;
   graph: string;
-  /** One engine, or several robots that start together. */
+  /** One engine, or several robots that start together; only `CONDUCTED` for a led run. */
   engines: readonly string[];
+  led?: LedOrder;
   request: string;
   /** Outcomes of actions; only the simulator follows them. */
   script?: RunnerApi["Script"];
@@ -88,6 +91,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(order.override === undefined ? {} : { override: order.override }),
     ...(order.script === undefined ? {} : { script: order.script }),
     ...(order.behaviours === true ? { behaviours: true } : {}),
+    ...order.led,
     umrf: order.umrf,
     ...order.inside,
   };
@@ -153,4 +157,28 @@ export function useRun(runner: string | undefined, id: string) {
     queryFn: ({ signal }) => getRun(runner ?? "", id, signal),
     enabled: runner !== undefined,
   });
+}
+
+/** Let a held run go on, if it is still held since this moment. Robots may begin to move. */
+export function letGoOn(runner: string, run: string, since: string): Promise<Run> {
+  return runnerAt(runner).post("/api/runs/{run}/go_on", { path: { run }, body: { since } });
+}
+
+/** The newest action that a led run has sent to a robot, as a run of its own. */
+export interface Piece {
+  readonly run: string;
+  readonly robot: string;
+  readonly action: string;
+}
+
+/** Return the newest piece of a led run on each robot. */
+export function newestPieces(run: Run): Piece[] {
+  const number = (piece: string) => Number(piece.slice(piece.lastIndexOf(".") + 1));
+  const newest = new Map<string, Piece>();
+  for (const [action, { robot = "", piece = "" }] of Object.entries(run.actions ?? {})) {
+    const before = newest.get(robot);
+    if (piece !== "" && (before === undefined || number(before.run) < number(piece)))
+      newest.set(robot, { run: piece, robot, action });
+  }
+  return [...newest.values()];
 }

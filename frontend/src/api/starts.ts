@@ -1,5 +1,6 @@
 /** Before a start: what is looked at, and who has said yes. */
 import { runnerAt } from "./client";
+import type { LedOrder } from "./led-runs";
 import type { Preflight } from "./robots";
 import type { Inside } from "./runs";
 import type { RunnerApi } from "./schema/runner";
@@ -25,9 +26,10 @@ export function runPreflight(
   what: { graph: string; umrf: string } & Inside,
   engines: readonly string[],
   behaviours: boolean,
+  led: LedOrder | null,
   signal: AbortSignal,
 ): Promise<Preflight[]> {
-  const body = { engines, ...(behaviours ? { behaviours } : {}), ...what };
+  const body = { engines, ...(behaviours ? { behaviours } : {}), ...led, ...what };
   return runnerAt(runner).post("/api/preflight", { body, signal });
 }
 

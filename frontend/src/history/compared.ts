@@ -5,6 +5,7 @@ import { useMemo } from "react";
 import { runnerAt } from "../api/client";
 import { type Version, versionName } from "../api/graphs";
 import type { HistoryEntry } from "../api/history";
+import { engineWords } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import type { Run } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
@@ -21,7 +22,6 @@ import {
 } from "../graph/model";
 import { isEqual } from "../graph/values";
 import { day, hourMinute, instant } from "../ui/times";
-import { isolated } from "../words/isolated";
 import { changesBetween } from "./graph-difference";
 import { entryAt, type GoodRun, goodBefore, type Timeline } from "./timeline";
 import { type PastGraph, usePastGraph } from "./walk";
@@ -151,7 +151,7 @@ function useRunGraph(run: string | null, other: Graph | null) {
 
 const read = (umrf: unknown, other: Graph): Graph => alignedWith(fromUmrf(umrf), other);
 
-type GoingRun = Pick<Run, "id" | "number" | "graph" | "engine" | "version" | "digest">;
+type GoingRun = Pick<Run, "id" | "number" | "graph" | "engine" | "robots" | "version" | "digest">;
 
 export interface RunningGraph {
   readonly run: string;
@@ -176,7 +176,7 @@ export function runningOf(
       const version = versions.find(({ id }) => id === run.version);
       const known = version !== undefined && version.digest === run.digest;
       const what = known ? versionName(versions, version.id) : "no version of this graph";
-      const words = `${isolated(run.engine)} now: run ${run.number}, ${what}`;
+      const words = `${engineWords(run)} now: run ${run.number}, ${what}`;
       return { run: run.id, words, seq: known ? version.seq : null };
     });
 }

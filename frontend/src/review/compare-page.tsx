@@ -5,6 +5,7 @@ import { useQuery } from "@tanstack/react-query";
 import { type ReactNode, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { errorText } from "../api/http";
+import { engineWords } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
 import {
@@ -42,7 +43,7 @@ function Head({ run, title }: { run: Run; title: string }) {
       </Link>
       <StateLabel pill {...useRunStatus(run)} />
       <span className={style.meta}>
-        {run.simulated ? "simulator" : run.engine} · {by}
+        {run.simulated ? "simulator" : engineWords(run)} · {by}
         {start !== null && ` · ${day(start, now)} ${clock(start)}`}
         {end !== null && boundsText(run.took) && ` · ${boundsText(run.took)}`}
       </span>
@@ -92,7 +93,7 @@ function Before({ found }: { found: Comparison }) {
       <h2>Before they began</h2>
       {!found.same_engine && (
         <p className={style.same}>
-          They ran on different engines: {isolated(found.a.engine)} and {isolated(found.b.engine)}.
+          They ran on different engines: {engineWords(found.a)} and {engineWords(found.b)}.
         </p>
       )}
       <GraphChanges found={found} />

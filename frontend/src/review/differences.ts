@@ -3,6 +3,7 @@
  * ranges do not overlap. Pure.
  */
 
+import { engineWords } from "../api/led-runs";
 import type { ComparedField, ComparedStep, Comparison } from "../api/review";
 import type { Visit } from "../api/runs";
 import { plainValue } from "../differences/difference-words";
@@ -229,7 +230,7 @@ export function likelyCause(found: Comparison): string | null {
   if (led !== undefined)
     return `the arrow ${isolated(led.parent)} → ${isolated(led.child)} was ${led.change}`;
   if (!found.same_engine)
-    return `they ran on ${isolated(found.a.engine)} and on ${isolated(found.b.engine)}`;
+    return `they ran on ${engineWords(found.a)} and on ${engineWords(found.b)}`;
   return null;
 }
 

@@ -10,6 +10,7 @@ import {
 } from "@tabler/icons-react";
 import { useEffect, useState } from "react";
 import { useGraphs, useVersions, versionName } from "../api/graphs";
+import { CONDUCTED } from "../api/led-runs";
 import { filterOf, NO_FILTER, queryOf, type RunFilter, useLabels } from "../api/review";
 import { keyOf } from "../ui/keys";
 import { Segments } from "../ui/segments";
@@ -142,7 +143,10 @@ export function RunFilters({ runner, filter, onChange, engines }: Props) {
       <Select
         aria-label="Robot"
         placeholder="Any robot"
-        data={[...engines]}
+        data={engines.map((value) => ({
+          value,
+          label: value === CONDUCTED ? "led step by step" : value,
+        }))}
         clearable
         value={filter.robot || null}
         onChange={(robot) => onChange({ ...filter, robot: robot ?? "" })}

@@ -15,6 +15,7 @@ import { expectRun } from "../api/courses";
 import { graphMoment, publish, useVersions, type Version, versionName } from "../api/graphs";
 import { errorText, fetchText } from "../api/http";
 import { insideOf } from "../api/inside";
+import { engineWords } from "../api/led-runs";
 import { type InjectedFault, recordedScriptFor, recordedScriptOf, umrfUrl } from "../api/review";
 import { getRun } from "../api/run-stop";
 import { type Inside, type Run, startRun } from "../api/runs";
@@ -30,6 +31,8 @@ export interface RepeatActions {
   name: string;
   seq: number;
   engines: readonly string[];
+  /** The engine of each actor; of a led run. */
+  robots?: Run["robots"];
 }
 
 interface Props {
@@ -132,7 +135,7 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   const graph = run.graph ?? "";
   const versions = useVersions(graph, run.version).data ?? [];
   const version = versions.find((each) => each.id === run.version);
-  const where = engines.map(isolated).join(", ");
+  const where = run.robots ? engineWords(run) : engines.map(isolated).join(", ");
   const complain = (error: unknown) =>
     notifications.show({ color: "red", title: "Not started", message: errorText(error) });
   const show = ({ run: fresh, doubts }: Repeated) => {
@@ -149,7 +152,8 @@ export function RunMenu({ runner, run, engines, onStart }: MenuProps) {
   const simulate = (which: RepeatedVersion) => {
     if (runner !== undefined) repeatRun(runner, run, which).then(show, complain);
   };
-  const start = (seq: number) => onStart({ graph, name: run.graph_name, seq, engines });
+  const start = (seq: number) =>
+    onStart({ graph, name: run.graph_name, seq, engines, robots: run.robots });
   const startNewest = () => graphMoment(graph).then(({ seq }) => start(seq), complain);
   const close = () => setDialog(null);
   return (

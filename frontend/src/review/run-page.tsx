@@ -6,6 +6,7 @@ import { ReactFlowProvider } from "@xyflow/react";
 import { memo, type ReactNode, useCallback, useEffect, useMemo, useState } from "react";
 import { useSearch } from "wouter";
 import { errorText } from "../api/http";
+import { CONDUCTED } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
 import { type ReplayMark, useReplayData } from "../api/replay";
@@ -14,6 +15,7 @@ import { type Run, useRun } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
 import { GraphView } from "../canvas/graph-view";
 import { serverTimeOf } from "../clock/server-clock";
+import { HeldNotice } from "../status/held-notice";
 import { type Lane, lanesOf, useLanes } from "../status/lanes/lanes";
 import { Timeline, type Track } from "../status/lanes/timeline";
 import { INTO } from "../status/level-places";
@@ -172,6 +174,7 @@ function AboutRun({ runner, newest, replay, label, marks, selected, onSelect }: 
 
 /** The engines of a run, and of those that began together with it. */
 function enginesOf(run: Run, mates: readonly Track[]): string[] {
+  if (run.robots) return [CONDUCTED];
   if (run.simulated) return ["simulator"];
   return [run.engine, ...mates.map(({ run: mate }) => mate.engine)].sort();
 }
@@ -281,7 +284,10 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         ),
       })}
       <main className={style.page}>
-        <FailureCauses runner={runner} run={newest} onShow={show} />
+        <div className={style.why}>
+          <HeldNotice run={newest} />
+          <FailureCauses runner={runner} run={newest} onShow={show} />
+        </div>
         <section className={style.canvas} aria-label="Graph of the run">
           <RunCanvas
             key={level.levels.join("\n")}

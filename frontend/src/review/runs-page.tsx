@@ -14,6 +14,7 @@ import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { type MouseEvent, useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { errorText } from "../api/http";
+import { CONDUCTED } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
 import {
@@ -345,7 +346,13 @@ export function RunsPage() {
 }
 
 function enginesOf(runs: readonly ListedRun[], chosen: string): string[] {
-  return [...new Set(["simulator", chosen, ...runs.map((run) => run.engine)])].filter(Boolean);
+  return [
+    ...new Set([
+      "simulator",
+      chosen,
+      ...runs.flatMap((run) => (run.robots ? [CONDUCTED] : [run.engine])),
+    ]),
+  ].filter(Boolean);
 }
 
 function numberOf(runs: readonly ListedRun[], id: string): number {

@@ -5,6 +5,7 @@ import { notifications } from "@mantine/notifications";
 import { IconFileImport, IconSquareFilled } from "@tabler/icons-react";
 import { Link } from "wouter";
 import { errorText } from "../api/http";
+import { enginesOf } from "../api/led-runs";
 import { foreignGraphs, openRuns } from "../api/live-socket";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
@@ -69,7 +70,7 @@ function StartedBy({ run }: { run: Run }) {
 
 export function RobotRuns({ robot, onImport }: Props) {
   const { now } = useLive();
-  const own = openRuns(now).filter((run) => run.engine === robot.name);
+  const own = openRuns(now).filter((run) => enginesOf(run).includes(robot.name));
   const foreign = foreignGraphs(now).filter((each) => each.robot.name === robot.name);
   if (own.length + foreign.length === 0) {
     const unsure = robot.state !== "answering" && robot.state !== "restarted";

@@ -1,6 +1,7 @@
 /** Words for the connection to the runner, and for the age of what the page shows of a run. */
 
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
+import { enginesOf } from "../api/led-runs";
 import { useLive, useRunSeenAt } from "../api/page-link";
 import type { Run } from "../api/runs";
 import { serverTimeOf } from "../clock/server-clock";
@@ -23,7 +24,8 @@ function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
       data-old={old > OLD || undefined}
       title="When the engine itself last showed this run"
     >
-      <IconEye size={13} aria-hidden /> {whose && <b>{run.engine}</b>} proof {duration(old)} ago
+      <IconEye size={13} aria-hidden /> {whose && <b>{enginesOf(run).join(", ")}</b>} proof{" "}
+      {duration(old)} ago
     </span>
   );
 }

@@ -82,3 +82,37 @@ test("a stop under way is no rest, and a run that has ended is no longer told", 
   ]);
   expect(movesNow(live([run({ state: "finished", ended_at: "t" })]))).toEqual([]);
 });
+
+test("a led run is told robot by robot; a robot that nothing was begun on waits", () => {
+  const played = (state: string, robot: string) => ({ ...action(state), robot });
+  const led = run({
+    engine: "conducted",
+    robots: { Scout: "David", Carrier: "Carol", Bell: "simulator" },
+    actions: actions({
+      Drive_0: played("RUNNING", "Carol"),
+      Look_0: played("UNINITIALIZED", "David"),
+      Ring_0: action("RUNNING"),
+    }),
+  });
+  expect(movesNow(live([led])).map(({ robot, kind, words }) => [robot, kind, words])).toEqual([
+    ["Carol", "moves", "Drive 0"],
+    ["David", "still", "waits"],
+    ["simulator", "moves", "Ring 0"],
+  ]);
+});
+
+test("of a robot of a led run that does not answer nothing is said to move", () => {
+  const played = (robot: string) => ({ ...action("RUNNING"), robot });
+  const led = run({
+    engine: "conducted",
+    robots: { Scout: "David", Carrier: "Carol" },
+    actions: actions({ Drive_0: played("Carol"), Look_0: played("David") }),
+  });
+  const engine = (name: string, state: string) => ({ name, state, simulated: false, holds: [] });
+  const engines = [engine("Carol", "answering"), engine("David", "silent")];
+  const now = { ...live([led]), engines } as unknown as LiveState;
+  expect(movesNow(now).map(({ robot, kind }) => [robot, kind])).toEqual([
+    ["Carol", "moves"],
+    ["David", "unknown"],
+  ]);
+});

@@ -2,8 +2,10 @@
 import { IconQuestionMark } from "@tabler/icons-react";
 import { useMemo } from "react";
 import { Link } from "wouter";
-import { foreignGraphs, type LiveState, openRuns } from "../api/live-socket";
+import { enginesOf } from "../api/led-runs";
+import { foreignGraphs, type LiveState, openRuns, silentRobots } from "../api/live-socket";
 import { useLive } from "../api/page-link";
+import { SIMULATOR } from "../api/robots";
 import type { Run } from "../api/runs";
 import { actionWords, placesOf } from "../status/level-places";
 import { colorOfName } from "../ui/name-colors";
@@ -92,21 +94,36 @@ const AT_NO_WORD: Partial<Record<Run["state"], string>> = {
   stopping: "stopping, rest not proven",
 };
 
-function ofRun(run: Run): Moving {
-  const robot = run.simulated ? "simulator" : run.engine;
+function ofRobot(run: Run, robot: string, silent = false): Moving {
   const base = { robot, run: run.id };
-  if (run.state === "unknown" || run.state === "lost" || instant(run.unknown_since) !== null) {
+  if (
+    silent ||
+    run.state === "unknown" ||
+    run.state === "lost" ||
+    instant(run.unknown_since) !== null
+  ) {
     return { ...base, kind: "unknown", words: "not known" };
   }
   const names = movingActions(run);
   if (names.length > 0) return { ...base, kind: "moves", words: names.join(", ") };
-  const words = AT_NO_WORD[run.state] ?? "no action seen to run";
+  const waits = run.robots ? "waits" : "no action seen to run";
+  const words = AT_NO_WORD[run.state] ?? waits;
   return { ...base, kind: run.state === "stopping" ? "unknown" : "still", words };
+}
+
+/** Return what moves on each robot of a run; actions of a led run without a robot are simulated. */
+function ofRun(run: Run, silent: ReadonlySet<string>): Moving[] {
+  if (!run.robots) return [ofRobot(run, run.simulated ? SIMULATOR : run.engine)];
+  const all = Object.entries(run.actions ?? {});
+  return enginesOf(run).map((robot) => {
+    const own = all.filter(([, action]) => (action.robot || SIMULATOR) === robot);
+    return ofRobot({ ...run, actions: Object.fromEntries(own) }, robot, silent.has(robot));
+  });
 }
 
 /** By robot. While the runner is not heard, nothing is known of any of them. */
 export function movesNow(now: LiveState): Moving[] {
-  const runs = openRuns(now).map(ofRun);
+  const runs = openRuns(now).flatMap((run) => ofRun(run, silentRobots(now)));
   const foreign = foreignGraphs(now).map(
     ({ robot, held }): Moving => ({
       robot: robot.name,

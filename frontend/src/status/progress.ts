@@ -207,6 +207,7 @@ export function runLabel(run: Run): { tone: Tone; word: string } {
     return { tone: resultTone[run.result] ?? "done", word: `finished: ${word}` };
   }
   if (run.state === "finished" && !run.result) return { tone: "done", word: "finished" };
+  if (run.held && run.state === "running") return { tone: "run", word: "running, held" };
   const word = run.state === "published" ? "starting" : run.state;
   return { tone: runTones[run.state] ?? "unknown", word };
 }

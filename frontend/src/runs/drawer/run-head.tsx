@@ -14,6 +14,7 @@ import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
 import { Link } from "wouter";
 import { errorText, isOutcomeUnknown } from "../../api/http";
+import { enginesOf } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useCurrentName, useMay } from "../../api/people";
 import { needsRestConfirmation } from "../../api/run-stop";
@@ -143,11 +144,12 @@ export function RunHead(props: Props) {
   return (
     <header className={style.head}>
       <b>Run {run.number}</b>
-      {!run.simulated && (
-        <span className={style.robot}>
-          <i style={{ background: colorOfName(run.engine) }} aria-hidden /> {run.engine}
-        </span>
-      )}
+      {!run.simulated &&
+        enginesOf(run).map((engine) => (
+          <span key={engine} className={style.robot}>
+            <i style={{ background: colorOfName(engine) }} aria-hidden /> {engine}
+          </span>
+        ))}
       <span className={style.version}>{versionLabel}</span>
       <StateLabel pill still {...useRunStatus(run)} />
       <Origin run={run} until={unsure ? serverTimeOf(now.since) : null} />

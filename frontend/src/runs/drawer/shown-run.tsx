@@ -1,10 +1,13 @@
 /** A run in the drawer: its head, a tab for each robot, and what they show while it is open. */
 import { Tabs } from "@mantine/core";
 import { useCallback, useMemo, useState } from "react";
+import { enginesOf } from "../../api/led-runs";
+import { silentRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import { currentAlarm, type Run } from "../../api/runs";
 import { serverTimeOf } from "../../clock/server-clock";
 import type { Graph } from "../../graph/model";
+import { HeldNotice } from "../../status/held-notice";
 import { type Lane, robotsOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
 import { runLabel, type Tone } from "../../status/progress";
@@ -67,9 +70,9 @@ export function ShownRun(props: ShownRunProps) {
   const runs = going.length > 1 ? going : [run];
   const sent = useSentGraph(run)?.graph ?? null;
   const lanes = useLanes(run, graph, runs.length > 1 ? run.engine : "", sent);
-  const tabs = robotTabs(runs, lanes, now.link !== "live");
+  const tabs = robotTabs(runs, lanes, now.link !== "live", silentRobots(now));
   const shown = tabs.find(({ id }) => id === tab);
-  const told = toldOf(run);
+  const told = toldOf(run) === run.held?.why ? "" : toldOf(run);
   const goes = run.ended_at === null;
   const announces = goes && !SHOUTED.has(currentAlarm(run)?.code ?? "");
   const inLine = folded === true || told.length < SHORT;
@@ -97,6 +100,7 @@ export function ShownRun(props: ShownRunProps) {
         cursor={cursor}
         onLive={() => onSeek(null)}
       />
+      <HeldNotice run={run} />
       {!inLine && (
         <p
           className={style.told}
@@ -224,11 +228,15 @@ function said(run: Run, names: ReadonlySet<string> | null, unheard: boolean) {
   return { tone, words: word };
 }
 
-/** A tab for each run that goes on; of a single run, for each of the robots in it. */
+/**
+ * A tab for each run that goes on; of a single run, for each of the robots in it. `silent`: robots
+ * that do not answer, whose part of a led run is not known.
+ */
 export function robotTabs(
   runs: readonly Run[],
   lanes: readonly Lane[],
   unheard: boolean,
+  silent: ReadonlySet<string> = new Set(),
 ): RobotTab[] {
   const [only] = runs;
   const actors = robotsOf(lanes);
@@ -236,12 +244,13 @@ export function robotTabs(
     return actors.map((actor) => {
       const names = new Set(lanes.filter(({ robot }) => robot === actor).map(({ name }) => name));
       const robot = actor === "" ? "any robot" : actor;
-      return { id: `${only.id} ${actor}`, robot, run: only, actor, ...said(only, names, unheard) };
+      const unknown = unheard || (Boolean(only.robots) && silent.has(actor));
+      return { id: `${only.id} ${actor}`, robot, run: only, actor, ...said(only, names, unknown) };
     });
   }
   const tabs = runs.map((run) => ({
     id: run.id,
-    robot: run.simulated ? "simulator" : run.engine,
+    robot: run.simulated ? "simulator" : enginesOf(run).join(", "),
     run,
     actor: null,
     ...said(run, null, unheard),

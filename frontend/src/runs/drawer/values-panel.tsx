@@ -1,5 +1,6 @@
 /** At the right of the lanes: what is known of one action, and how old that is. */
 import { useMemo } from "react";
+import { engineWords } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { type Run, useRun } from "../../api/runs";
 import { fullName, type Graph, type Key } from "../../graph/model";
@@ -37,12 +38,14 @@ export function ValuesPanel({ run, graph, aid }: Props) {
       </aside>
     );
   }
+  const own = Object.values(run.actions ?? {}).find((action) => action.aid === aid)?.robot;
+  const whose = own ? isolated(own) : engineWords(run);
   const onlySent = found.values.some(({ from }) => from === "sent");
   return (
     <aside className={style.values} aria-label={`Values of ${spaced(found.name)}`}>
       <h2>
         {spaced(found.name)}
-        {!run.simulated && ` on ${isolated(run.engine)}`}
+        {!run.simulated && ` on ${whose}`}
         <Age run={run} />
       </h2>
       <dl>

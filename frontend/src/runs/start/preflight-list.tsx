@@ -12,6 +12,7 @@ import { useEffect, useRef, useState } from "react";
 import { Link } from "wouter";
 import { errorText } from "../../api/http";
 import { fetchInside } from "../../api/inside";
+import { CONDUCTED } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { serverPath } from "../../api/page-url";
 import { useMay } from "../../api/people";
@@ -83,15 +84,20 @@ interface Props {
 }
 
 export function PreflightList({ engine, alone, look, moment }: Props) {
-  const codes = engine === SIMULATOR ? ["graph"] : Object.keys(WAITING);
+  const isLed = engine === CONDUCTED;
+  const codes = engine === SIMULATOR || isLed ? ["graph"] : Object.keys(WAITING);
   return (
     <div className={style.engine}>
       {!alone && (
         <h4 className={style.name}>
-          <i style={{ background: colorOfName(engine) }} aria-hidden /> {engine}
+          {!isLed && <i style={{ background: colorOfName(engine) }} aria-hidden />}{" "}
+          {isLed ? "The whole graph" : engine}
         </h4>
       )}
-      <ul className="list-reset" aria-label={`Looked at on ${isolated(engine)}`}>
+      <ul
+        className="list-reset"
+        aria-label={isLed ? "Looked at in the whole graph" : `Looked at on ${isolated(engine)}`}
+      >
         {look
           ? look.items.map((item) => (
               <Line key={item.code} item={item} look={look} moment={moment} />

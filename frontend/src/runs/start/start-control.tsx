@@ -4,6 +4,7 @@ import { IconChevronDown, IconPlayerPlayFilled } from "@tabler/icons-react";
 import { useState } from "react";
 import { useVersions } from "../../api/graphs";
 import { errorText } from "../../api/http";
+import { CONDUCTED } from "../../api/led-runs";
 import { openRuns } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
 import { SIMULATOR } from "../../api/robots";
@@ -55,8 +56,9 @@ export function StartControl(props: Props) {
   const simulated = engines.every((engine) => engine === SIMULATOR);
   const icon = <IconPlayerPlayFilled size={13} aria-hidden />;
   const words = start.isPending ? "Starting …" : `Start ${isolated(label)}`;
-  const where = engines.map(isolated).join(", ");
-  const wide = compact ? words : `${words} on ${where} …`;
+  const led = engines.includes(CONDUCTED);
+  const where = led ? "step by step" : `on ${engines.map(isolated).join(", ")}`;
+  const wide = compact ? words : `${words} ${where} …`;
   const ask = () =>
     void settle().then(setAsking, (error) => notifyFailure("Not started", errorText(error)));
   return (
@@ -79,15 +81,17 @@ export function StartControl(props: Props) {
           leftSection={thumb ? undefined : icon}
           className={style.robots ?? ""}
           disabled={why !== null}
-          title={why ?? `Look at ${where} before starting`}
+          title={
+            (why ?? led)
+              ? "Look at its robots before starting"
+              : `Look ${where.replace(/^on /, "at ")} before starting`
+          }
           onClick={ask}
         >
-          <span aria-hidden>
-            {thumb ? <TwoLines first={words} second={`on ${where} …`} /> : wide}
-          </span>
+          <span aria-hidden>{thumb ? <TwoLines first={words} second={`${where} …`} /> : wide}</span>
           <span className="visually-hidden">
             {why === null
-              ? `Start ${isolated(label)} on ${where} …`
+              ? `Start ${isolated(label)} ${where} …`
               : `Start ${isolated(label)}: ${why}`}
           </span>
         </Button>

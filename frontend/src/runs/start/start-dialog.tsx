@@ -7,22 +7,22 @@ import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
 import { errorText } from "../../api/http";
 import { fetchInside } from "../../api/inside";
+import { CONDUCTED, type LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useMay, usePerson } from "../../api/people";
 import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
 import type { Run } from "../../api/runs";
 import { type Approval, approve, fetchApprovals, runPreflight } from "../../api/starts";
-import { fromUmrf } from "../../canvas/from-umrf";
-import { robotNames } from "../../graph/robots";
 import { HelpLink } from "../../status/help-link";
 import { EngineLabel } from "../../status/state-label";
 import { HoldButton } from "../../ui/hold-button";
 import { textScope, useKeptText } from "../../ui/kept-texts";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
+import { actorsIn, castObstacle, castOf, LedChoice, movesWords, WayChoice } from "./led-choice";
 import { PreflightList } from "./preflight-list";
 import style from "./start-dialog.module.css";
-import { rememberEngines, useStart } from "./use-start";
+import { lastLed, rememberEngines, rememberLed, useStart } from "./use-start";
 
 interface Props {
   graph: string;
@@ -30,6 +30,8 @@ interface Props {
   seq: number;
   label: string;
   chosen: readonly string[];
+  /** The engine of each actor, if a led run is started once more. */
+  robots?: LedOrder["robots"] | null | undefined;
   onChosen: (engines: string[]) => void;
   onStarted?: (runs: readonly Run[]) => void;
   onClose: () => void;
@@ -37,58 +39,38 @@ interface Props {
 
 const LOOK_AGAIN = 5_000; // ms
 
-/** Return the names of the robots that the actions of a UMRF text belong to; empty if it is no JSON. */
-function robotsOfText(text: string | undefined): string[] {
-  try {
-    return text === undefined ? [] : robotNames(fromUmrf(JSON.parse(text)).actions);
-  } catch {
-    return [];
-  }
-}
-
-/** Says before anything is pressed that a graph of several robots runs in the simulator only, for now. */
-function SeveralRobots({ text }: { text: string | undefined }) {
-  const robots = useMemo(() => robotsOfText(text), [text]);
-  if (robots.length < 2) return null;
-  return (
-    <Text size="sm" className={style.several ?? ""} role="note">
-      {robots.map((name, i) => (
-        <span key={name}>
-          {i > 0 && (i === robots.length - 1 ? " and " : ", ")}
-          <i style={{ background: colorOfName(name) }} aria-hidden />
-          <b>
-            <bdi>{name}</bdi>
-          </b>
-        </span>
-      ))}{" "}
-      share this graph. The simulator can play all of them; robots cannot be given it yet.
-    </Text>
-  );
-}
-
-/** The text of the moment, and what the runner sees when it looks at the chosen engines now. */
-function useLook(graph: string, seq: number, engines: readonly string[], behaviours: boolean) {
-  const { runner } = useLive();
-  const umrf = useQuery({
+/** The text of the moment. */
+function useText(graph: string, seq: number) {
+  return useQuery({
     queryKey: ["umrf", graph, seq],
     queryFn: ({ signal }) => identifiedText(graph, seq, signal),
     staleTime: Number.POSITIVE_INFINITY,
   });
+}
+
+/** What the runner sees when it looks at the chosen engines now. */
+function useLook(
+  { graph, seq, umrf }: { graph: string; seq: number; umrf: string | undefined },
+  engines: readonly string[],
+  behaviours: boolean,
+  led: LedOrder | null,
+) {
+  const { runner } = useLive();
   const look = useQuery({
-    queryKey: ["preflight", graph, seq, behaviours, ...engines],
+    queryKey: ["preflight", graph, seq, behaviours, led, ...engines],
     queryFn: async ({ signal }) => {
       const inside = await fetchInside(graph, seq, signal);
-      const what = { graph, umrf: umrf.data ?? "", ...inside };
-      return runPreflight(runner ?? "", what, engines, behaviours, signal);
+      const what = { graph, umrf: umrf ?? "", ...inside };
+      return runPreflight(runner ?? "", what, engines, behaviours, led, signal);
     },
-    enabled: umrf.data !== undefined && runner !== undefined && engines.length > 0,
+    enabled: umrf !== undefined && runner !== undefined && engines.length > 0,
     refetchInterval: LOOK_AGAIN,
     gcTime: 0,
     staleTime: 0,
     retry: false,
   });
   const lookSoon = () => void look.refetch({ cancelRefetch: false });
-  return { look, lookSoon, text: umrf.data, error: umrf.error ?? look.error };
+  return { look, lookSoon, error: look.error };
 }
 
 /** The simulator goes alone; robots go together. */
@@ -169,11 +151,14 @@ function Exactly({
   label,
   digest,
   engines,
+  moves,
 }: {
   name: string;
   label: string;
   digest: string;
   engines: readonly string[];
+  /** What moves in a led run; "" for other starts. */
+  moves: string;
 }) {
   return (
     <dl className={style.exactly}>
@@ -185,6 +170,12 @@ function Exactly({
       <dd className="weight-400 mono">{digest === "" ? "…" : `${digest.slice(0, 16)}…`}</dd>
       <dt className="ink2">{engines.length > 1 ? "Robots" : "On"}</dt>
       <dd>{engines.map(isolated).join(", ") || "nowhere yet"}</dd>
+      {moves !== "" && (
+        <>
+          <dt className="ink2">Moves</dt>
+          <dd>{moves}</dd>
+        </>
+      )}
     </dl>
   );
 }
@@ -203,16 +194,45 @@ function obstacleOf(
   return null;
 }
 
+/** The way in which a graph is started, and the robots of a led start. */
+function useWay({ graph, seq, chosen, robots }: Props) {
+  const { now } = useLive();
+  const may = useMay("operate");
+  const text = useText(graph, seq);
+  const actors = useMemo(() => actorsIn(text.data), [text.data]);
+  const [before] = useState(() => lastLed(graph));
+  const [picked, pick] = useState<LedOrder["robots"]>(robots ?? before?.robots ?? {});
+  const [lost, setLost] = useState<LedOrder["lost"]>(before?.lost ?? "stop");
+  const several = actors.filter((actor) => actor !== "").length > 1;
+  const [wanted, want] = useState<boolean | null>(chosen.includes(CONDUCTED) ? true : null);
+  const led = wanted ?? several;
+  const offered = several || led || now.engines.some((robot) => robot.led);
+  const cast = castOf(actors, picked, now.engines, may);
+  const missing = led ? castObstacle(actors, cast) : null;
+  return { text, actors, several, led, want, offered, cast, pick, lost, setLost, missing };
+}
+
 export function StartDialog(props: Props) {
   const { graph, name, seq, label, chosen, onChosen, onStarted, onClose } = props;
-  const [engines, setEngines] = useState<readonly string[]>(chosen);
+  const [whole, setEngines] = useState<readonly string[]>(() => {
+    const robots = chosen.filter((engine) => engine !== CONDUCTED);
+    return robots.length > 0 ? robots : [SIMULATOR];
+  });
+  const way = useWay(props);
+  const { led, cast } = way;
+  const order: LedOrder | null = led ? { robots: cast, lost: way.lost } : null;
+  const players = [...new Set(Object.values(cast))].sort();
+  const engines = led ? players : whole;
+  const asked = led ? (way.missing === null ? [CONDUCTED] : []) : whole;
   const { person } = usePerson();
   // A reason counts for this moment on these robots only.
-  const place = `${textScope(graph, person.id)}start/${seq}/${engines.join("/")}`;
+  const place = `${textScope(graph, person.id)}start/${seq}/${led ? "led/" : ""}${engines.join("/")}`;
   const [reason, setReason] = useKeptText(place);
   const { now } = useLive();
-  const { behaviours, choice } = useBehaviours(engines.includes(SIMULATOR));
-  const { look, lookSoon, text, error } = useLook(graph, seq, engines, behaviours);
+  const { behaviours, choice } = useBehaviours(!led && engines.includes(SIMULATOR));
+  const moment = { graph, seq, umrf: way.text.data };
+  const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order);
+  const error = way.text.error ?? lookError;
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
@@ -222,14 +242,15 @@ export function StartDialog(props: Props) {
       ? "The runner does not answer"
       : start.isPending
         ? "Starting …"
-        : obstacleOf(engines, looks, reason);
+        : (way.missing ?? obstacleOf(engines, looks, reason));
   const choose = (engine: string) => {
     setReason("");
-    setEngines(toggled(engines, engine));
+    setEngines(toggled(whole, engine));
   };
   const begin = () => {
-    rememberEngines(graph, engines);
-    onChosen([...engines]);
+    rememberEngines(graph, asked);
+    if (order !== null) rememberLed(graph, order);
+    onChosen([...asked]);
     const override = codes.length > 0 ? { override: { codes, reason: reason.trim() } } : {};
     const done = ({ runs }: { runs: readonly Run[] }) => {
       setReason("");
@@ -237,9 +258,11 @@ export function StartDialog(props: Props) {
       onStarted?.(runs);
     };
     const looked = { digest, ...(tree && { tree }) };
-    start.mutate({ seq, engines, ...looked, behaviours, ...override }, { onSuccess: done });
+    const what = { seq, engines: asked, ...(order && { led: order }), ...looked, behaviours };
+    start.mutate({ ...what, ...override }, { onSuccess: done });
   };
   const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
+  const how = led ? ", step by step," : "";
   return (
     <Modal
       opened
@@ -248,10 +271,32 @@ export function StartDialog(props: Props) {
       closeButtonProps={{ "aria-label": "Close" }}
       size="lg"
     >
-      <SeveralRobots text={text} />
-      <Where engines={engines} behaviours={behaviours} onToggle={choose} />
+      {way.offered && (
+        <WayChoice
+          led={led}
+          several={way.several}
+          onLed={(wanted) => {
+            setReason("");
+            way.want(wanted);
+          }}
+        />
+      )}
+      {led ? (
+        <LedChoice
+          actors={way.actors}
+          cast={cast}
+          lost={way.lost}
+          onCast={(robots) => {
+            setReason("");
+            way.pick(robots);
+          }}
+          onLost={way.setLost}
+        />
+      ) : (
+        <Where engines={engines} behaviours={behaviours} onToggle={choose} />
+      )}
       {choice}
-      {engines.length > 0 && (
+      {asked.length > 0 && (
         <section
           className={style.looks}
           aria-label="Checks before the start"
@@ -273,15 +318,17 @@ export function StartDialog(props: Props) {
               {errorText(error)}
             </Text>
           )}
-          {engines.map((engine) => (
-            <PreflightList
-              key={engine}
-              engine={engine}
-              alone={engines.length === 1}
-              look={looks?.find((each) => each.engine === engine)}
-              moment={{ graph, seq, onLeave: onClose, onLookAgain: lookSoon }}
-            />
-          ))}
+          {(led ? [CONDUCTED, ...players.filter((each) => each !== SIMULATOR)] : engines).map(
+            (engine) => (
+              <PreflightList
+                key={engine}
+                engine={engine}
+                alone={!led && engines.length === 1}
+                look={looks?.find((each) => each.engine === engine)}
+                moment={{ graph, seq, onLeave: onClose, onLookAgain: lookSoon }}
+              />
+            ),
+          )}
         </section>
       )}
       <SecondPerson graph={graph} label={label} looks={looks} />
@@ -296,16 +343,22 @@ export function StartDialog(props: Props) {
         />
       )}
       <footer className={style.foot}>
-        <Exactly name={name} label={label} digest={digest} engines={engines} />
+        <Exactly
+          name={name}
+          label={label}
+          digest={digest}
+          engines={engines}
+          moves={led && way.missing === null ? movesWords(cast) : ""}
+        />
         <HoldButton
           icon={<IconPlayerPlayFilled size={13} aria-hidden />}
           label={why ?? "Hold to start"}
           name={
             why === null
-              ? `Start ${label} on ${where.map(isolated).join(", ")}`
+              ? `Start ${label}${how} on ${where.map(isolated).join(", ")}`
               : `Start ${label}: ${why}`
           }
-          question={`Start exactly ${isolated(label)} of ${isolated(name)} on ${where.map(isolated).join(", ")}?`}
+          question={`Start exactly ${isolated(label)} of ${isolated(name)}${how} on ${where.map(isolated).join(", ")}?${led ? ` ${movesWords(cast)}` : ""}`}
           disabled={why !== null}
           onHeld={begin}
         />

@@ -6,6 +6,7 @@ import { CloseButton, Loader } from "@mantine/core";
 import { useQuery } from "@tanstack/react-query";
 import { useEffect } from "react";
 import { Link } from "wouter";
+import { CONDUCTED, engineWords } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { SIMULATOR } from "../../api/robots";
 import { findStart, type Run, type StartFound } from "../../api/runs";
@@ -32,7 +33,9 @@ export function unknownWords(
 ): string | null {
   const left = missing(sent, found);
   if (left.length === 0) return null;
-  const where = left.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
+  const where = left.map((engine) =>
+    engine === SIMULATOR ? "the simulator" : engine === CONDUCTED ? "its robots" : engine,
+  );
   const head = `NOT KNOWN whether ${sent.what} started on ${where.map(isolated).join(", ")}.`;
   const after = "The page looks for this start, and does not send it again. Stop works.";
   if (silent || found === undefined) return `${head} The runner has not answered. ${after}`;
@@ -47,7 +50,7 @@ function Found({ run }: { run: Run }) {
       <i style={{ background: colorOfName(run.engine) }} aria-hidden />
       <span>
         Started after all: <Link to={`/runs/${run.id}`}>run {run.number}</Link> on{" "}
-        {run.simulated ? "the simulator" : run.engine}, {word}.
+        {run.simulated ? "the simulator" : engineWords(run)}, {word}.
       </span>
     </p>
   );

@@ -6,6 +6,7 @@ import type { Script } from "../../api/dry-runs";
 import { publish, queryKeys, type Version, versionName } from "../../api/graphs";
 import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
 import { insideOf } from "../../api/inside";
+import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { type Started, type StartOrder, startRun } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
@@ -18,6 +19,8 @@ export interface StartInput {
   /** The moment that shall run; awaited when the page has yet to hear its name. */
   seq: number | Promise<number>;
   engines: readonly string[];
+  /** Robots of a led run. */
+  led?: LedOrder;
   /** Digest of the graph that a person looked at; null if nobody looked. */
   digest: string | null;
   /** Tree digest, with all sub-graphs, that a person looked at; left out if nobody looked. */
@@ -55,7 +58,7 @@ export function useStart(graph: string) {
   const client = useQueryClient();
   return useMutation({
     mutationFn: async (wanted: StartInput) => {
-      const { seq, engines, digest, tree, script, behaviours, override } = wanted;
+      const { seq, engines, led, digest, tree, script, behaviours, override } = wanted;
       if (runner === undefined) throw new Error("The address of the runner is not known yet.");
       const { version, umrf } = await publishedVersion(graph, await seq);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
@@ -75,6 +78,7 @@ export function useStart(graph: string) {
         graph,
         engines,
         request: newAid(),
+        ...(led === undefined ? {} : { led }),
         ...(script === undefined ? {} : { script }),
         ...(behaviours === undefined ? {} : { behaviours }),
         ...(override === undefined ? {} : { override }),
@@ -122,6 +126,27 @@ function nameIn(version: Version): string {
 }
 
 const CHOICE = "aa.engines";
+const LED = "aa.led";
+
+/** Return the robots with which this browser last started a led run of a graph. */
+export function lastLed(graph: string): LedOrder | null {
+  try {
+    const all = JSON.parse(localStorage.getItem(LED) ?? "{}") as Record<string, LedOrder>;
+    const found = all[graph];
+    return found !== undefined && typeof found.robots === "object" ? found : null;
+  } catch {
+    return null;
+  }
+}
+
+export function rememberLed(graph: string, led: LedOrder): void {
+  try {
+    const all = JSON.parse(localStorage.getItem(LED) ?? "{}") as Record<string, LedOrder>;
+    localStorage.setItem(LED, JSON.stringify({ ...all, [graph]: led }));
+  } catch {
+    // A browser that stores nothing asks again next time.
+  }
+}
 
 /** Return the engines on which this browser last started a graph. */
 export function lastEngines(graph: string): string[] {

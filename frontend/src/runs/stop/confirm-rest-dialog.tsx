@@ -1,12 +1,14 @@
 /** Ends a run by a person's word, and says first what that means. */
 
-import { Button, Modal, Text, TextInput } from "@mantine/core";
+import { Button, Modal, NativeSelect, Text, TextInput } from "@mantine/core";
 import { IconEye } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { useState } from "react";
 import { errorText } from "../../api/http";
+import { engineWords } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
-import { confirmRest, type Run } from "../../api/runs";
+import { confirmRest, newestPieces, type Run } from "../../api/runs";
+import { actionWords } from "../../status/level-places";
 import { usePendingText } from "../../ui/drafts";
 import { HoldButton } from "../../ui/hold-button";
 import { isolated } from "../../words/isolated";
@@ -24,10 +26,15 @@ interface Props {
 export function ConfirmRestDialog({ run, opened, onClose }: Props) {
   const { runner } = useLive();
   const [how, setHow] = useState("");
+  // A led run is confirmed robot by robot.
+  const pieces = newestPieces(run);
+  const [chosen, choose] = useState<string | null>(null);
+  const piece = pieces.find((each) => each.run === chosen) ?? pieces[0];
+  const where = piece === undefined ? engineWords(run) : isolated(piece.robot);
   // Never kept for later: these words are about what was seen a moment ago.
   usePendingText(opened ? how : "", null);
   const confirm = useMutation({
-    mutationFn: () => confirmRest(runner ?? "", run.id, how.trim()),
+    mutationFn: () => confirmRest(runner ?? "", piece?.run ?? run.id, how.trim()),
     onSuccess: onClose,
     onError: (error) => notifyFailure("Not confirmed", errorText(error)),
   });
@@ -36,7 +43,7 @@ export function ConfirmRestDialog({ run, opened, onClose }: Props) {
     <Modal
       opened={opened}
       onClose={onClose}
-      title={`Is ${isolated(run.engine)} at rest?`}
+      title={`Is ${where} at rest?`}
       closeButtonProps={{ "aria-label": "Close" }}
       zIndex={300}
     >
@@ -48,6 +55,18 @@ export function ConfirmRestDialog({ run, opened, onClose }: Props) {
       <Text size="sm" mt="xs">
         Only somebody who has looked at the robot can end this. Until then nothing is started there.
       </Text>
+      {pieces.length > 1 && (
+        <NativeSelect
+          mt="md"
+          label="Which robot?"
+          value={piece?.run ?? ""}
+          data={pieces.map((each) => ({
+            value: each.run,
+            label: `${isolated(each.robot)}: ${actionWords(run, each.action)}`,
+          }))}
+          onChange={(event) => choose(event.currentTarget.value)}
+        />
+      )}
       <TextInput
         mt="md"
         data-autofocus
@@ -67,7 +86,7 @@ export function ConfirmRestDialog({ run, opened, onClose }: Props) {
           icon={<IconEye size={14} aria-hidden />}
           label={confirm.isPending ? "Confirming …" : "Hold to confirm"}
           name={said ? `Confirm that run ${run.number} is at rest` : "Say how you saw it first"}
-          question={`Has ${isolated(run.engine)} come to rest, and have you seen it?`}
+          question={`Has ${where} come to rest, and have you seen it?`}
           disabled={!said || confirm.isPending}
           onHeld={() => confirm.mutate()}
         />

@@ -1,6 +1,7 @@
 /** Notice with the state of a Stop, in words, until it is proven. */
 
 import { useState } from "react";
+import { engineWords } from "../../api/led-runs";
 import type { LiveState, StopRequest } from "../../api/live-socket";
 import { foreignGraphs, openRuns, stopTargets, unheardRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
@@ -37,7 +38,7 @@ function reasonOf(run: Run): string {
 }
 
 function unconfirmed(runs: readonly Run[], since?: string): StopNoticeText {
-  const each = runs.map((run) => `run ${run.number} on ${isolated(run.engine)}`).join(", ");
+  const each = runs.map((run) => `run ${run.number} on ${engineWords(run)}`).join(", ");
   const why = runs.map(reasonOf).find((reason) => reason !== "") ?? "no proof has come.";
   const look = runs.some((run) => run.unconfirmed)
     ? " Look at the robot; use its hardware stop."
@@ -76,7 +77,7 @@ export function noticeOf(stop: StopRequest, now: LiveState, at: number): StopNot
   const lost = runs.filter((run) => run.state === "lost");
   if (lost.length > 0) {
     const ends = lost
-      .map((run) => `run ${run.number} on ${isolated(run.engine)}: ${run.detail}`)
+      .map((run) => `run ${run.number} on ${engineWords(run)}: ${run.detail}`)
       .join(" ");
     return { tone: "loud", text: `STOP UNCONFIRMED: ${ends} Look at the robot.` };
   }
@@ -97,7 +98,7 @@ const endOf = (run: Run) => {
 /** The runner is silent since: what it said before that stays true, and of the rest nothing is known. */
 function silentNotice(runs: readonly Run[], since: string): StopNoticeText {
   const open = runs.filter((run) => !isAtRest(run));
-  const who = open.map((run) => `run ${run.number} on ${isolated(run.engine)}: `).join("");
+  const who = open.map((run) => `run ${run.number} on ${engineWords(run)}: `).join("");
   const before = runs.filter(isAtRest).map(endOf).join(", ");
   const proven = before === "" ? "" : ` Proven before that: ${before}.`;
   const text = `STOP UNCONFIRMED: ${who}sent, but no word from the runner since.${proven}`;
@@ -308,7 +309,7 @@ export function StopNotice() {
               className={style.look}
               onClick={() => askedRun.set(run.id)}
             >
-              {silent.length > 1 ? `I looked at ${isolated(run.engine)} …` : "I looked …"}
+              {silent.length > 1 ? `I looked at ${engineWords(run)} …` : "I looked …"}
             </button>
           ))}
         </span>

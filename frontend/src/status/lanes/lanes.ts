@@ -64,8 +64,8 @@ function needsByName(graph: Graph | null): ReadonlyMap<string, Needs> {
 }
 
 /** Every action, those that ran first, in the order in which they began, and right below each those inside
- * of it. `robot` is whose they are where the graph does not say. `sent`: the graph that runs, as far
- * as it is known. */
+ * of it. In a led run they are the robot's that carried them out; `robot` is whose they are where
+ * the graph does not say. `sent`: the graph that runs, as far as it is known. */
 export function lanesOf(run: Run, graph: Graph, robot = "", sent: Graph | null = graph): Lane[] {
   const needs = needsByName(sent);
   const known = new Map(graph.actions.map((action) => [fullName(action), action]));
@@ -76,7 +76,7 @@ export function lanesOf(run: Run, graph: Graph, robot = "", sent: Graph | null =
   const put = (around: string | null, whose: string | null) => {
     for (const { name, place } of inside.get(around) ?? []) {
       const aid = run.actions?.[name]?.aid ?? known.get(name)?.key ?? null;
-      const its = whose ?? (known.get(name)?.actor || robot);
+      const its = whose ?? (run.actions?.[name]?.robot || known.get(name)?.actor || robot);
       const holds = inside.has(name);
       const { levels, name: label } = place;
       const need = levels.length === 0 ? needs.get(name) : undefined;

@@ -1,0 +1,92 @@
+/** A graph of two robots, led step by step: started from the page, handed from one to the other, stopped. */
+
+import { expect, type Page, test } from "@playwright/test";
+import { holdEnter, saved } from "./canvas";
+import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
+import { type Person, Product } from "./product";
+
+test.skip(NO_ROS !== "", NO_ROS);
+test.describe.configure({ mode: "serial" });
+
+const product = new Product();
+const carol = new StandIn("Carol");
+const david = new StandIn("David");
+let ada: Person;
+let graph: string;
+
+const dialog = (page: Page) => page.getByRole("dialog");
+const moves = (page: Page) => page.getByRole("region", { name: "Moves now" });
+
+function post<T>(path: string, body: object, base = product.runnerUrl): Promise<T> {
+  const headers = { "content-type": "application/json" };
+  return product.ask<T>(path, { method: "POST", body: JSON.stringify(body), headers }, base);
+}
+
+/** Carrier drives, and when it has arrived Scout looks. */
+function driveThenLook(): Promise<{ id: string }> {
+  const drive = { name: "Drive", instance_id: 0 };
+  const look = { name: "Look", instance_id: 0 };
+  const actions = [
+    { ...drive, type: "sync", actor: "Carrier", parents: [], children: [look] },
+    { ...look, type: "sync", actor: "Scout", parents: [drive], children: [] },
+  ];
+  const file = { graph_name: "drive_look", graph_entry: [drive], graph_exit: [look], actions };
+  return post("/api/graphs", file, product.url);
+}
+
+test.beforeAll(async ({ browser }) => {
+  carol.start(product.data, { "*": { after_s: 1.5 } });
+  david.start(product.data, { "*": { after_s: 60, stop_s: 0.05 } });
+  await product.start();
+  const reach = ({ name, path }: StandIn) => ({ name, domain: DOMAIN, get_service: path });
+  await post("/api/robots", { ...reach(carol), led: true });
+  await post("/api/robots", reach(david));
+  graph = (await driveThenLook()).id;
+  ada = await product.person(browser, "Ada");
+});
+
+test.afterAll(async () => {
+  for (const robot of [carol, david]) await robot.kill();
+  expect(ada.failures).toEqual([]);
+  await product.dispose();
+});
+
+test("a robot is led only after somebody has switched that on", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/robots`);
+  const david = page.getByRole("article", { name: "David" });
+  await expect(david.getByText("A stop can be proven")).toBeVisible({ timeout: 30_000 });
+  await david.getByRole("button", { name: /^More about/ }).click();
+  await page.getByRole("menuitem", { name: "Change …" }).click();
+  await dialog(page).getByRole("switch", { name: "Runs that are led step by step" }).check();
+  await dialog(page).getByRole("button", { name: "Save" }).click();
+  await expect(david.getByText("Led step by step")).toBeVisible();
+});
+
+test("a led run passes from one robot to the other, and Stop ends it", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${graph}`);
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  await expect(dialog(page).getByRole("radio", { name: /^Lead it/ })).toBeChecked();
+  await dialog(page).getByRole("combobox", { name: "Robot for Carrier" }).selectOption("Carol");
+  await expect(dialog(page).getByRole("button", { name: /Choose who plays Scout/ })).toBeDisabled();
+  await dialog(page).getByRole("combobox", { name: "Robot for Scout" }).selectOption("David");
+  await expect(dialog(page)).toContainText(/Carol.? and .?David.? may begin to move/);
+  const start = dialog(page).getByRole("button", { name: /^Start v1, step by step, on/ });
+  await expect(start).toBeEnabled({ timeout: 15_000 });
+  await holdEnter(page, start);
+  await expect(moves(page)).toContainText("Carol Drive", { timeout: 10_000 });
+  await expect(moves(page)).toContainText("David Look", { timeout: 10_000 });
+  await expect(moves(page)).not.toContainText("not started here");
+  await page.getByRole("button", { name: /^Stop/ }).first().click();
+  await expect(moves(page)).toBeHidden({ timeout: 10_000 });
+  const [run] = await product.ask<{ state: string; proof_at: string | null }[]>(
+    "/api/runs",
+    {},
+    product.runnerUrl,
+  );
+  expect(run).toMatchObject({ state: "stopped", proof_at: expect.any(String) });
+  await page.goto(`${product.url}/runs`);
+  await expect(page.getByRole("row", { name: /drive_look/ })).toContainText("Carol, David");
+});

@@ -1,0 +1,203 @@
+/** The choices of a start that the runner leads step by step: who plays whom, and what a lost robot causes. */
+import { NativeSelect, Text } from "@mantine/core";
+import type { ReactNode } from "react";
+import { Link } from "wouter";
+import type { LedOrder } from "../../api/led-runs";
+import { useLive } from "../../api/page-link";
+import { useMay } from "../../api/people";
+import { type Robot, SIMULATOR } from "../../api/robots";
+import { fromUmrf } from "../../canvas/from-umrf";
+import { robotCounts } from "../../graph/robots";
+import { colorOfName } from "../../ui/name-colors";
+import { isolated } from "../../words/isolated";
+import style from "./led-choice.module.css";
+import dialogStyle from "./start-dialog.module.css";
+
+type Cast = LedOrder["robots"];
+
+/** Return the actors of a graph, "" (actions that name none) last; empty while its text is not there. */
+export function actorsIn(umrf: string | undefined): string[] {
+  if (umrf === undefined) return [];
+  return robotCounts(fromUmrf(JSON.parse(umrf)).actions).map(([actor]) => actor);
+}
+
+/** Return why a robot can play nobody in a led run; "" if it can. */
+export function whyOff(robot: Robot, may: boolean): string {
+  if (robot.simulated) return "";
+  if (!robot.led) return "led runs are off";
+  if (!may) return "operators only";
+  return robot.state === "no_link" ? "no link" : "";
+}
+
+/**
+ * Return the robot of each actor: what was chosen, else the robot of the same name; the simulator
+ * where no robot allows led runs. An actor without a robot is left out.
+ */
+export function castOf(
+  actors: readonly string[],
+  chosen: Cast,
+  engines: readonly Robot[],
+  may: boolean,
+): Record<string, string> {
+  const can = new Set(engines.filter((robot) => whyOff(robot, may) === "").map(({ name }) => name));
+  const onlySimulated = [...can].every((name) => name === SIMULATOR);
+  const cast: Record<string, string> = {};
+  for (const actor of actors) {
+    const own = Object.hasOwn(chosen, actor) ? chosen[actor] : undefined;
+    const wanted = [own, actor, onlySimulated ? SIMULATOR : undefined];
+    const found = wanted.find((name) => name !== undefined && can.has(name));
+    if (found !== undefined) cast[actor] = found;
+  }
+  return cast;
+}
+
+/** Return the name of an actor in the table; `only`: there is no other. */
+function actorWords(actor: string, only: boolean): string {
+  if (actor !== "") return isolated(actor);
+  return only ? "All actions" : "The other actions";
+}
+
+/** Return why a led run has no complete cast; null when it has. */
+export function castObstacle(actors: readonly string[], cast: Cast): string | null {
+  if (actors.length === 0) return "Looking …";
+  const without = actors.find((actor) => !Object.hasOwn(cast, actor));
+  if (without === undefined) return null;
+  return `Choose who plays ${actorWords(without, actors.length === 1).replace(/^[AT](ll|he) /, (a) => a.toLowerCase())}`;
+}
+
+/** Return what moves in a led run, and for how long, as a sentence. */
+export function movesWords(cast: Cast): string {
+  const engines = [...new Set(Object.values(cast))].sort();
+  const robots = engines.filter((name) => name !== SIMULATOR).map(isolated);
+  if (robots.length === 0) return "Only the simulator plays: nothing moves.";
+  const rest = engines.length > robots.length ? " The simulator plays the others." : "";
+  const many = robots.length > 1 ? `${robots.slice(0, -1).join(", ")} and ` : "";
+  return `${many}${robots.at(-1)} may begin to move at any time until the run ends.${rest}`;
+}
+
+interface WayProps {
+  led: boolean;
+  /** Actions name two or more robots. */
+  several: boolean;
+  onLed: (led: boolean) => void;
+}
+
+/** The choice between a graph that is handed over whole and one that is led. */
+export function WayChoice({ led, several, onLed }: WayProps) {
+  const ways = [
+    {
+      value: false,
+      name: "Hand over the whole graph",
+      means: several
+        ? "The engine gets the whole graph at once. For a graph of several robots, only the simulator can do that."
+        : "The robot gets the whole graph at once and carries it out by itself. It goes on when this server or the network fails.",
+    },
+    {
+      value: true,
+      name: "Lead it step by step",
+      means:
+        "The runner sends each robot one action at a time, and sees each result. When it or the network fails, nothing further begins; what was begun goes on.",
+    },
+  ];
+  return (
+    <fieldset className={dialogStyle.where}>
+      <legend>How</legend>
+      {ways.map(({ value, name, means }) => (
+        <label key={name} className={dialogStyle.choice} data-on={led === value || undefined}>
+          <input type="radio" name="way" checked={led === value} onChange={() => onLed(value)} />
+          <span>
+            <span className="weight-550">{name}</span>
+            <span className={style.means}>{means}</span>
+          </span>
+        </label>
+      ))}
+    </fieldset>
+  );
+}
+
+interface LedChoiceProps {
+  actors: readonly string[];
+  cast: Cast;
+  lost: LedOrder["lost"];
+  onCast: (cast: Cast) => void;
+  onLost: (lost: LedOrder["lost"]) => void;
+}
+
+const LOST = [
+  ["stop", "Stop everything"],
+  ["wait", "Wait for a person"],
+] as const;
+
+export function LedChoice({ actors, cast, lost, onCast, onLost }: LedChoiceProps) {
+  const { now } = useLive();
+  const may = useMay("operate");
+  const options = now.engines.map((robot) => {
+    const why = whyOff(robot, may);
+    const player = robot.simulated ? "Simulator (nothing moves)" : isolated(robot.name);
+    return {
+      value: robot.name,
+      label: why === "" ? player : `${player}: ${why}`,
+      disabled: why !== "",
+    };
+  });
+  const off = now.engines.filter(({ led, simulated }) => !simulated && !led);
+  return (
+    <>
+      <fieldset className={style.part}>
+        <legend>Who plays whom</legend>
+        <div className={style.cast}>
+          {actors.map((actor) => (
+            <CastRow key={actor} actor={actor} only={actors.length === 1}>
+              <NativeSelect
+                aria-label={`Robot for ${actorWords(actor, actors.length === 1)}`}
+                value={cast[actor] ?? ""}
+                data={[{ value: "", label: "Choose …", disabled: true }, ...options]}
+                onChange={(event) => onCast({ ...cast, [actor]: event.currentTarget.value })}
+              />
+            </CastRow>
+          ))}
+        </div>
+        {off.length > 0 && (
+          <Text size="xs" c="dimmed">
+            Led runs are off for {off.map(({ name }) => isolated(name)).join(", ")}:{" "}
+            <Link to="/robots">Robots</Link>, Change …, switches them on.
+          </Text>
+        )}
+      </fieldset>
+      <fieldset className={style.part}>
+        <legend>When a robot does not answer, or its action cannot begin</legend>
+        <div className={style.lost}>
+          {LOST.map(([value, words]) => (
+            <label key={value}>
+              <input
+                type="radio"
+                name="lost"
+                checked={lost === value}
+                onChange={() => onLost(value)}
+              />
+              {words}
+            </label>
+          ))}
+        </div>
+      </fieldset>
+    </>
+  );
+}
+
+interface CastRowProps {
+  actor: string;
+  only: boolean;
+  children: ReactNode;
+}
+
+function CastRow({ actor, only, children }: CastRowProps) {
+  return (
+    <>
+      <span className={style.actor}>
+        {actor !== "" && <i style={{ background: colorOfName(actor) }} aria-hidden />}
+        {actorWords(actor, only)}
+      </span>
+      {children}
+    </>
+  );
+}

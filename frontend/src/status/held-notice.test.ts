@@ -1,0 +1,41 @@
+import { expect, test } from "vitest";
+import type { Run } from "../api/runs";
+import { heldWords } from "./held-notice";
+
+const held = { by: null, why: "Look_0 on David: the robot does not answer.", since: "2026-01-01" };
+const run = (part: object) =>
+  ({
+    ...{ id: "r", number: 4, graph_name: "fetch", engine: "conducted", state: "running" },
+    ...{ robots: { Scout: "David", Carrier: "Carol" }, held, ended_at: null, actions: {} },
+    ...part,
+  }) as unknown as Run;
+const NONE: ReadonlySet<string> = new Set();
+const action = (state: string, robot: string) => ({ state, robot, visits: [] });
+
+test("a held run says what goes on all the same, and on which robot", () => {
+  const actions = {
+    Drive_0: action("RUNNING", "Carol"),
+    Look_0: action("FINISHED", "David"),
+    Beep_0: action("STOPPING", ""),
+  };
+  const words = heldWords(run({ actions }), NONE);
+  expect(words?.why).toBe("Waiting: Look_0 on David: the robot does not answer.");
+  expect(words?.moving).toMatch(/^What was begun goes on: Drive.* on .?Carol.?, Beep.* on the sim/);
+  expect(words?.moving).not.toContain("Look");
+});
+
+test("what a robot does that does not answer is not known, and may go on", () => {
+  const actions = { Drive_0: action("RUNNING", "Carol"), Look_0: action("RUNNING", "David") };
+  const words = heldWords(run({ actions }), new Set(["David"]));
+  expect(words?.moving).toMatch(/goes on: Drive.* on .?Carol.?\. Not known, .*: Look.* on .?David/);
+});
+
+test("it never says that nothing moves, only that nothing was seen to", () => {
+  expect(heldWords(run({}), NONE)?.moving).toBe("No action was seen to move.");
+});
+
+test("a run that is not held, is being stopped or is over waits for nobody", () => {
+  expect(heldWords(run({ held: null }), NONE)).toBeNull();
+  expect(heldWords(run({ desired: "stopped" }), NONE)).toBeNull();
+  expect(heldWords(run({ ended_at: "2026-01-01" }), NONE)).toBeNull();
+});
