@@ -1,5 +1,7 @@
 """Starts at most once; pauses where that is safe; takes up what a crash left. In virtual time."""
 
+from typing import Any
+
 import anyio
 import pytest
 
@@ -119,6 +121,29 @@ async def test_a_request_id_belongs_to_one_start_only() -> None:
         await control.start(order(sequence("one"), request_id="same"), ANN)
         with pytest.raises(Conflict, match="request_id"):
             await control.start(order(sequence("two"), request_id="same"), ANN)
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("simulator", {"robots": {"": "David"}}),
+        ("David", {"robots": {"": "David"}}),
+        ("David", {"like": "David"}),
+        ("David", {"behaviours": True}),
+        ("conducted", {"robots": {"": "simulator"}, "like": "David"}),
+        ("conducted", {"robots": {"": "simulator"}, "behaviours": True}),
+    ],
+)
+@virtual
+async def test_a_field_that_means_nothing_for_the_engine_is_refused_with_its_place(
+    name: str, given: dict[str, Any]
+) -> None:
+    harness = Harness({"David": Robot(engine())})
+    async with harness.runner() as control:
+        with pytest.raises(BadInput) as refused:
+            await control.start(order(sequence(), engine=name, **given), ANN)
+        assert refused.value.where == {"path": f"/{list(given)[-1]}"}
+        assert not control.open
 
 
 @virtual

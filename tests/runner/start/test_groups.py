@@ -3,7 +3,7 @@
 import anyio
 import pytest
 
-from action_assistant.errors import Conflict
+from action_assistant.errors import BadInput, Conflict
 from action_assistant.runner.links.port import Leaves, Order, unwatched
 from action_assistant.runner.runs import queries
 from runner.harness import ANN, BEN, Harness, sequence, until, virtual
@@ -48,6 +48,17 @@ async def test_a_start_that_is_under_way_says_so_until_its_runs_are_there() -> N
         assert (control.under_way(asked.request_id), await found()) == (False, ["David", "Eve"])
         control.stop_all(BEN)
         await until(lambda: not control.open)
+
+
+@pytest.mark.parametrize("other", ["simulator", "conducted"])
+@virtual
+async def test_a_group_has_robots_only(other: str) -> None:
+    david = Open(NEVER)
+    async with fleet(Harness(), David=david) as control:
+        with pytest.raises(BadInput, match="robots only") as refused:
+            await control.start_group(group(sequence(), "David", other), ANN)
+    assert refused.value.where == {"path": "/engines"}
+    assert david.starts == []
 
 
 @virtual

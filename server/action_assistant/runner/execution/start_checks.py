@@ -124,15 +124,14 @@ class StartChecks:
     async def accept(self, request: StartRequest, starter: str) -> AcceptedStart:
         """Take a request through all stages that may refuse it. Raise a subclass of Refused if one
         stage does."""
-        if request.engine == SIMULATOR:
-            return await self._accept_simulation(request)
         if request.engine == CONDUCTED:
             return await self._accept_conducted(request, starter)
+        if request.robots:
+            raise BadInput("Only a conducted run has several robots.", where={"path": "/robots"})
+        if request.engine == SIMULATOR:
+            return await self._accept_simulation(request)
         robot = self._robots.reachable(request.engine)
-        if request.like is not None:
-            raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
-        if request.behaviours:
-            raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
+        _require_plain(request)
         ready = await self._run_in_worker(prepared, request, robot.facts, random_id())
         return await self._accept_on(robot, request, ready, starter)
 
@@ -160,6 +159,7 @@ class StartChecks:
     async def _accept_conducted(self, request: StartRequest, starter: str) -> AcceptedStart:
         """Take the start of a conducted run through all stages, with all its robots side by side.
         Raise Conflict, with the reasons of all robots, if a stage refuses it."""
+        _require_plain(request)
         ready = await self._run_in_worker(prepared_pieces, request, CONDUCTED_FACTS, random_id())
         items = preflight.led_items(ready)
         overridden = request.override.codes if request.override else ()
@@ -418,6 +418,14 @@ class StartChecks:
             return (preflight.unknown_courses_item(why),)
         except Refused as refused:
             return (preflight.unknown_courses_item(refused.detail),)
+
+
+def _require_plain(request: StartRequest) -> None:
+    """Raise BadInput if a start has fields that mean something to the simulator only."""
+    if request.like is not None:
+        raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
+    if request.behaviours:
+        raise BadInput("Only the simulator runs behaviours.", where={"path": "/behaviours"})
 
 
 def require_led(robot: KnownEngine) -> None:
