@@ -59,7 +59,8 @@ class RunMetrics(Collector):
         run = opened.run
         if run.end is not None and self._over.get(opened) != run.end:
             self._over[opened] = run.end
-            self._ended[run.engine, run.end] += 1
+            if not opened.is_led:  # a piece is a part of its run
+                self._ended[run.engine, run.end] += 1
         if run.end is None:
             self._over.pop(opened, None)  # it moves again, and will end once more
         if run.desired != "stopped":
@@ -86,9 +87,9 @@ class RunMetrics(Collector):
         yield from self._robot_families()
 
     def _run_families(self) -> Iterator[Family]:
-        opened = tuple(self._control.open.values())
-        open_runs = [each.run for each in opened if each.run.end is None]
-        yield Family("runs_open", "Runs that are not over, or not stored yet.", len(opened))
+        opened, shown = tuple(self._control.open.values()), self._control.shown.values()
+        open_runs = [each.run for each in shown if each.run.end is None]
+        yield Family("runs_open", "Runs that are not over, or not stored yet.", len(shown))
         yield Family(
             "runs",
             "Runs that are not over, by engine and state.",
@@ -192,7 +193,7 @@ class WatchedRunner(Watched):
         ]
         return Activity(
             sockets=len(self._hub.boxes),
-            runs=len(self._control.open),
+            runs=len(self._control.shown),
             stops_unconfirmed=self._metrics.unconfirmed.total(),
             robots=robots,
         )
