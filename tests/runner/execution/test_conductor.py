@@ -384,3 +384,37 @@ async def test_a_run_is_not_at_rest_by_word_while_a_robot_may_move_in_it() -> No
         await control.stop(run, BEN)
         assert await ended(control, run) == "stopped"
         assert not await lab.david.moving("task--Work_0")
+
+
+@virtual
+async def test_a_piece_whose_robot_is_lost_is_stopped_with_its_run() -> None:
+    lab = Lab({"*": [{"after_s": 60}]})
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 2), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost="stop"), ANN)).run.id
+        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        lab.david.engine = engine({"*": [{"after_s": 60}]})
+        await until(lambda: control.open[run].run.desired == "stopped")
+        await anyio.sleep(1)
+        piece = control.open[control.open[run].run.actions["Work_0"].piece]
+        assert piece.run.lost
+        assert piece.run.desired == "stopped"
+        assert piece.run == lab.harness.journal.history(piece.run.id)
+
+
+@virtual
+async def test_a_stop_reaches_a_piece_that_moves_again() -> None:
+    lab = Lab({"*": [{"after_s": 100}]})
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 2), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+        await until(lambda: bool(lab.carol.starts), 200)
+        await anyio.sleep(5)
+        await lab.david.engine.start(lab.david.starts[0])
+        await until(lambda: control.open[run].run.held is not None)
+        assert await lab.david.moving("task--Work_0")
+        await control.stop(run, BEN)
+        with anyio.fail_after(20):
+            assert await ended(control, run) == "stopped"
+        assert not await lab.david.moving("task--Work_0")
+        assert (await control.find(run)).held is None

@@ -203,6 +203,9 @@ class Conductor:
         self._gate.close()
         for step in self._steps.values():
             self._end_step(step, author)
+        for piece in self._again.values():
+            if piece.run.end is None:
+                piece.stop(author, "")
 
     async def pause(self, graph_name: str) -> None:
         """Raise NotSent: a conducted run is held, not paused."""
@@ -234,11 +237,8 @@ class Conductor:
         """Return the whole graph where no engine knows it any more: stopped once nothing can begin and
         no piece is open."""
         at, is_over = self._clock_us(), self._gate.is_final and not self._is_going
-        others = {
-            name: "UNINITIALIZED" if state in ACTIVE else state  # they ended with their engine
-            for name, state in self._others.items()
-        }
-        nodes = dict.fromkeys(self._first.actions, "UNINITIALIZED") | others | self._states
+        ended = {name: state for name, state in self._others.items() if state not in ACTIVE}
+        nodes = dict.fromkeys(self._first.actions, "UNINITIALIZED") | ended | self._states
         state = self._state if self._state in TERMINAL else "STOPPED" if is_over else "RUNNING"
         shown = Snapshot(at, self._first.graph_name, state, nodes, asked_at=at, run=self._first.run)
         return Answer(asked_at=at, at=at, incarnation=self._first.run, graphs=(shown,))
@@ -687,11 +687,12 @@ class Conductor:
 
     def moves_again(self, piece: OpenRun) -> None:
         """Act on a piece that had ended and moves."""
-        if piece.run.id not in self._again:
-            self._again[piece.run.id] = piece
-            self._act_on(
-                f"{piece.run.graph_name} moves again on {piece.run.engine}.", "moves_again"
-            )
+        again = piece.run
+        is_known, self._again[again.id] = again.id in self._again, piece
+        if self._gate.is_final and again.desired != "stopped":
+            piece.stop(self._stopped_by, "")
+        if not is_known:
+            self._act_on(f"{again.graph_name} moves again on {again.engine}.", "moves_again")
 
     @property
     def _run(self) -> Leading:

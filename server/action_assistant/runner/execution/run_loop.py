@@ -51,6 +51,7 @@ from action_assistant.runner.runs.events import (
     Silent,
     StopSent,
 )
+from action_assistant.runner.runs.fold import follow
 from action_assistant.runner.runs.history import newest_sent_text
 from action_assistant.runner.runs.recorder import RunRecorder, Store
 from action_assistant.runner.runs.run import Run
@@ -253,7 +254,10 @@ class OpenRun:
 
     def _apply(self, changes: RunChanges) -> None:
         """Apply and store changes that were derived from the present state of the run."""
-        for event, author, self.run in changes:
+        known = self.run
+        for event, author, after in changes:
+            # Whoever saw the change before this one may have stopped the run: that is kept.
+            self.run = known = after if self.run is known else follow(self.run, event)
             self.recorder.put(event, author or self.run.engine)
             if self.run.end is not None:
                 self._over.set()

@@ -204,6 +204,7 @@ def _desired(run: Run, event: PauseRequested | ResumeRequested | StopRequested) 
                 desired="stopped",
                 stop_requested_at=event.at,
                 stopped_by=event.author,
+                held=None,
             )
         case _:
             assert_never(event)
@@ -355,6 +356,7 @@ def _end(run: Run, event: Ended) -> Run:
         loading_since=None,
         moves_again_at=None,
         unknown_since=run.unknown_since if event.state == "lost" else None,
+        held=None,
     )
 
 
