@@ -303,3 +303,7 @@ def lived(seed: int) -> str:
 @given(seed=st.integers(0, 2**32))
 def test_a_led_run_stays_safe_whatever_happens(seed: int) -> None:
     lived(seed)
+
+
+def test_a_clock_that_is_set_back_between_two_runners_leaves_the_run_stoppable() -> None:
+    assert lived(1444) == "stopped"

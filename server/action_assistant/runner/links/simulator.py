@@ -208,7 +208,9 @@ class SimulatorLink:
         name = order.graph.name
         self._runs[name] = order.run
         self._engine.library = {**self._engine.library, **_inside(order)}
-        elapsed_us = max(0, self._clock_us() - course.began)
+        newest_ms = max((at_ms for at_ms, _ in course.steps), default=0.0)
+        # A clock that was set back must not leave the engine behind its own past.
+        elapsed_us = max(self._clock_us() - course.began, round(newest_ms * 1000))
         self._origin = anyio.current_time() - elapsed_us / 1e6
         self._origin_wall = course.began
         try:
@@ -216,7 +218,9 @@ class SimulatorLink:
         except semantics.GraphRefused as refused:
             raise EngineRefused(str(refused)) from refused
         over = {step.number for _, step in course.steps if isinstance(step, Returned)}
+        past_ms = 0.0
         for at_ms, step in course.steps:
+            past_ms = at_ms = max(past_ms, at_ms)
             if isinstance(step, Returned):
                 self._engine.returned(step, at_ms)
             else:
