@@ -15,6 +15,7 @@ from httpx_ws import aconnect_ws
 from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
+from action_assistant.cli import main
 from action_assistant.commands.client import Server
 from action_assistant.commands.remote import insisting, verdict
 from action_assistant.runner.runs.views import RunShown
@@ -213,6 +214,16 @@ def test_the_answer_no_is_exit_code_1_and_one_sentence(
         answer = product.cli(*arguments)
         assert answer.returncode == 1, arguments
         assert len(answer.stderr.splitlines()) == 1, answer.stderr
+
+
+@pytest.mark.parametrize("robots", ["David", "Scout=", "Scout=David,", "Scout=David,Scout=Carol"])
+def test_robots_of_a_led_run_that_cannot_be_meant_are_refused_with_the_form(
+    robots: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["run", "patrol", "--robots", robots])
+    told = capsys.readouterr().err
+    assert f"{robots!r} is not of the form ACTOR=ROBOT,…, each actor once" in told
 
 
 def test_without_a_server_it_says_how_to_start_one(tmp_path: Path) -> None:

@@ -74,11 +74,14 @@ def _add_run(run: argparse.ArgumentParser) -> None:
 
 
 def _robots(text: str) -> dict[str, str]:
-    """Read `Scout=David,Carrier=Carol`. Raise ValueError if it is anything else."""
+    """Read `Scout=David,Carrier=Carol`. Raise ArgumentTypeError if it is anything else."""
     pairs = [each.rpartition("=") for each in text.split(",")]
-    if any(not equals or not robot for _, equals, robot in pairs):
-        raise ValueError(text)
-    return {actor: robot for actor, _, robot in pairs}
+    robots = {actor: robot for actor, _, robot in pairs}
+    if len(robots) < len(pairs) or any(not equals or not robot for _, equals, robot in pairs):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not of the form ACTOR=ROBOT,…, each actor once"
+        )
+    return robots
 
 
 def _add_stop(stop: argparse.ArgumentParser) -> None:
