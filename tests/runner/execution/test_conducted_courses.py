@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from action_assistant.errors import Refused
-from action_assistant.runner.execution.conductor import CONDUCTED_FACTS
+from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.observations import GraphResult, NodeResult, NodeState

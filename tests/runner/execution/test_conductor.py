@@ -418,3 +418,23 @@ async def test_a_stop_reaches_a_piece_that_moves_again() -> None:
             assert await ended(control, run) == "stopped"
         assert not await lab.david.moving("task--Work_0")
         assert (await control.find(run)).held is None
+
+
+@virtual
+async def test_a_run_is_not_proven_where_only_a_person_has_seen_a_robot_at_rest() -> None:
+    lab = Lab({"*": [{"after_s": 60}]})
+    async with lab.runner() as control:
+        graph = shared(sequence("task", 2), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost="stop"), ANN)).run.id
+        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        lab.david.engine = engine({"*": [{"after_s": 60}]})
+        await until(lambda: control.open[run].run.desired == "stopped")
+        await anyio.sleep(1)
+        piece = control.open[run].run.actions["Work_0"].piece
+        await control.confirm_rest(piece, RestRequest("I stand beside it."), BEN)
+        assert await ended(control, run) == "error"
+        found = lab.harness.journal.history(run)
+        assert found.proof_at is None
+        assert found.at_rest is not None
+        assert found.at_rest.by == BEN
+        assert found.actions["Work_0"].visits[-1].how == "inferred"

@@ -1,6 +1,7 @@
 """The steps of a conducted run, and the gate before them."""
 
 from collections.abc import Awaitable, Callable
+from typing import Final
 
 import anyio
 import msgspec
@@ -18,19 +19,31 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
+from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.pieces import piece_name
 from action_assistant.umrf.semantics import Call
 
+#: Facts of the engine that plays the whole graph: only a proof ends what a robot does.
+CONDUCTED_FACTS: Final = msgspec.structs.replace(
+    SIMULATED, synchronises=True, stop_timeout_ms=10**12
+)
+#: Who stops an action in the name of the graph: an arrow of it, or its end.
+GRAPH: Final = Author("graph", "the graph itself", "program")
+#: Who stops a conducted run whose robot is lost, as the starter has chosen.
+RUNNER: Final = Author("runner", "the runner", "program")
+
 
 class Leading(msgspec.Struct, frozen=True, kw_only=True):
-    """The run that a conductor leads, as far as it needs it: `tell` shows and records an event, `stored` waits until all
-    told events are in the journal, `stop` begins a Stop of the whole run."""
+    """The run that a conductor leads, as far as it needs it: `tell` shows and records an event,
+    `stored` waits until all told events are in the journal, `stop` begins a Stop of the whole run,
+    `rests` ends it as a piece has ended that no answer has proven at rest."""
 
     tell: Callable[[RunEvent], None]
     stored: Callable[[], Awaitable[None]]
     stop: Callable[[Author], None]
+    rests: Callable[[Run], None]
 
 
 class Word(msgspec.Struct, frozen=True, kw_only=True):
@@ -44,13 +57,15 @@ class Word(msgspec.Struct, frozen=True, kw_only=True):
 class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
     """A conducted run that an earlier process left: its start, how far it got, how many pieces it had
     sent, those of calls without an outcome, by number of the call, each with the seq of its last
-    event, and the states of the actions that robots play."""
+    event, the states of the actions that robots play, and the last piece whose rest no answer has
+    proven."""
 
     order: Order
     course: LedCourse
     sent: int
     pieces: dict[int, tuple[Run, int]]
     states: dict[str, str]
+    unproven: Run | None
 
 
 class Step:

@@ -25,6 +25,8 @@ from anyio.abc import TaskGroup
 from action_assistant.errors import Conflict, Refused
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.conducted_steps import (
+    GRAPH,
+    RUNNER,
     Gate,
     Leading,
     LeftOpen,
@@ -80,7 +82,6 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import PieceText
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
-from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.semantics import Returned
@@ -94,14 +95,6 @@ _STALL_S: Final = 3.0  # for which nothing may have stood still before a piece l
 _MOST_ENGINES: Final = 3  # that are begun for one run after the first
 _UNSET_S: Final = 1.0  # a piece whose action has ended and whose graph goes on lacks an output
 _FOREIGN: Final = frozenset({"foreign_start", "foreign_stop", "foreign_pause", "foreign_modify"})
-#: Facts of the engine that plays the whole graph: only a proof ends what a robot does.
-CONDUCTED_FACTS: Final = msgspec.structs.replace(
-    SIMULATED, synchronises=True, stop_timeout_ms=10**12
-)
-#: Who stops an action in the name of the graph: an arrow of it, or its end.
-GRAPH: Final = Author("graph", "the graph itself", "program")
-#: Who stops a conducted run whose robot is lost, as the starter has chosen.
-RUNNER: Final = Author("runner", "the runner", "program")
 
 
 class Conductor:
@@ -158,6 +151,7 @@ class Conductor:
         #: The states of the actions that robots play.
         self._states = dict(left.states) if left is not None else dict[str, str]()
         self._others: dict[str, str] = {}  # the states of the other actions
+        self._unproven = left.unproven if left is not None else None  # rests by what was seen
         self._stopped_by = GRAPH
         self._is_told_to_stop = False
         self._replaced = 0
@@ -239,6 +233,8 @@ class Conductor:
         at, is_over = self._clock_us(), self._gate.is_final and not self._is_going
         ended = {name: state for name, state in self._others.items() if state not in ACTIVE}
         nodes = dict.fromkeys(self._first.actions, "UNINITIALIZED") | ended | self._states
+        if is_over and self._unproven is not None:
+            self._run.rests(self._unproven)
         state = self._state if self._state in TERMINAL else "STOPPED" if is_over else "RUNNING"
         shown = Snapshot(at, self._first.graph_name, state, nodes, asked_at=at, run=self._first.run)
         return Answer(asked_at=at, at=at, incarnation=self._first.run, graphs=(shown,))
@@ -380,6 +376,8 @@ class Conductor:
             )
             if is_end and self._is_going:
                 break
+            if is_end and self._gate.is_final and self._unproven is not None:
+                self._run.rests(self._unproven)
             ready.append(self._waiting.pop(0))
             if isinstance(first, GraphState) and first.graph == self._first.graph_name:
                 self._state = first.state
@@ -414,14 +412,15 @@ class Conductor:
             await step.over.wait()
             outcome = self._outcome(step)
             if outcome is not None:
-                await self._finish(step, outcome, "shape")
+                is_shown = step.run.at_rest is None
+                await self._finish(step, outcome, "shape" if is_shown else "word")
                 return
             if not step.has_not_left:  # a Stop or the word of a person ends it
                 await step.decided.wait()
                 if step.word is not None:
                     await self._finish(step, step.word.outcome, "word")
                 else:
-                    await self._finish(step, "on_stopped", "shape")
+                    await self._finish(step, "on_stopped", "word")
                 return
             step.renew()  # nothing has left: a person may let it go on
 
@@ -545,6 +544,7 @@ class Conductor:
             self._find_lacking_output(step, run)
             return
         step.over.set()
+        self._unproven = run if run.at_rest is not None else self._unproven
         self._show_what_may_be(self._first.run)
 
     def _find_trouble(self, step: Step, run: Run) -> None:

@@ -5,11 +5,14 @@ from typing import Final, Literal
 from weakref import WeakValueDictionary
 
 from action_assistant.errors import Conflict
-from action_assistant.runner.execution.conducted_steps import Leading, LeftOpen, Word, order_of
-from action_assistant.runner.execution.conductor import (
+from action_assistant.runner.execution.conducted_steps import (
     CONDUCTED_FACTS,
-    Conductor,
+    Leading,
+    LeftOpen,
+    Word,
+    order_of,
 )
+from action_assistant.runner.execution.conductor import Conductor
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.led_calls import LedCourse
@@ -88,6 +91,7 @@ class Conductors:
                 tell=opened.tell,
                 stored=opened.recorder.flushed,
                 stop=lambda author: opened.stop(author, ""),
+                rests=opened.rests_as,
             )
         )
         self._open[run.id] = conductor
@@ -133,6 +137,7 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
     Unavailable if the journal cannot be read."""
     ends: list[tuple[int, Returned | Literal["stop"]]] = []
     began, sent, calls = first.at, 0, dict[int, int]()
+    unproven: Run | None = None
     after = 0
     while events := await history.events(first.run, after, _PAGE):
         after = events[-1].seq
@@ -143,7 +148,9 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
                 case PieceBegan(call=call, piece=piece):
                     sent = max(sent, int(piece.rpartition(".")[2]))
                     calls[call] = sent
-                case PieceEnded(at=at, call=call, outcome=outcome):
+                case PieceEnded(at=at, call=call, outcome=outcome, how=how, piece=piece):
+                    if how == "word":
+                        unproven = (await history.left(piece))[0]
                     calls.pop(call, None)
                     result = "on_true" if outcome == "on_stopped" else outcome
                     ends.append((at, Returned(number=call, result=result)))
@@ -167,4 +174,5 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
         sent=sent,
         pieces=pieces,
         states={name: each.state for name, each in now.actions.items() if each.robot},
+        unproven=unproven,
     )

@@ -536,6 +536,13 @@ class OpenRun:
         with self._changing() as changes:
             changes.rests(AtRest(author, self._clock_us(), how), "error", why, author.id)
 
+    def rests_as(self, piece: Run) -> None:
+        """End the run as a piece of it has ended that somebody or something has seen at rest, where
+        no answer of its robot proves that."""
+        if piece.at_rest is not None and piece.end is not None and self.run.end is None:
+            with self._changing() as changes:
+                changes.rests(piece.at_rest, piece.end, f"{piece.engine}: {piece.detail}")
+
     def end(self, state: End, detail: str) -> None:
         """End the run in this state, unless it has ended already."""
         with self._changing() as changes:

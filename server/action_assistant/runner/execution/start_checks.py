@@ -14,7 +14,7 @@ from action_assistant.errors import BadInput, Conflict, Refused, Unavailable
 from action_assistant.random_ids import random_id
 from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.analysis.course_checks import CheckedCourses
-from action_assistant.runner.execution.conductor import CONDUCTED_FACTS
+from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS
 from action_assistant.runner.execution.late_activity import LateActivity
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
