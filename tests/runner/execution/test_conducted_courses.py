@@ -329,6 +329,10 @@ async def led_through(seed: int) -> str:
     return "same"
 
 
+def test_a_run_whose_graph_ends_every_engine_can_be_stopped() -> None:
+    run_in_virtual_time(lambda: led_through(10075))
+
+
 @pytest.mark.timeout(0)
 @settings(max_examples=examples(40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
 @given(seed=st.integers(0, 2**32))

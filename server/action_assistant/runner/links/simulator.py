@@ -204,7 +204,7 @@ class SimulatorLink:
     async def take_up(self, order: Order, course: LedCourse) -> None:
         """Start a graph and bring it to where an earlier engine had left it. Nothing of that is
         reported except the calls that are still open. Raise EngineRefused if the engine refuses the
-        graph."""
+        graph, or does not survive its course."""
         name = order.graph.name
         self._runs[name] = order.run
         self._engine.library = {**self._engine.library, **_inside(order)}
@@ -226,6 +226,8 @@ class SimulatorLink:
             else:
                 self._engine.stop(name, at_ms)
         self._engine.advance(self._now())
+        if self._engine.crashed or self._engine.locked:
+            raise EngineRefused("its course ends the engine again")
         self._wake.set()
         for each in self._performer.news() if isinstance(self._performer, LedCalls) else ():
             number = each.call.number if isinstance(each, CallBegan) else each.number
