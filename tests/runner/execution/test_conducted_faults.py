@@ -307,3 +307,4 @@ def test_a_led_run_stays_safe_whatever_happens(seed: int) -> None:
 
 def test_a_clock_that_is_set_back_between_two_runners_leaves_the_run_stoppable() -> None:
     assert lived(1444) in ENDED
+    assert lived(247) in ENDED

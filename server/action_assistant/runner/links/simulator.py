@@ -210,7 +210,7 @@ class SimulatorLink:
         self._engine.library = {**self._engine.library, **_inside(order)}
         newest_ms = max((at_ms for at_ms, _ in course.steps), default=0.0)
         # A clock that was set back must not leave the engine behind its own past.
-        elapsed_us = max(self._clock_us() - course.began, round(newest_ms * 1000))
+        elapsed_us = max(0, self._clock_us() - course.began, round(newest_ms * 1000))
         self._origin = anyio.current_time() - elapsed_us / 1e6
         self._origin_wall = course.began
         try:
