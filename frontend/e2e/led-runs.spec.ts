@@ -1,7 +1,7 @@
 /** A graph of two robots, led step by step: started from the page, handed from one to the other, stopped. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { holdEnter, saved } from "./canvas";
+import { card, holdEnter, saved } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { type Person, Product } from "./product";
 
@@ -79,6 +79,13 @@ test("a led run passes from one robot to the other, and Stop ends it", async () 
   await expect(moves(page)).toContainText("Carol Drive", { timeout: 10_000 });
   await expect(moves(page)).toContainText("David Look", { timeout: 10_000 });
   await expect(moves(page)).not.toContainText("not started here");
+  const lane = page.getByRole("region", { name: "Run" }).locator('[data-lane="Look_0"]');
+  const look = card(page, "Look");
+  for (const said of [lane, look]) await expect(said).toContainText("running");
+  david.freeze();
+  for (const said of [lane, look]) await expect(said).toContainText("unknown", { timeout: 15_000 });
+  david.thaw();
+  for (const said of [lane, look]) await expect(said).toContainText("running", { timeout: 15_000 });
   await page.getByRole("button", { name: /^Stop/ }).first().click();
   await expect(moves(page)).toBeHidden({ timeout: 10_000 });
   const [run] = await product.ask<{ state: string; proof_at: string | null }[]>(

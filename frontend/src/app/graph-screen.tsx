@@ -30,7 +30,9 @@ import { ConnectionStatus } from "../runs/connection-status";
 import { RunDrawer } from "../runs/drawer/run-drawer";
 import type { Waits } from "../runs/sent-graph";
 import { StartControl } from "../runs/start/start-control";
+import type { Unsure } from "../status/progress";
 import { type GraphInRun, isInRun, useProgress } from "../status/progress-inside";
+import { useUnsure } from "../status/silence";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
 import { useStableCallback } from "../ui/hooks";
@@ -67,7 +69,7 @@ interface RunHere {
   /** The newest run, also of last week: shown in the strip. Undefined until that is known. */
   run: Run | null | undefined;
   label: string;
-  unsure: boolean;
+  unsure: Unsure;
 }
 
 function useRunHere(id: string): RunHere {
@@ -87,7 +89,7 @@ function useRunHere(id: string): RunHere {
     live,
     run,
     label,
-    unsure: now.link === "down" && live?.ended_at === null,
+    unsure: useUnsure(live),
   };
 }
 
@@ -128,7 +130,7 @@ function useEdge(run: Run | null): number {
 /** Tells what is drawn inside of actions which run is shown. */
 function useRunOnCanvas(
   run: Run | null,
-  unsure: boolean,
+  unsure: Unsure,
   at: number | null,
   inside: GraphInRun | null,
 ): void {
@@ -150,10 +152,10 @@ function Inside({ id }: { id: string }) {
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);
   const past = replay.at !== null;
   const drawn = past ? replay.run : live;
-  const seen = useProgress(drawn, unsure && !past, replay.at, inside);
+  const seen = useProgress(drawn, !past && unsure, replay.at, inside);
   const [waits, setWaits] = useState<Waits | null>(null);
   const progress = waits?.of === seen ? waits.progress : seen;
-  useRunOnCanvas(drawn, unsure && !past, replay.at, inside);
+  useRunOnCanvas(drawn, !past && unsure, replay.at, inside);
   const newest = run?.id;
   const { seek } = replay;
   // biome-ignore lint/correctness/useExhaustiveDependencies: another run is shown as it is now

@@ -9,6 +9,7 @@ import { fromUmrf } from "../canvas/from-umrf";
 import { GraphView } from "../canvas/graph-view";
 import type { Tone } from "../status/progress";
 import { useProgress } from "../status/progress-inside";
+import { useUnsure } from "../status/silence";
 import { StateLabel } from "../status/state-label";
 import { isolated } from "../words/isolated";
 import style from "./compare-page.module.css";
@@ -56,7 +57,7 @@ interface Props {
 
 export function ComparedCanvas({ found, run, selected, onSelect }: Props) {
   const graph = useMemo(() => fromUmrf(run.umrf), [run.umrf]);
-  const progress = useProgress(run, false);
+  const progress = useProgress(run, useUnsure(run));
   const actions = useMemo(
     () => new Map(comparedActions(found).map((each) => [each.aid, each])),
     [found],

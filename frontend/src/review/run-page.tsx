@@ -21,6 +21,7 @@ import { Timeline, type Track } from "../status/lanes/timeline";
 import { INTO } from "../status/level-places";
 import { runEndText, runLabel, useRunStatus } from "../status/progress";
 import { useProgress } from "../status/progress-inside";
+import { useUnsure } from "../status/silence";
 import { StateLabel } from "../status/state-label";
 import { withWaits } from "../status/waits";
 import { Empty } from "../ui/empty";
@@ -259,7 +260,8 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
   const { run } = replay;
   const past = replay.at !== null;
   useAddress(newest.id, replay, level);
-  const seen = useProgress(run, unsure && !past, replay.at, level.inside);
+  const unheard = useUnsure(newest);
+  const seen = useProgress(run, !past && unheard, replay.at, level.inside);
   const progress = useMemo(() => withWaits(level.graph, seen), [level.graph, seen]);
   const mates = useTracks(runner, newest);
   const engines = useMemo(() => enginesOf(newest, mates), [newest, mates]);

@@ -5,6 +5,7 @@ import { serverNow } from "../clock/server-clock";
 import { boundsText, durationText } from "../status/durations";
 import { actionWords } from "../status/level-places";
 import { progressOf, runEndText, visitDuration } from "../status/progress";
+import { useUnsure } from "../status/silence";
 import { PrintSheet } from "../ui/print-sheet";
 import { clock, dateText, instant } from "../ui/times";
 import { isolated } from "../words/isolated";
@@ -20,8 +21,9 @@ export function rangeText(from: string | null, to: string | null): string {
   return exact(least) === exact(most) ? exact(least) : `${exact(least)}–${exact(most)}`;
 }
 
-function endOf(visit: Visit, over: boolean): string {
-  if (visit.until === null && visit.not_after === null) return over ? "not seen" : "goes on";
+function endOf(visit: Visit, over: boolean, unknown: boolean): string {
+  if (visit.until === null && visit.not_after === null)
+    return over ? "not seen" : unknown ? "not known" : "goes on";
   return rangeText(visit.until, visit.not_after);
 }
 
@@ -32,7 +34,7 @@ interface VisitRowsProps {
 }
 
 function ActionRows({ run, name, action }: VisitRowsProps) {
-  const now = progressOf(action, run, false);
+  const now = progressOf(action, run, useUnsure(run));
   const over = run.ended_at !== null;
   if (action.visits.length === 0) {
     return (
@@ -57,7 +59,7 @@ function ActionRows({ run, name, action }: VisitRowsProps) {
           {visit.how === "inferred" && " (inferred)"}
         </td>
         <td>{rangeText(visit.not_before, visit.from)}</td>
-        <td>{endOf(visit, over)}</td>
+        <td>{endOf(visit, over, last && now.tone === "unknown")}</td>
         <td>{durationText(visitDuration(visit)) ?? "not known"}</td>
       </tr>
     );

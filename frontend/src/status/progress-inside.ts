@@ -7,7 +7,13 @@ import { useRef } from "react";
 import type { Run } from "../api/runs";
 import { fullName, type Graph } from "../graph/model";
 import { placesOf } from "./level-places";
-import { type Progress, progressAt, progressByAid, progressOfAction } from "./progress";
+import {
+  type Progress,
+  progressAt,
+  progressByAid,
+  progressOfAction,
+  type Unsure,
+} from "./progress";
 
 /** The way from the outermost graph to one inside: by the names of the graphs below it, as far as nobody knows
  * which of several actions of a name was entered, and then by the very actions that one is inside of. */
@@ -21,7 +27,7 @@ export type GraphInRun = WayInside & { readonly graph: Pick<Graph, "actions"> };
 /** The run whose states are on the canvas. */
 export interface RunOnCanvas {
   readonly run: Run;
-  readonly unsure: boolean;
+  readonly unsure: Unsure;
   /** The moment at which its replay stands, ms. */
   readonly at: number | null;
   /** The names of the graphs below the run's, down to the one on the canvas. */
@@ -42,7 +48,7 @@ function isThere(told: readonly string[], way: WayInside): boolean {
 /** Progress by the keys that the actions have here; those that the run knows under no such name have none. */
 export function progressInside(
   run: Run,
-  unsure: boolean,
+  unsure: Unsure,
   inside: GraphInRun,
 ): Map<string, Progress> {
   const keys = new Map(inside.graph.actions.map((action) => [fullName(action), action.key]));
@@ -83,7 +89,7 @@ function keptProgress(before: ProgressByAid, now: ProgressByAid): ProgressByAid 
 /** `at`: the moment at which a replay stands, ms. `inside`: what is shown is a graph inside of the run's. */
 export function useProgress(
   run: Run | null,
-  unsure: boolean,
+  unsure: Unsure,
   at: number | null = null,
   inside: GraphInRun | null = null,
 ): ProgressByAid {

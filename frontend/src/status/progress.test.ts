@@ -79,6 +79,40 @@ test("while nobody hears of the run, what ran is unknown", () => {
   expect(progressOf(going, { ...run, state: "unknown" }, false).tone).toBe("unknown");
 });
 
+const SILENT: ReadonlySet<string> = new Set(["David"]);
+
+test.each(["RUNNING", "PAUSE_REQUESTED", "PAUSED", "STOPPING"])(
+  "in a led run what was %s on a robot that does not answer is unknown, and on another one it is not",
+  (state) => {
+    const on = (aid: string, robot: string): ActionRun => ({ ...going, state, aid, robot });
+    const actions = { A_0: on("a", "David"), B_0: on("b", "Carol"), C_0: on("c", "") };
+    const led = { ...run, actions, robots: { Scout: "David", Carrier: "Carol" } };
+    const keys = Object.entries({ a: "A", b: "B", c: "C" });
+    const graph = { actions: keys.map(([key, name]) => ({ key, name, instanceId: 0 })) } as never;
+    const tones = (silent: ReadonlySet<string>) => [
+      [...progressByAid(led, silent)].map(([aid, { tone }]) => aid + (tone === "unknown")),
+      [...progressInside(led, silent, { graph, names: [] })].map(
+        ([aid, { tone }]) => aid + (tone === "unknown"),
+      ),
+    ];
+    const unknown = ["atrue", "bfalse", "cfalse"];
+    const known = ["afalse", "bfalse", "cfalse"];
+    expect(tones(new Set())).toEqual([known, known]);
+    expect(tones(SILENT)).toEqual([unknown, unknown]);
+    expect(tones(new Set())).toEqual([known, known]);
+  },
+);
+
+test("what ended on a robot that does not answer now stays as it ended", () => {
+  const ended: ActionRun = {
+    ...{ ...going, state: "FINISHED", robot: "David" },
+    visits: [{ ...visit, until: visit.from, result: "true" }],
+  };
+  expect(progressOf(ended, run, SILENT).word).toBe("true");
+  const over = { ...run, ended_at: "2026-01-01T00:00:09Z" };
+  expect(progressOf({ ...going, robot: "David" }, over, SILENT).word).toBe("end not seen");
+});
+
 test("an end that was not seen is not told as one of the four outcomes", () => {
   const ended: ActionRun = {
     ...going,

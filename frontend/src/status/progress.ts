@@ -109,10 +109,17 @@ export function visitDuration(visit: Visit): Pick<Progress, "took" | "atMost"> {
   return { took, atMost: visitDurationBound(visit) };
 }
 
-/** `unsure`: nobody has heard of the run for too long. */
-export function progressOf(action: ActionRun, run: Run, unsure: boolean): Progress {
+/** True: nothing is heard of a run. A set: the robots that do not answer, of which a led run may have some. */
+export type Unsure = boolean | ReadonlySet<string>;
+
+function isUnsure(action: ActionRun, run: Run, unsure: Unsure): boolean {
+  if (unsure === true || run.state === "unknown") return true;
+  return unsure !== false && unsure.has(action.robot ?? "");
+}
+
+export function progressOf(action: ActionRun, run: Run, unsure: Unsure): Progress {
   const over = run.ended_at !== null;
-  const { tone, word } = stateOf(action, over, unsure || run.state === "unknown");
+  const { tone, word } = stateOf(action, over, isUnsure(action, run, unsure));
   const last = action.visits.at(-1);
   const from = last ? visitBegin(last) : null;
   const until = last ? visitEnd(last) : null;
@@ -142,9 +149,9 @@ export function progressOfAction(
   name: string,
   action: ActionRun,
   run: Run,
-  unsure: boolean,
+  unsure: Unsure,
 ): Progress {
-  const key = `${name} ${run.ended_at !== null} ${unsure || run.state === "unknown"}`;
+  const key = `${name} ${run.ended_at !== null} ${isUnsure(action, run, unsure)}`;
   const before = lastSaid.get(action);
   if (before?.key === key) return before.progress;
   const progress = { name, ...progressOf(action, run, unsure) };
@@ -154,7 +161,7 @@ export function progressOfAction(
 
 /** Progress by `aid`; actions of sub-graphs, which carry none, are left out. What is told of an action
  * that did not change is the same object again. */
-export function progressByAid(run: Run | null, unsure: boolean): Map<string, Progress> {
+export function progressByAid(run: Run | null, unsure: Unsure): Map<string, Progress> {
   const found = new Map<string, Progress>();
   if (run === null) return found;
   for (const [name, action] of Object.entries(run.actions ?? {})) {

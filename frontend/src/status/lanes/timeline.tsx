@@ -8,12 +8,14 @@ import {
   useRef,
   useState,
 } from "react";
+import { useLive } from "../../api/page-link";
 import type { Run } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
 import { keyOf } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { duration, instant, stopwatch, useNow } from "../../ui/times";
 import { type Progress, progressOf, progressOfAction, type Tone } from "../progress";
+import { silentSinceOf, useUnsure } from "../silence";
 import { toneColor } from "../state-label";
 import { waitingFor, waitWords } from "../waits";
 import {
@@ -224,9 +226,11 @@ function Groups({ track, axis, named, inside, ...props }: GroupsProps) {
   const nested = track.lanes.some(({ holds }) => holds);
   const ended = instant(run.ended_at);
   const silent = ended === null ? silentSince : null;
+  const { now } = useLive();
+  const unsure = useUnsure(run);
   const progressIn = (name: string): Progress | null => {
     const action = run.actions?.[name];
-    return action ? progressOfAction(name, action, run, silent !== null) : null;
+    return action ? progressOfAction(name, action, run, silent !== null || unsure) : null;
   };
   const progressIs = ({ name, needs }: Lane): Progress | null => {
     const own = progressIn(name);
@@ -256,7 +260,7 @@ function Groups({ track, axis, named, inside, ...props }: GroupsProps) {
               progress={progressIs(lane)}
               axis={axis}
               ended={ended}
-              silentSince={silent}
+              silentSince={silent ?? (action && ended === null ? silentSinceOf(action, now) : null)}
               selected={lane.name === selected}
               onPick={picks(lane) ? onPick : undefined}
               opened={lane.holds ? inside.open.has(lane.name) : null}
