@@ -73,6 +73,7 @@ test("a led run passes from one robot to the other, and Stop ends it", async () 
   await expect(dialog(page).getByRole("button", { name: /Choose who plays Scout/ })).toBeDisabled();
   await dialog(page).getByRole("combobox", { name: "Robot for Scout" }).selectOption("David");
   await expect(dialog(page)).toContainText(/Carol.? and .?David.? may begin to move/);
+  await dialog(page).getByRole("radio", { name: /wait/i }).check();
   const start = dialog(page).getByRole("button", { name: /^Start v1, step by step, on/ });
   await expect(start).toBeEnabled({ timeout: 15_000 });
   await holdEnter(page, start);
@@ -84,6 +85,12 @@ test("a led run passes from one robot to the other, and Stop ends it", async () 
   for (const said of [lane, look]) await expect(said).toContainText("running");
   david.freeze();
   for (const said of [lane, look]) await expect(said).toContainText("unknown", { timeout: 15_000 });
+  const desktop = page.viewportSize() ?? { width: 1440, height: 900 };
+  await page.setViewportSize({ width: 390, height: 844 });
+  await expect(look).toBeVisible();
+  const waits = page.getByRole("region", { name: "The run waits for a person" });
+  await expect(waits).toContainText("David");
+  await page.setViewportSize(desktop);
   david.thaw();
   for (const said of [lane, look]) await expect(said).toContainText("running", { timeout: 15_000 });
   await page.getByRole("button", { name: /^Stop/ }).first().click();

@@ -48,6 +48,10 @@ const DraftStatus = boundedPart(
 const RunWaits = boundedPart(() => import("../runs/sent-graph").then((part) => part.RunWaits), {
   waiting: null,
 });
+const HeldNotice = boundedPart(
+  () => import("../status/held-notice").then((part) => part.HeldNotice),
+  { waiting: null },
+);
 const RecordDryRun = lazyPart(() =>
   import("../runs/start/record-dry-run").then((part) => part.RecordDryRun),
 );
@@ -204,6 +208,7 @@ function Inside({ id }: { id: string }) {
           />
         }
         seed={seed}
+        held={live?.held && <HeldNotice run={live} />}
         corner={<ConnectionStatus run={live} whose={going.length > 1} />}
       />
     </>

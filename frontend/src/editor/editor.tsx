@@ -214,6 +214,8 @@ interface Props {
   /** The button that turns the open dry-run into a run. */
   record: ReactNode;
   corner: ReactNode;
+  /** The notice of a run that waits for a person, for a phone: elsewhere the strip shows it. */
+  held?: ReactNode;
   /** The moment of a run at which a dry-run shall start; null without one. */
   seed: DryRunSeed | null;
 }
@@ -419,7 +421,7 @@ export function Editor(props: Props) {
       <EditorSummaryContext value={summary}>
         <props.Bar {...barParts(props, context, summary, told, search, rename)} />
         {phone ? (
-          <PhoneLayout {...parts} onCanvas={isDryOrPast} start={props.start} />
+          <PhoneLayout {...parts} onCanvas={isDryOrPast} start={props.start} held={props.held} />
         ) : (
           <DesktopLayout {...parts} wide={!compact} told={told} list={props.list} />
         )}

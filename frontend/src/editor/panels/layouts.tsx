@@ -75,10 +75,13 @@ interface PhoneParts extends Parts {
   /** A dry-run is open or the past is shown; both need the canvas. */
   onCanvas: boolean;
   start: ReactNode;
+  /** The notice of a run that waits for a person; the run's own pane shows it too. */
+  held: ReactNode;
 }
 
 export function PhoneLayout(props: PhoneParts) {
-  const { panels, outline, history, stage, find, details, strip, start, status, onCanvas } = props;
+  const { panels, outline, history, stage, find, details, strip, start, held, status, onCanvas } =
+    props;
   const { pane, setPane } = panels;
   useEffect(() => {
     if (onCanvas) setPane("canvas");
@@ -92,6 +95,7 @@ export function PhoneLayout(props: PhoneParts) {
         value={pane}
         onChange={setPane}
       />
+      {pane !== "run" && held}
       <div className="fill-y relative border-top">
         {find}
         {pane === "canvas" && stage}
