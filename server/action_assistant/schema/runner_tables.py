@@ -70,9 +70,9 @@ robot: Final = Table(
     Column("rmw", Text, nullable=False),
     Column("get_service", Text, nullable=False),
     Column("profile", JSON, nullable=False),
-    Column("led", Boolean(create_constraint=False), nullable=False, server_default=false()),
     Column("registered_at", BigInteger, nullable=False),
     Column("retired_at", BigInteger),
+    Column("led", Boolean(create_constraint=False), nullable=False, server_default=false()),
 )
 #: What people noted about a run, and what may be searched of it once it is over (`summed`).
 review: Final = Table(
