@@ -34,7 +34,12 @@ test.afterAll(async () => {
 const where = (page: Page) => page.getByRole("navigation", { name: "Where you are" });
 /** The dialog about one graph without graphs inside. */
 async function asked(page: Page) {
-  await page.keyboard.press("Control+k");
+  // A page that was just loaded may not take the first press yet.
+  const words = page.getByRole("dialog").getByRole("combobox");
+  await expect(async () => {
+    await page.keyboard.press("Control+k");
+    await expect(words).toBeVisible({ timeout: 1000 });
+  }).toPass();
   await page.keyboard.type("one graph without");
   await page.keyboard.press("Enter");
   return page.getByRole("dialog", { name: "One graph without graphs inside" });
@@ -45,8 +50,11 @@ const inside = (page: Page, name: string) =>
 
 test("one goes in by the sign, a double click and ], and out by the line of levels and [", async () => {
   const { page } = ada;
-  await inside(page, "Fetch").click();
-  await expect(where(page)).toContainText("Graphs/Round/Fetch");
+  // The sign moves with its card while the graph that was just opened is laid out.
+  await expect(async () => {
+    await inside(page, "Fetch").click({ timeout: 1000 });
+    await expect(where(page)).toContainText("Graphs/Round/Fetch", { timeout: 2000 });
+  }).toPass();
   await expect(card(page, "Grip")).toBeVisible();
   await card(page, "Grip").dblclick();
   await expect(where(page)).toContainText("Graphs/Round/Fetch/Grip");
