@@ -82,9 +82,10 @@ export function StartControl(props: Props) {
           className={style.robots ?? ""}
           disabled={why !== null}
           title={
-            (why ?? led)
+            why ??
+            (led
               ? "Look at its robots before starting"
-              : `Look ${where.replace(/^on /, "at ")} before starting`
+              : `Look ${where.replace(/^on /, "at ")} before starting`)
           }
           onClick={ask}
         >
