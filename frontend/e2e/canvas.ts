@@ -200,9 +200,12 @@ export async function tidy(page: Page): Promise<void> {
 
 /** Waits until everything is on disk, also where things stand in a graph that was opened anew. */
 export async function saved(page: Page): Promise<void> {
+  const stored = page.getByText("Saved", { exact: true });
   const busy = page.locator("main [aria-busy=true]:not([aria-label=Run])");
+  // A page without its canvas yet is not busy either.
+  await expect(stored).toBeVisible({ timeout: 30_000 });
   await expect(busy).toHaveCount(0, { timeout: 30_000 });
-  await expect(page.getByText("Saved", { exact: true })).toBeVisible();
+  await expect(stored).toBeVisible();
 }
 
 /** Holds Start for as long as it asks for. */

@@ -34,12 +34,8 @@ test.afterAll(async () => {
 const where = (page: Page) => page.getByRole("navigation", { name: "Where you are" });
 /** The dialog about one graph without graphs inside. */
 async function asked(page: Page) {
-  // A page that was just loaded may not take the first press yet.
-  const words = page.getByRole("dialog").getByRole("combobox");
-  await expect(async () => {
-    await page.keyboard.press("Control+k");
-    await expect(words).toBeVisible({ timeout: 1000 });
-  }).toPass();
+  await saved(page);
+  await page.keyboard.press("Control+k");
   await page.keyboard.type("one graph without");
   await page.keyboard.press("Enter");
   return page.getByRole("dialog", { name: "One graph without graphs inside" });
@@ -50,11 +46,9 @@ const inside = (page: Page, name: string) =>
 
 test("one goes in by the sign, a double click and ], and out by the line of levels and [", async () => {
   const { page } = ada;
-  // The sign moves with its card while the graph that was just opened is laid out.
-  await expect(async () => {
-    await inside(page, "Fetch").click({ timeout: 1000 });
-    await expect(where(page)).toContainText("Graphs/Round/Fetch", { timeout: 2000 });
-  }).toPass();
+  await saved(page);
+  await inside(page, "Fetch").click();
+  await expect(where(page)).toContainText("Graphs/Round/Fetch");
   await expect(card(page, "Grip")).toBeVisible();
   await card(page, "Grip").dblclick();
   await expect(where(page)).toContainText("Graphs/Round/Fetch/Grip");
