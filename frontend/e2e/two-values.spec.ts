@@ -228,13 +228,14 @@ test("a value that lost at once is in the history, with its author and what stay
   await clientIds(mari.page, 3_000_000_000);
   const graph = await newGraph("lost-at-once");
   await enter(ada.page, graph);
-  await add(ada.page, "Look");
+  // A name of its own: one that another graph has is offered from there.
+  await add(ada.page, "Peer");
   await saved(ada.page);
   await enter(mari.page, graph);
   await ada.context.setOffline(true);
-  await put(ada.page, "left of the door");
+  await put(ada.page, "left of the door", "Peer");
   await expect(ada.page.getByText(/Offline with 1 change/i).first()).toBeVisible();
-  await put(mari.page, "right of the door");
+  await put(mari.page, "right of the door", "Peer");
   await saved(mari.page);
   await ada.context.setOffline(false);
   await saved(ada.page);
@@ -247,10 +248,10 @@ test("a value that lost at once is in the history, with its author and what stay
   await page.keyboard.press("Space");
   const lost = page.getByRole("region", { name: "History" }).getByRole("listitem");
   await expect(lost.filter({ hasText: "overwritten at once" })).toContainText(
-    /Ada.*set Look description to left of the door, overwritten at once by right of the door/,
+    /Ada.*set Peer description to left of the door, overwritten at once by right of the door/,
   );
   await page.screenshot({ path: test.info().outputPath("history.png") });
-  await card(page, "Look").click({ position: { x: 50, y: 30 } });
+  await card(page, "Peer").click({ position: { x: 50, y: 30 } });
   const fields = page.getByRole("list", { name: "Who set what" }).getByRole("listitem");
   const set = fields.filter({ hasText: "description" }).getByRole("button").first();
   await expect(set).toContainText(/right of the door.*Mari/); // it stands, and is hers
