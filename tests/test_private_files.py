@@ -1,4 +1,4 @@
-"""Other users of the computer can neither see nor change anything in a data folder."""
+"""A data folder is closed to other users of the computer: they can neither see nor change anything in it."""
 
 import fcntl
 import json

@@ -1,4 +1,4 @@
-"""Others on the LAN reach the server without a proxy: by --tls, on other ports, with a token
+"""People on the LAN reach the server without a proxy: by --tls, on other ports, with a token
 from a file."""
 
 import ssl

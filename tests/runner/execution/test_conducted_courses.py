@@ -181,7 +181,7 @@ def played(graph: Graph, calls: Mapping[str, Any]) -> tuple[list[Trace], Engine]
 
 
 class Seen:
-    """What the engine of the whole graph went through while the run was led."""
+    """Records the course of the engine of the whole graph while its run is led."""
 
     def __init__(self) -> None:
         self.course: Course = defaultdict(list)
@@ -225,7 +225,7 @@ def as_seen(course: Course) -> Course:
 
 
 def is_near(one: Course, other: Course) -> bool:
-    """Whether two courses are the same to 2 ms."""
+    """Return whether two courses are the same to 2 ms."""
     if one.keys() != other.keys():
         return False
     return all(

@@ -1,4 +1,4 @@
-"""Whatever people, robots and power cuts do to a conducted run: no piece is sent twice, none after the
+"""Random histories of a conducted run with faults of all kinds: no piece is sent twice, none after the
 gate has closed, no outcome is made up, and nothing is called stopped that moves."""
 
 import random
@@ -183,7 +183,7 @@ class Story:
             robot.engine._engine.loading_ms = 0.0
 
     async def _come_to_rest(self, control: ExecutionService) -> str:
-        """Everything works again, and somebody stops everything."""
+        """Mend everything, and stop everything."""
         self._make_well()
         await anyio.sleep(2)
         control.stop_all(BEN)
@@ -206,7 +206,7 @@ class Story:
         return (await control.find(self.run)).state
 
     def hold(self) -> None:
-        """What must be true of the whole story."""
+        """Check what must be true of the whole story."""
         assert self.faults == [], (self.seed, self.log, self.faults)
         for name, robot in self.robots.items():
             sent = [each.run for each in robot.starts]
@@ -233,7 +233,7 @@ class Story:
 
     @property
     def meant(self) -> dict[str, str]:
-        """What the code of each piece has returned, if it was not stopped."""
+        """Return the outcome that the code of each piece gives unless it is stopped, by piece."""
         found: dict[str, str] = {}
         for robot in self.robots.values():
             found |= robot.meant

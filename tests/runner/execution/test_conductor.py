@@ -63,6 +63,17 @@ class Lab:
             yield control
             engines.cancel_scope.cancel()
 
+    async def led_run(
+        self, control: ExecutionService, *, actions: int = 2, lost: str = "stop"
+    ) -> str:
+        """Start a run whose actions alternate between the robots; return its id once the first one
+        is seen moving."""
+        graph = shared(sequence("task", actions), "Scout", "Carrier")
+        run = (await control.start(led(graph, lost=lost), ANN)).run.id
+        history = self.harness.journal.history
+        await until(lambda: history(run).actions["Work_0"].state == "RUNNING")
+        return run
+
 
 def led(graph: Graph, **more: Any) -> Any:
     """A start of a conducted run in which Scout is David and Carrier is Carol."""
@@ -251,9 +262,7 @@ async def test_a_stop_of_one_robot_stops_the_whole_run() -> None:
 async def test_the_word_of_a_person_counts_once_rest_is_seen_and_is_not_called_observed() -> None:
     lab = Lab({"*": [{"after_s": 5}]})
     async with lab.runner() as control:
-        graph = shared(sequence("task", 2), "Scout", "Carrier")
-        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
-        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        run = await lab.led_run(control, lost="wait")
         lab.david.engine = engine({"*": [{"after_s": 5}]})
         await until(lambda: bool(control.open[run].run.held))
         word = WordRequest(action="Work_0", outcome="true", reason="It stands at the door.")
@@ -304,9 +313,7 @@ async def test_a_run_can_be_stopped_when_nothing_leads_it_any_more() -> None:
     lab, engines = Lab({"*": [{"after_s": 60, "stop_s": 1}]}), Dying()
     lab.harness.simulator = engines
     async with lab.runner() as control:
-        graph = shared(sequence("task", 3), "Scout", "Carrier")
-        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
-        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        run = await lab.led_run(control, actions=3, lost="wait")
         for _ in range(5):
             engines.die()
             await anyio.sleep(2)
@@ -328,9 +335,7 @@ async def test_an_action_that_ends_while_the_run_gets_another_engine_is_not_sent
     lab, engines = Lab({"*": [{"after_s": 5}]}), Dying(begins_s=3)
     lab.harness.simulator = engines
     async with lab.runner() as control:
-        graph = shared(sequence("task", 2), "Scout", "Carrier")
-        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
-        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        run = await lab.led_run(control, lost="wait")
         await anyio.sleep(3)
         engines.die()
         await anyio.sleep(6)
@@ -372,9 +377,7 @@ async def test_a_run_is_not_at_rest_by_word_while_a_robot_may_move_in_it() -> No
     lab, engines = Lab({"*": [{"after_s": 60}]}), Dying(begins_s=20)
     lab.harness.simulator = engines
     async with lab.runner() as control:
-        graph = shared(sequence("task", 2), "Scout", "Carrier")
-        run = (await control.start(led(graph, lost="wait"), ANN)).run.id
-        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        run = await lab.led_run(control, lost="wait")
         engines.die()
         await anyio.sleep(10)
         assert control.open[run].run.state == "unknown"
@@ -390,9 +393,7 @@ async def test_a_run_is_not_at_rest_by_word_while_a_robot_may_move_in_it() -> No
 async def test_a_piece_whose_robot_is_lost_is_stopped_with_its_run() -> None:
     lab = Lab({"*": [{"after_s": 60}]})
     async with lab.runner() as control:
-        graph = shared(sequence("task", 2), "Scout", "Carrier")
-        run = (await control.start(led(graph, lost="stop"), ANN)).run.id
-        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        run = await lab.led_run(control)
         lab.david.engine = engine({"*": [{"after_s": 60}]})
         await until(lambda: control.open[run].run.desired == "stopped")
         await anyio.sleep(1)
@@ -424,9 +425,7 @@ async def test_a_stop_reaches_a_piece_that_moves_again() -> None:
 async def test_a_run_is_not_proven_where_only_a_person_has_seen_a_robot_at_rest() -> None:
     lab = Lab({"*": [{"after_s": 60}]})
     async with lab.runner() as control:
-        graph = shared(sequence("task", 2), "Scout", "Carrier")
-        run = (await control.start(led(graph, lost="stop"), ANN)).run.id
-        await until(lambda: lab.harness.journal.history(run).actions["Work_0"].state == "RUNNING")
+        run = await lab.led_run(control)
         lab.david.engine = engine({"*": [{"after_s": 60}]})
         await until(lambda: control.open[run].run.desired == "stopped")
         await anyio.sleep(1)

@@ -4,7 +4,7 @@ It lives on one event loop. Open runs are in memory; the journal has all runs.
 """
 
 import logging
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any, Final
 
@@ -56,6 +56,12 @@ _LOST: Final = (
     "The runner ended while this simulation went on, and the simulated engine with it. Nothing "
     "shows how it would have ended."
 )
+#: The outcomes that a person can give.
+_OUTCOMES: Final[Mapping[str, Precondition]] = {
+    "true": "on_true",
+    "false": "on_false",
+    "error": "on_error",
+}
 
 
 class ExecutionService:
@@ -254,8 +260,7 @@ class ExecutionService:
         """Take the outcome of an action in a conducted run from a person, where nothing shows it.
         Raise NotFound if there is no such run, Conflict if it is not asked for."""
         opened = await self._movable(run)
-        outcome: Precondition = f"on_{asked.outcome}"  # type: ignore[assignment]
-        word = Word(outcome=outcome, by=author, reason=asked.reason)
+        word = Word(outcome=_OUTCOMES[asked.outcome], by=author, reason=asked.reason)
         self._conductors.give_word(run, asked.action, word)
         return opened.run
 
