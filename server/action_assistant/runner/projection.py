@@ -123,7 +123,7 @@ def _first_summary(asked: Requested) -> dict[str, object]:
     if asked.group is not None:
         summary["group"] = asked.group
     if asked.led is not None:
-        summary["robots"] = asked.led.robots
+        summary |= {"robots": asked.led.robots, "lost": asked.led.lost}
     return summary
 
 

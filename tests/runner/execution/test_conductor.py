@@ -245,6 +245,18 @@ async def test_a_robot_is_kept_for_its_run_until_the_end() -> None:
 
 
 @virtual
+async def test_a_request_that_is_repeated_with_another_choice_is_another_start() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        request = led(shared(sequence("task", 2), "Scout", "Carrier"), lost="wait")
+        run = (await control.start(request, ANN)).run.id
+        assert (await control.start(request, ANN)).run.id == run
+        other = msgspec.structs.replace(request, lost="stop")
+        assert "belongs to another start" in await refused(control, other)
+        assert await ended(control, run) == "finished"
+
+
+@virtual
 async def test_a_stop_of_one_robot_stops_the_whole_run() -> None:
     lab = Lab({"*": [{"after_s": 5}]})
     async with lab.runner() as control:

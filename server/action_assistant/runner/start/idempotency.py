@@ -72,7 +72,10 @@ class IdempotentStarts:
             return None
         row = rows[0]
         other_tree = request.tree_digest and row.tree_digest not in {None, request.tree_digest}
-        other_robots = request.robots != row.summary.get("robots", {})
+        other_robots = (request.robots, request.lost) != (
+            row.summary.get("robots", {}),
+            row.summary.get("lost", request.lost),
+        )
         other = (row.digest, row.engine) != (request.digest, request.engine)
         if other or other_tree or other_robots:
             raise Conflict(
