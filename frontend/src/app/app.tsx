@@ -6,13 +6,12 @@ import { Route, Router, Switch } from "wouter";
 import { SignInGate } from "../account/sign-in-gate";
 import { Refusal } from "../api/http";
 import { basePath } from "../api/page-url";
-import { actionDrag } from "../canvas/action-drag";
+import { DragPreview } from "../canvas/action-drag";
 import { NewVersionNotice } from "../offline/page-version";
 import { UnansweredStartNotice } from "../runs/start/unanswered-starts";
 import { RestQuestion } from "../runs/stop/rest-question";
 import { LiveRegion } from "../ui/announcer";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
-import { DragPreview } from "../ui/pointer-drag";
 import { theme, variables } from "../ui/theme";
 import type { Crumb } from "../ui/top-bar";
 import { useWatched } from "../ui/watched";
@@ -139,7 +138,7 @@ export function App() {
               <ImportReview />
               <RestQuestion />
               <UnansweredStartNotice />
-              <DragPreview carrier={actionDrag} />
+              <DragPreview />
               <NewVersionNotice />
               <LiveRegion />
             </DropFiles>

@@ -5,7 +5,6 @@ import { DRY_RUN } from "./dry-run-actions";
 import type { EditAction } from "./edit-action";
 import * as folding from "./folding";
 import * as notes from "./notes";
-import { PANELS } from "./panels";
 import * as graph from "./share";
 import * as look from "./view";
 
@@ -67,7 +66,7 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   look.toCanvas,
   look.menu,
   look.showJson,
-  ...PANELS,
+  ...look.PANELS,
   look.showShortcuts,
   ...DRY_RUN,
   graph.exportUmrf,

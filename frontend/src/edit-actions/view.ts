@@ -1,4 +1,4 @@
-/** Edit actions that change the view, not the graph. */
+/** Edit actions that change the view, not the graph, and those that open a panel or find. */
 import {
   IconArrowGuide,
   IconArrowsDiagonal,
@@ -9,8 +9,12 @@ import {
   IconFocusCentered,
   IconHandStop,
   IconKeyboard,
+  IconListTree,
   IconMarquee2,
   IconMenu2,
+  IconMessageCircle,
+  IconSearch,
+  IconShieldCheck,
   IconSitemapOff,
   IconStairsDown,
   IconStairsUp,
@@ -303,3 +307,43 @@ export const flatten: EditAction = {
     graph.actions.some(({ name }) => store.graphsInside.now()?.byName.has(name) ?? false),
   run: (context) => context.openOverlay({ kind: "flat" }),
 };
+
+export const PANELS: readonly EditAction[] = [
+  {
+    ...look,
+    name: "find",
+    label: "Find in graph",
+    shortcuts: ["Mod+f"],
+    icon: IconSearch,
+    also: "search robot parameter value problem",
+    enabled: (context) => context.graph.actions.length > 0,
+    run: (context) => context.openFind(),
+  },
+  {
+    ...look,
+    name: "outline",
+    label: "Show the outline",
+    shortcuts: ["o"],
+    icon: IconListTree,
+    also: "tree list rows",
+    run: (context) => context.setPanel("outline"),
+  },
+  {
+    ...look,
+    name: "comments",
+    label: "Show the comments",
+    shortcuts: ["m"],
+    icon: IconMessageCircle,
+    also: "talk threads",
+    run: (context) => context.setPanel("comments"),
+  },
+  {
+    ...look,
+    name: "courses",
+    label: "Show the expected courses",
+    shortcuts: [],
+    icon: IconShieldCheck,
+    also: "tests coverage verify",
+    run: (context) => context.setPanel("courses"),
+  },
+];

@@ -1,12 +1,16 @@
 /** The canvas with its tools and bars, and the hint on an empty canvas. */
 
 import { Button, Kbd, Skeleton } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
 import { IconFocus2, IconRouteAltLeft } from "@tabler/icons-react";
 import { ReactFlowProvider } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useRef } from "react";
+import { useSearch } from "wouter";
 import { ChangeMarked } from "../canvas/marks/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/marks/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
+import { asksForHistory, present, targetOf, withPast } from "../edit-actions/graph-links";
+import { shownKeys } from "../edit-actions/view";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
 import type { SeenPast } from "../history/past-bar";
 import { RobotFilter } from "../outline/robot-filter";
@@ -15,6 +19,7 @@ import { useFollowedView } from "../people/use-followed-view";
 import type { Progress } from "../status/progress";
 import { useGraph, useLinkPart } from "../sync/use-room";
 import { Empty } from "../ui/empty";
+import { focusField } from "../ui/focus-field";
 import { useHasFingersOnly } from "../ui/hooks";
 import { boundedPart } from "../ui/lazy-part";
 import { useWatched } from "../ui/watched";
@@ -25,7 +30,6 @@ import { useUnfolding, useViewport } from "./canvas/use-viewport";
 import style from "./canvas-pane.module.css";
 import { Toolbar } from "./menus/toolbar";
 import type { EditorState } from "./use-editor";
-import { useGraphLink } from "./use-graph-link";
 import type { Past } from "./use-past";
 
 const PastBar = boundedPart(() => import("../history/past-bar").then((part) => part.PastBar));
@@ -272,4 +276,43 @@ export function CanvasPane(props: Props) {
       <PaneInFlow {...props} />
     </ReactFlowProvider>
   );
+}
+
+const SETTLED = 160; // ms after which the canvas has measured its cards and shown the graph
+
+/**
+ * Selects and shows what the address points at, once the graph is there and whenever the address
+ * changes. `begun`: the graph has arrived and has places.
+ */
+function useGraphLink(context: EditorContext, begun: boolean): void {
+  // Moments of the past are in the address, too, and point at no element.
+  const search = withPast(useSearch(), null);
+  const now = useRef(context);
+  now.current = context;
+  useEffect(() => {
+    if (begun && asksForHistory(search)) now.current.setPanel("history");
+  }, [search, begun]);
+  useEffect(() => {
+    const target = begun ? targetOf(search) : null;
+    if (target === null) return;
+    const timer = setTimeout(() => {
+      const { graph, select, setPanel } = now.current;
+      const selection = present(graph, target.selection);
+      if (selection.length < target.selection.length) {
+        notifications.show({
+          message: "The link points to something that is no longer in this graph.",
+        });
+      }
+      select(selection);
+      if (target.problem !== null) setPanel(selection.length > 0 ? "details" : "problems");
+      // The selection is rendered first; then its place is known.
+      requestAnimationFrame(() => {
+        const keys = shownKeys(now.current);
+        if (keys.length > 0) now.current.view.show(keys);
+        const [only] = selection;
+        if (only !== undefined && target.field !== null) focusField(`${only}|${target.field}`);
+      });
+    }, SETTLED);
+    return () => clearTimeout(timer);
+  }, [search, begun]);
 }

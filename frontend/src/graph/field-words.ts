@@ -1,6 +1,10 @@
-/** Words that people read for the fields of a graph, an action and an arrow. One table for the whole page. Pure. */
-import type { Key } from "./model";
-import { pathWords } from "./value-text";
+/**
+ * Words that people read for the fields of a graph, an action and an arrow, one table for the whole
+ * page; paths and values of parameters as text. Pure.
+ */
+
+import { memberText } from "./json-members";
+import type { Key, Parameter } from "./model";
 
 /** Words by the key of a field in the document; a key that stands for itself is not listed. */
 const WORDS: Readonly<Record<string, string>> = {
@@ -49,4 +53,39 @@ export function endLabel(key: Key): "Entry" | "Exit" | null {
 /** Return a value as text of at most `longest` characters, with a sign if it was longer. */
 export function shortText(text: string, longest: number): string {
   return text.length > longest ? `${text.slice(0, longest)}…` : text;
+}
+
+/** Returns a path as people read it: `pose.position.x` for `pose/position/x`. */
+export function pathWords(path: string): string {
+  return path
+    .split("/")
+    .map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"))
+    .join(".");
+}
+
+/** Returns the value as it is spelled; null when there is none. */
+export function valueText(parameter: Parameter): string | null {
+  const text = parameter.text.trimStart();
+  return text.startsWith("{") ? memberText(text, "pvf_value") : text;
+}
+
+export interface ParameterLine {
+  readonly name: string;
+  /** Null: no value of its own. */
+  readonly value: string | null;
+}
+
+/** Returns the most important inputs, `most` of them: those with a value, then those without. */
+export function cardLines(inputs: readonly Parameter[], most: number): ParameterLine[] {
+  const lines = inputs.map((input) => ({
+    name: pathWords(input.path),
+    value: valueText(input)?.replace(/\s+/g, " ") ?? null,
+  }));
+  const given = lines.filter((line) => line.value !== null);
+  const open = lines.filter((line) => line.value === null);
+  return [...given, ...open].slice(0, most);
+}
+
+export function lineText({ name, value }: ParameterLine): string {
+  return value === null ? `${name} = ?` : `${name} = ${value}`;
 }

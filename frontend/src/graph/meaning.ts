@@ -1,7 +1,7 @@
 /** Compares graphs by what they say, apart from how they are drawn: equal texts for equal tasks. */
 
 import { isolated } from "../words/isolated";
-import { fieldWords, shortText } from "./field-words";
+import { fieldWords, pathWords, shortText, valueText } from "./field-words";
 import {
   type Action,
   ENTRY,
@@ -12,7 +12,6 @@ import {
   type Parameter,
   PRECONDITIONS,
 } from "./model";
-import { pathWords, valueText } from "./value-text";
 
 function value(text: string): unknown {
   try {

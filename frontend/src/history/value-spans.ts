@@ -27,7 +27,7 @@ function numberOf(value: unknown): number | null {
 /** A value that the field never showed, since another one, which stayed, was set at the same time. */
 export interface OverwrittenValue {
   readonly value: FieldValue;
-  /** Both values as text. */
+  /** The value as text; `stayed`: the other one. */
   readonly text: string;
   readonly stayed: string;
 }

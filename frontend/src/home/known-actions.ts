@@ -10,7 +10,7 @@ import {
   useLibrary,
 } from "../api/library";
 import type { NewAction } from "../graph/edit";
-import { pathWords } from "../graph/value-text";
+import { pathWords } from "../graph/field-words";
 
 export interface KnownAction {
   readonly template: NewAction;

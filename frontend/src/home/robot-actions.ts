@@ -6,7 +6,7 @@ import { useLive } from "../api/page-link";
 import { type IndexedByRobot, indexedAction, useIndexedByRobots } from "../api/robots";
 import { flatName, pathOf } from "../graph/document-keys";
 import type { NewAction } from "../graph/edit";
-import { pathWords } from "../graph/value-text";
+import { pathWords } from "../graph/field-words";
 import { isolated } from "../words/isolated";
 
 export type IndexedAction = IndexedByRobot["actions"][number];

@@ -1,14 +1,18 @@
-/** The properties of an action. */
+/** Forms of an action: of one in a graph, and of one of the library. */
 import { Button, Group } from "@mantine/core";
 import { IconGhost2, IconPackage } from "@tabler/icons-react";
+import type { ReactNode } from "react";
 import { useEditorContext } from "../edit-actions/editor-context";
-import { adoptGhost, rename, setField } from "../graph/edit";
+import { adoptGhost, rename, renameDocument, setField } from "../graph/edit";
 import type { Action } from "../graph/model";
 import { DraftInput } from "../ui/draft-input";
 import { ArrowList } from "./arrow-list";
 import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
+import { type CheckedGroup, ProblemsContext } from "./fields/field-problems";
 import { SharedField } from "./fields/shared-field";
+import { InLibraryContext, ViewOnly } from "./fields/view-only";
 import style from "./inspector.module.css";
+import { LabelsField } from "./labels";
 import { ParameterList } from "./parameters/parameter-list";
 import { RobotField } from "./robot-field";
 import { RunConditions } from "./run-conditions";
@@ -78,5 +82,38 @@ export function ActionForm({ action }: { action: Action }) {
         </Button>
       </section>
     </div>
+  );
+}
+
+interface Props {
+  action: Action;
+  /** Fields that follow from its name. */
+  names: ReactNode;
+  told: readonly CheckedGroup[];
+}
+
+export function LibraryActionForm({ action, names, told }: Props) {
+  const { doc } = useEditorContext();
+  return (
+    <ViewOnly>
+      <ProblemsContext value={told}>
+        <div className={style.form}>
+          <NameField
+            action={action}
+            description={names}
+            onRename={(name) => renameDocument(doc, action.key, name)}
+          />
+          <DescriptionField action={action} />
+          <LabelsField />
+          <InLibraryContext value={true}>
+            <ParameterList action={action} side="in" />
+            <ParameterList action={action} side="out" />
+          </InLibraryContext>
+          <section className={style.section}>
+            <TypeField action={action} />
+          </section>
+        </div>
+      </ProblemsContext>
+    </ViewOnly>
   );
 }

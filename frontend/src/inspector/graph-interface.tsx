@@ -4,10 +4,10 @@ import { useMemo } from "react";
 import { useEditorContext } from "../edit-actions/editor-context";
 import type { ParameterSide } from "../graph/document-keys";
 import { asOneEdit, setParameter } from "../graph/edit";
+import { pathWords } from "../graph/field-words";
 import { type InterfaceParameter, interfaceOf } from "../graph/parameters/graph-interface";
 import { TYPES, withRequired, withType } from "../graph/parameters/values";
 import { endName } from "../graph/relation-words";
-import { pathWords } from "../graph/value-text";
 import { isolated } from "../words/isolated";
 import style from "./inspector.module.css";
 

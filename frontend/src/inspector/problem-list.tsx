@@ -8,11 +8,11 @@ import { type EditorContext, useEditorContext } from "../edit-actions/editor-con
 import { linkToProblem } from "../edit-actions/graph-links";
 import { relationId } from "../graph/document-keys";
 import { applyExamples, applySafeFixes, exampleFixes, safeFixes } from "../graph/edit/fixes";
+import { pathWords } from "../graph/field-words";
 import type { Graph } from "../graph/model";
 import { dataFlowOf } from "../graph/parameters/data-flow";
 import type { CheckedPlaceInside, ProblemKind } from "../graph/problems/problem-kinds";
 import { endName } from "../graph/relation-words";
-import { pathWords } from "../graph/value-text";
 import { INTO, spaced } from "../status/level-places";
 import { focusField } from "../ui/focus-field";
 import { Tooltip } from "../ui/tooltip";

@@ -1,4 +1,4 @@
-/** Whose actions these are: a field for one action, or for several at once. */
+/** The field for the robot of one action, or of several at once. */
 import { Button } from "@mantine/core";
 import { useLive } from "../api/page-link";
 import { useEditorContext } from "../edit-actions/editor-context";

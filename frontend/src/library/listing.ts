@@ -1,6 +1,6 @@
 /** Collects the actions of the library, of graphs and of robots into one list, and filters it. Pure. */
 import type { LibraryAction } from "../api/library";
-import { pathWords } from "../graph/value-text";
+import { pathWords } from "../graph/field-words";
 import type { RobotAction, RobotsKnowledge } from "../home/robot-actions";
 
 /** One action by its name. `action`: null if only robots have it. */

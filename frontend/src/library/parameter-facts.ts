@@ -2,11 +2,12 @@
  * Turns parameters into rows of a table; a pose is one row, and unknown members of the JSON are
  * listed. Pure.
  */
+
+import { pathWords } from "../graph/field-words";
 import { memberNames, memberText } from "../graph/json-members";
 import type { Parameter } from "../graph/model";
 import { blocksOf } from "../graph/parameters/groups";
 import { allowedLines, parameterValueOf } from "../graph/parameters/values";
-import { pathWords } from "../graph/value-text";
 
 export interface ParameterFacts {
   readonly path: string;

@@ -17,7 +17,7 @@ import {
   useActionUses,
 } from "../api/library";
 import { DifferenceView } from "../differences/difference-view";
-import { pathWords } from "../graph/value-text";
+import { pathWords } from "../graph/field-words";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import {

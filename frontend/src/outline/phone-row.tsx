@@ -2,9 +2,9 @@
 import { IconArrowBackUp, IconArrowRight, IconFlag, IconPlus } from "@tabler/icons-react";
 import { memo, useId } from "react";
 import { OutcomeSign, outcomeColor, outcomeWord } from "../canvas/outcome";
+import { cardLines, lineText } from "../graph/field-words";
 import { EXIT, type Key, type Precondition } from "../graph/model";
 import type { RobotOf } from "../graph/robots";
-import { cardLines, lineText } from "../graph/value-text";
 import { durationLabel } from "../status/durations";
 import type { Progress } from "../status/progress";
 import { StateLabel } from "../status/state-label";

@@ -8,7 +8,7 @@ import {
   IconPlayerTrackPrev,
 } from "@tabler/icons-react";
 import { type ReactNode, useEffect, useRef } from "react";
-import type { Replay, ReplayMark } from "../api/replay";
+import type { Replay, ReplayMark } from "../api/review";
 import type { Run } from "../api/runs";
 import type { TimeGap, TimeSign } from "../status/lanes/timeline";
 import { keyOf } from "../ui/keys";

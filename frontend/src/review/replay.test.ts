@@ -1,6 +1,6 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import type { Frame, Replay } from "../api/replay";
+import type { Frame, Replay } from "../api/review";
 import type { Run, Visit } from "../api/runs";
 import { chapterAt, framesBy, ReplayPlayer, runAfter, runBefore, shows } from "./replay";
 

@@ -10,7 +10,7 @@ import {
   useRef,
   useState,
 } from "react";
-import { type ActionFrame, type Frame, type Replay, useReplayData } from "../api/replay";
+import { type ActionFrame, type Frame, type Replay, useReplayData } from "../api/review";
 import type { ActionRun, Run } from "../api/runs";
 import { tick } from "../clock/server-clock";
 import { instant } from "../ui/times";

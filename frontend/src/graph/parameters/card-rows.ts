@@ -1,7 +1,7 @@
 /** Computes the rows that a card shows of its inputs: one for each, or one for a whole point or pose. Pure. */
 import { flatName } from "../document-keys";
+import { pathWords } from "../field-words";
 import type { Parameter } from "../model";
-import { pathWords } from "../value-text";
 import { type InputGivers, readValue, takenGivers } from "./data-flow";
 import { blocksOf } from "./groups";
 import { shown } from "./values";

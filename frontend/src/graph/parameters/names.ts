@@ -2,8 +2,8 @@
 
 import { isolated } from "../../words/isolated";
 import type { ParameterSide } from "../document-keys";
+import { pathWords } from "../field-words";
 import type { Action, Graph, Parameter } from "../model";
-import { pathWords } from "../value-text";
 import { handsOver, readValue } from "./data-flow";
 
 /** Returns the path of a typed name: `pose/position/x` for `pose.position.x`. */

@@ -1,9 +1,9 @@
 /** Groups checked problems for people: one thing is shown once, however many fields it has. Pure. */
 
+import { pathWords } from "../field-words";
 import type { Graph, Key } from "../model";
 import { type DataFlow, dataFlowOf } from "../parameters/data-flow";
 import { groupOf } from "../parameters/groups";
-import { pathWords } from "../value-text";
 import { type CheckedProblem, inputOf, kindOf, type ProblemKind } from "./problem-kinds";
 
 export interface ProblemGroup<P extends CheckedProblem = CheckedProblem> {

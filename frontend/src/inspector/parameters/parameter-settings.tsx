@@ -4,6 +4,7 @@ import { IconTrash } from "@tabler/icons-react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
 import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
+import { pathWords } from "../../graph/field-words";
 import type { Key, Parameter } from "../../graph/model";
 import { pathFrom, taken } from "../../graph/parameters/names";
 import {
@@ -15,7 +16,6 @@ import {
   withRequired,
   withType,
 } from "../../graph/parameters/values";
-import { pathWords } from "../../graph/value-text";
 import { DraftChoice, DraftInput } from "../../ui/draft-input";
 import { isolated } from "../../words/isolated";
 import style from "../inspector.module.css";

@@ -48,7 +48,7 @@ function useText(graph: string, seq: number) {
   });
 }
 
-/** What the runner sees when it looks at the chosen engines now. */
+/** Query the state of the chosen engines, as the runner sees it now. */
 function useLook(
   { graph, seq, umrf }: { graph: string; seq: number; umrf: string | undefined },
   engines: readonly string[],
@@ -157,7 +157,7 @@ function Exactly({
   label: string;
   digest: string;
   engines: readonly string[];
-  /** What moves in a led run; "" for other starts. */
+  /** The robots that move in a led run; "" for other starts. */
   moves: string;
 }) {
   return (

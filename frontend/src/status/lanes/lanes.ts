@@ -19,7 +19,7 @@ export interface Lane {
   around: string | null;
   /** Set if it has inner lanes. */
   holds: boolean;
-  /** What it waits for of other robots, by names of lanes; left out if there is nothing. */
+  /** The actions of other robots that it waits for, by names of lanes; left out if there are none. */
   needs?: Needs;
 }
 

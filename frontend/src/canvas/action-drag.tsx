@@ -1,30 +1,30 @@
-/** Drag and drop by pointer events, so that it works for fingers too. */
+/** Drags actions from the library to the canvas by pointer events, so that it works for fingers too. */
 import { type PointerEvent as ReactPointerEvent, useEffect } from "react";
-import { keyOf } from "./keys";
-import style from "./pointer-drag.module.css";
-import { useWatched, Watched } from "./watched";
+import type { NewAction } from "../graph/edit";
+import { keyOf } from "../ui/keys";
+import { useWatched, Watched } from "../ui/watched";
+import style from "./action-drag.module.css";
 
-export interface DraggedItem<T> {
-  readonly payload: T;
+interface DraggedAction {
+  readonly payload: NewAction;
   readonly label: string;
   readonly x: number;
   readonly y: number;
 }
 
-type DropHandler<T> = (draggedItem: DraggedItem<T>) => void;
+type DropHandler = (dragged: DraggedAction) => void;
 
 const THRESHOLD = 6; // px until a press becomes a drag
 
-/** One carrier for each kind of load. */
-export class PointerDrag<T> {
-  readonly #dragged = new Watched<DraggedItem<T> | null>(null);
-  #taker: DropHandler<T> | null = null;
+class ActionDrag {
+  readonly #dragged = new Watched<DraggedAction | null>(null);
+  #taker: DropHandler | null = null;
 
   readonly subscribe = this.#dragged.subscribe;
   readonly now = this.#dragged.now;
 
   /** Subscribe a handler of drops. Return the function that unsubscribes it. */
-  onDrop(taker: DropHandler<T>): () => void {
+  onDrop(taker: DropHandler): () => void {
     this.#taker = taker;
     return () => {
       if (this.#taker === taker) this.#taker = null;
@@ -32,7 +32,7 @@ export class PointerDrag<T> {
   }
 
   /** To be called by `onPointerDown`: becomes a drag when the pointer moves, else stays a click. */
-  press(event: ReactPointerEvent, load: T, label: string): void {
+  press(event: ReactPointerEvent, load: NewAction, label: string): void {
     if (event.button !== 0) return;
     const [x0, y0, id] = [event.clientX, event.clientY, event.pointerId];
     const onMove = (move: PointerEvent) => {
@@ -72,9 +72,11 @@ function swallowClick(): void {
   setTimeout(() => window.removeEventListener("click", swallow, { capture: true }), 0);
 }
 
-/** Preview of the dragged thing, under the pointer. */
-export function DragPreview<T>({ carrier }: { carrier: PointerDrag<T> }) {
-  const draggedItem = useWatched(carrier);
+export const actionDrag = new ActionDrag();
+
+/** Preview of the dragged action, under the pointer. */
+export function DragPreview() {
+  const draggedItem = useWatched(actionDrag);
   const active = draggedItem !== null;
   useEffect(() => {
     document.body.classList.toggle(style.carrying ?? "", active);
