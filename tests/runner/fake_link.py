@@ -58,6 +58,7 @@ class FakeLink:
             servers=len(servers),
             listeners=dict.fromkeys(("start", "stop"), len(servers)),
             others=len(network.publishers("start")),
+            indexes=False,
             newcomers=self._newcomers.among(
                 network.listeners("start"), servers, lambda: network.bystanders(self._path), now()
             ),

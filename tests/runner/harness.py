@@ -219,6 +219,7 @@ class Robot:
         self.blind = 0.0
         self.old = 0.01
         self.silent = False
+        self.indexes: bool | None = False
         self.tasks: TaskGroup | None = None  # for messages under way
         self.starts: list[Order] = []
         self.stops: list[tuple[float, str]] = []
@@ -273,7 +274,7 @@ class Robot:
     @property
     def standing(self) -> Standing:
         """The standing of the simulated engine."""
-        return self.engine.standing
+        return msgspec.structs.replace(self.engine.standing, indexes=self.indexes)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
         """Let the engine obey a change."""

@@ -8,7 +8,13 @@ import anyio
 import msgspec
 import pytest
 
-from action_assistant.runner.links.engine_process import EngineProcess, has_ended, process
+from action_assistant.runner.links.engine_process import (
+    EngineProcess,
+    has_ended,
+    indexes_again,
+    indexes_by,
+    process,
+)
 from runner.harness import (
     ANN,
     Harness,
@@ -45,6 +51,40 @@ def test_a_process_of_this_computer_is_seen_to_end_and_no_other(
     child.wait()
     assert has_ended(known)
     assert process(child.pid) is None
+
+
+@pytest.mark.parametrize(
+    ("line", "again"),
+    [
+        (["/opt/lib/action_engine_node", "--actor-name", "David"], True),
+        (["action_engine_node", "--actor-name", "David", "--indexing-rate", "2"], True),
+        (["action_engine_node", "--indexing-rate=0", "--actor-name", "David"], False),
+        (["action_engine_node", "--index", "0", "--actor-name", "David"], False),
+        (["action_engine_node", "--actor-name", "simulate-robot"], True),
+        (["gdb", "/opt/lib/action_engine_node", "--indexing-rate", "00"], False),
+        (["python3", "/usr/bin/action-assistant", "simulate-robot", "David"], False),
+        (["python3", "-m", "action_assistant", "simulate-robot", "David"], False),
+        (["own_engine", "--actor-name", "David", "--indexing-rate", "0"], None),
+        (["own_engine", "simulate-robot", "--actor-name", "David"], None),
+    ],
+)
+def test_the_command_line_of_an_engine_shows_whether_it_indexes_while_it_runs(
+    line: list[str], again: bool | None
+) -> None:
+    assert indexes_by(line) is again
+
+
+def test_only_the_very_process_of_an_engine_shows_how_it_indexes() -> None:
+    line = ["action_engine_node", "-c", "read -r line", "--indexing-rate", "2"]
+    with subprocess.Popen(line, executable="/bin/sh", stdin=subprocess.PIPE) as node:
+        known = process(node.pid)
+        assert known is not None
+        assert indexes_again(known) is True
+        assert indexes_again(msgspec.structs.replace(known, started=known.started - 1)) is None
+        assert indexes_again(msgspec.structs.replace(known, boot="another")) is None
+        node.kill()
+        node.wait()
+        assert indexes_again(known) is None
 
 
 @virtual

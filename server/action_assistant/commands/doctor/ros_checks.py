@@ -3,7 +3,7 @@
 import os
 import sqlite3
 import subprocess
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
@@ -17,13 +17,17 @@ from action_assistant.errors import CannotStart
 from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.journal.sqlite import unchanged
 from action_assistant.kit.clock import utc_us
+from action_assistant.runner.links.engine_process import (
+    argument,
+    command_line,
+    indexing_rate,
+    is_engine_node,
+)
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.checkup import look
 from action_assistant.runner.runs import queries
 from action_assistant.system.diagnostics import Diagnostic, found
 
-#: The program of the real engine.
-_NODE: Final = "action_engine_node"
 _PATIENCE_S: Final = 45.0
 #: Seconds that it takes at most.
 ROBOTS_S: Final = _PATIENCE_S + 5
@@ -53,15 +57,16 @@ def robots_answer(place: Installation) -> Iterator[Diagnostic]:
 def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
     """Warn of engines of registered robots on this computer that index while they run: such an
     engine may crash at a get or start (H15)."""
-    names = {each.name for each in _registered(place.data)}
-    for pid, words in _engines() if names else ():
-        name = _said(words, "--actor-name")
-        if name in names and _said(words, "--indexing-rate") != "0":
+    robots = {each.name: each for each in _registered(place.data)}
+    for pid, words in _engines() if robots else ():
+        name = argument(words, "--actor-name")
+        if name in robots and indexing_rate(words) != "0":
+            refused = " The start of a led run on it is refused." if robots[name].led else ""
             yield found(
                 "engine-indexing",
                 name,
                 f"Its engine (process {pid}) reads its folder again and again while it runs. It may die of "
-                "being asked meanwhile, with every running graph (H15).",
+                f"being asked meanwhile, with every running graph (H15).{refused}",
                 "Start it with --indexing-rate 0, and again after a change of its folder. Only where graphs "
                 "are written into its index while it runs (--index-folder) does it need another rate.",
             )
@@ -71,21 +76,11 @@ def _engines() -> Iterator[tuple[int, list[str]]]:
     """Yield the process id and command line of each engine node on this computer."""
     for folder in Path("/proc").glob("[0-9]*"):
         try:
-            words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
+            words = command_line(int(folder.name))
         except OSError:
             continue  # it has ended
-        if any(Path(word).name == _NODE for word in words[:2]):
+        if is_engine_node(words):
             yield int(folder.name), words
-
-
-def _said(words: Sequence[str], option: str) -> str:
-    """Return the value of an option in a command line, as `--a b` or `--a=b`; empty without it."""
-    for word, following in zip(words, [*words[1:], ""], strict=True):
-        if word == option:
-            return following
-        if word.startswith(f"{option}="):
-            return word.removeprefix(f"{option}=")
-    return ""
 
 
 def look_here(place: Installation) -> list[Diagnostic]:
@@ -147,6 +142,7 @@ def _registered(data: Path) -> list[Registration]:
             rmw=row.rmw,
             get_service=row.get_service,
             profile=row.profile,
+            led=row.led,
         )
         for row in rows
     ]

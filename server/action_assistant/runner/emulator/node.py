@@ -38,6 +38,7 @@ from action_assistant.runner.emulator.messages import (
     Start,
     Stop,
 )
+from action_assistant.runner.links.ros2.ros_values import EMULATED
 from action_assistant.umrf.facts import EngineFacts
 
 log: Final = logging.getLogger(__name__)
@@ -84,6 +85,7 @@ class EmulatorNode:
         self.robot = make(round(time.time() * 1000))
         if self.robot.performer is not None:
             self.robot.performer.wake = self._executor.wake
+        self._node.create_publisher(Log, f"{facts.get_service}/{EMULATED}", 1)
         self._listen(facts, self.robot.quirks.depth or _WAITING)
         self._node.create_service(UmrfGraphGet, facts.get_service, self._ask)
         self._executor.add_node(self._node)

@@ -36,6 +36,7 @@ from action_assistant.runner.execution.conducted_steps import (
     piece_to_send,
     seen_of,
 )
+from action_assistant.runner.execution.led_look import Cleared, LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
 from action_assistant.runner.links.led_calls import LedCourse
@@ -66,7 +67,6 @@ from action_assistant.runner.links.port import (
     unwatched,
 )
 from action_assistant.runner.links.simulator import LeadableLink
-from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import (
     AlarmRaised,
@@ -81,15 +81,12 @@ from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import PieceText
 from action_assistant.runner.start.idempotency import IdempotentStarts
-from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.semantics import Returned
 
 log: Final = logging.getLogger(__name__)
 
-_GET_S: Final = 2.0  # before a piece leaves, its robot has to answer within this time
-_FRESH_S: Final = 3.0  # for which a look at a robot counts
 _TICK_S: Final = 0.5
 _STALL_S: Final = 3.0  # for which nothing may have stood still before a piece leaves
 _MOST_ENGINES: Final = 3  # that are begun for one run after the first
@@ -113,7 +110,7 @@ class Conductor:
         *,
         make_engine: Callable[[], LeadableLink],
         robots: Robots,
-        foreign_stops: ForeignStopLoop,
+        look: LedLook,
         runs: OpenRuns,
         claims: IdempotentStarts,
         clock_us: ClockUs,
@@ -132,7 +129,7 @@ class Conductor:
         self._over: set[int] = set()  # the calls whose outcome is known
         self._began = first.at
         self._robots = robots
-        self._foreign_stops = foreign_stops
+        self._look = look
         self._runs = runs
         self._claims = claims
         self._clock_us = clock_us
@@ -428,16 +425,16 @@ class Conductor:
         """Send the piece of a step once the gate is open and its robot may begin it; do what the
         starter has chosen if it may not."""
         await self._gate.wait()
-        robot = self._robots.reachable(step.engine)
-        try:
-            answer = await self._look(robot)
-        except NoAnswer as why:
-            self._trouble(step, "silent", f"{step.engine} was not given {step.node}: {why}")
-            return
         await self._run.stored()  # nothing begins while its causes are not in the journal
         for recorder in tuple(self._unstored):
             await recorder.flushed()
             self._unstored.discard(recorder)
+        robot = self._robots.reachable(step.engine)
+        try:
+            cleared = await self._look.before_piece(robot, self._first)
+        except NoAnswer as why:
+            self._trouble(step, "silent", f"{step.engine} was not given {step.node}: {why}")
+            return
         with anyio.CancelScope(shield=True):
             self._pieces += 1
             piece, at = f"{self._first.run}.{self._pieces}", self._clock_us()
@@ -448,10 +445,9 @@ class Conductor:
             except Refused as refused:
                 self._trouble(step, "unstored", refused.detail)
                 return
-            looked_at = anyio.current_time()
             hooks = PieceHooks(
                 changed=lambda piece: self._piece_changed(step, piece),
-                may_leave=lambda: self._may_leave(step, robot, answer.incarnation, looked_at),
+                may_leave=lambda: self._may_leave(step, cleared),
             )
             step.piece = self._runs.open(run, robot, owns_link=False, seq=1, piece=hooks)
             step.run = run
@@ -463,7 +459,7 @@ class Conductor:
             )
             if step.is_stopped:
                 step.piece.stop(self._stopped_by, "")
-            self._runs.drive(step.piece, order, answer.incarnation)
+            self._runs.drive(step.piece, order, cleared.life)
 
     def _take_up_piece(self, step: Step) -> None:
         """Follow the piece that an earlier process has sent for a step, if there is one."""
@@ -484,41 +480,14 @@ class Conductor:
             step.piece.stop(self._stopped_by, "")
         self._runs.drive(step.piece)
 
-    async def _look(self, robot: KnownEngine) -> Answer:
-        """Ask a robot, and return its answer if a piece may begin on it. Raise NoAnswer with the
-        reason if not."""
-        name = robot.registration.name
-        await robot.indexed()
-        try:
-            with anyio.fail_after(_GET_S):
-                answer = await robot.get()
-        except TimeoutError as late:
-            raise NoAnswer(f"it has not answered for {_GET_S:.0f} s. {robot.why}") from late
-        if answer.incarnation != self._led.lives.get(name):
-            raise NoAnswer("its engine was restarted since the start of this run")
-        if robot.standing.doubt:
-            raise NoAnswer(robot.standing.doubt)
-        if self._foreign_stops.is_stopping(name):
-            raise NoAnswer("something that others have started is being stopped there")
-        others = foreign_graphs(answer, self._runs.on(name))
-        if others:
-            raise NoAnswer(f"somebody else runs {others[0]} there")
-        taken = self._runs.occupying(name, apart_from=self._first.run)
-        if taken is not None:
-            raise NoAnswer(f"run {taken.number} is {taken.state} there")
-        return answer
-
-    def _may_leave(self, step: Step, robot: KnownEngine, life: str, looked_at: float) -> None:
+    def _may_leave(self, step: Step, cleared: Cleared) -> None:
         """Look at the gate and the robot in the step of the event loop in which the message leaves.
         Raise NotSent if the piece may not begin any more."""
         if not self._gate.is_open or step.is_stopped:
             raise NotSent("the run was held or stopped before it left")
         if anyio.current_time() - self._ticked > _STALL_S:
             raise NotSent("the runner stood still before it left")
-        if robot.standing.incarnation not in {"", life} or robot.standing.doubt:
-            raise NotSent("its robot has changed before it left")
-        if anyio.current_time() - looked_at > _FRESH_S:
-            raise NotSent("its turn came too late after its robot was looked at")
+        cleared.require_still()
 
     def _piece_changed(self, step: Step, piece: OpenRun) -> None:
         """Show what a robot shows of its piece, and act on its end and on its troubles."""

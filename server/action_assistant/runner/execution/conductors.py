@@ -13,6 +13,7 @@ from action_assistant.runner.execution.conducted_steps import (
     order_of,
 )
 from action_assistant.runner.execution.conductor import Conductor
+from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.led_calls import LedCourse
@@ -32,7 +33,6 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import PieceText, piece_texts
 from action_assistant.runner.start.idempotency import IdempotentStarts
-from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.semantics import Returned
 
 _PAGE: Final = 500  # events read at once
@@ -44,14 +44,14 @@ class Conductors:
     def __init__(
         self,
         robots: Robots,
-        foreign_stops: ForeignStopLoop,
+        look: LedLook,
         runs: OpenRuns,
         history: RunHistory,
         simulator: Simulator,
         runtime: Runtime,
     ) -> None:
         self._robots = robots
-        self._foreign_stops = foreign_stops
+        self._look = look
         self._runs = runs
         self._history = history
         self._simulator = simulator
@@ -79,7 +79,7 @@ class Conductors:
             engine,
             make_engine=lambda: self._engine_for(first),
             robots=self._robots,
-            foreign_stops=self._foreign_stops,
+            look=self._look,
             runs=self._runs,
             claims=self._claims,
             clock_us=self._runtime.clock_us,

@@ -18,6 +18,7 @@ from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.conducted_steps import Word
 from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.late_activity import LateActivity
+from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.start_checks import NO_SOURCES, StartChecks, StartSources
@@ -44,6 +45,7 @@ from action_assistant.runner.start.admission import (
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import StopOrder
+from action_assistant.runner.start.indexing import IndexingWords
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.umrf.model import Precondition
@@ -87,6 +89,9 @@ class ExecutionService:
         self._runs = OpenRuns(robots, self.history, runtime)
         self.open: Final = self._runs.by_id
         self._late_activity = LateActivity(self._runs, self.history, robots, runtime)
+        look = LedLook(
+            self._runs, self.foreign_stops, IndexingWords(runtime.journal, runtime.clock_us)
+        )
         self._checks = StartChecks(
             self._runs,
             self._late_activity,
@@ -94,12 +99,11 @@ class ExecutionService:
             self.foreign_stops,
             runtime,
             approvals=self.approvals,
+            look=look,
             simulator=simulator,
             sources=sources,
         )
-        self._conductors = Conductors(
-            robots, self.foreign_stops, self._runs, self.history, simulator, runtime
-        )
+        self._conductors = Conductors(robots, look, self._runs, self.history, simulator, runtime)
         self._starts = StartPipeline(
             self._runs, self._checks, self._stops, self._conductors, runtime
         )

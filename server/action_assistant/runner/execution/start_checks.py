@@ -1,8 +1,9 @@
 """The checks of a start: read, check, ask the engine, decide. A pre-flight makes the same checks and lists
 all that they find, instead of ending at the first refusal."""
 
+import itertools
 import os
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Final, TypeAlias
@@ -16,13 +17,14 @@ from action_assistant.ros_workspace import Workspace
 from action_assistant.runner.analysis.course_checks import CheckedCourses
 from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS
 from action_assistant.runner.execution.late_activity import LateActivity
+from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import CONDUCTED, SIMULATOR, Answer, Link, NoAnswer
 from action_assistant.runner.links.simulator import LeadableLink, Simulator
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs.events import Overridden
+from action_assistant.runner.runs.events import Author, Overridden
 from action_assistant.runner.runs.sent_graphs import SentSubgraph
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start import preflight
@@ -35,6 +37,7 @@ from action_assistant.runner.start.admission import (
     prepared_pieces,
 )
 from action_assistant.runner.start.approvals import Approvals
+from action_assistant.runner.start.indexing import CODE as INDEXING
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.check import forbids_start
@@ -82,10 +85,12 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
 
 class LedStart(msgspec.Struct, frozen=True, kw_only=True):
     """The part of an accepted start that only a conducted run has. `lives`: the life of the engine
-    of each robot, as it was looked at; `engine`: plays the whole graph."""
+    of each robot, as it was looked at; `by_word`: those of them of which only the starter says that
+    they index once; `engine`: plays the whole graph."""
 
     pieces: PreparedPieces
     lives: dict[str, str]
+    by_word: dict[str, str]
     engine: LeadableLink
 
 
@@ -107,6 +112,7 @@ class StartChecks:
         runtime: Runtime,
         *,
         approvals: Approvals,
+        look: LedLook,
         simulator: Simulator,
         sources: StartSources,
     ) -> None:
@@ -115,6 +121,7 @@ class StartChecks:
         self._robots = robots
         self._foreign_stops = foreign_stops
         self._approvals = approvals
+        self._look_led = look
         self._clock_us = runtime.clock_us
         self._run_in_worker = runtime.run_in_worker
         self._simulator = simulator
@@ -143,9 +150,16 @@ class StartChecks:
         return await _all_accepted(requests, lambda each: self.accept(each, starter))
 
     async def _accept_on(
-        self, robot: KnownEngine, request: StartRequest, ready: Prepared, starter: str
+        self,
+        robot: KnownEngine,
+        request: StartRequest,
+        ready: Prepared,
+        starter: str,
+        *,
+        is_led: bool = False,
     ) -> AcceptedStart:
-        """Take a prepared start through the stages that concern its robot."""
+        """Take a prepared start through the stages that concern its robot. `is_led`: it is the part
+        of a conducted run on this robot."""
         await self._check(request, ready, robot, starter)
         try:
             view = await self._ask(robot)
@@ -154,7 +168,7 @@ class StartChecks:
             raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
                 nothing
             )
-        return await self._decide(request, ready, robot, view)
+        return await self._decide(request, ready, robot, view, is_led=is_led)
 
     async def _accept_conducted(self, request: StartRequest, starter: str) -> AcceptedStart:
         """Take the start of a conducted run through all stages, with all its robots side by side.
@@ -171,7 +185,8 @@ class StartChecks:
         async def accept(part: StartRequest) -> AcceptedStart:
             robot = self._robots.reachable(part.engine)
             require_led(robot)
-            return await self._accept_on(robot, part, ready.by_robot[part.engine], starter)
+            own = ready.by_robot[part.engine]
+            return await self._accept_on(robot, part, own, starter, is_led=True)
 
         accepted = await _all_accepted(parts, accept)
         led = frozenset(ready.players)
@@ -182,10 +197,17 @@ class StartChecks:
             link=engine,
             is_simulated=not parts,
             incarnation=ready.whole.run if parts else engine.standing.incarnation,
-            despite=_overridden(ready.whole, items),
+            despite=_each_once(
+                _overridden(ready.whole, items), *(each.despite for each in accepted)
+            ),
             led=LedStart(
                 pieces=ready,
                 lives={each.request.engine: each.incarnation for each in accepted},
+                by_word={
+                    each.request.engine: each.incarnation
+                    for each in accepted
+                    if any(problem.code == INDEXING for problem in each.despite)
+                },
                 engine=engine,
             ),
         )
@@ -244,10 +266,19 @@ class StartChecks:
         )
 
     async def _decide(
-        self, request: StartRequest, ready: Prepared, robot: KnownEngine, view: EngineView
+        self,
+        request: StartRequest,
+        ready: Prepared,
+        robot: KnownEngine,
+        view: EngineView,
+        *,
+        is_led: bool,
     ) -> AcceptedStart:
         """Accept a start if no item of its pre-flight blocks it. Raise Conflict if one does."""
-        items = await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes)
+        items = [
+            *await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes),
+            *(await self._look_led.items(robot, view.answer) if is_led else ()),
+        ]
         free = self._free_item(request.engine, ready.name)  # again: time has passed
         accepted = AcceptedStart(
             request=request,
@@ -260,6 +291,13 @@ class StartChecks:
         preflight.require_clear([free], accepted.overridden)
         preflight.require_clear(items, accepted.overridden)
         return accepted
+
+    async def give_words(self, accepted: AcceptedStart, author: Author) -> None:
+        """Store what the starter of an accepted conducted run says of the engines of its robots.
+        Raise Unavailable if the journal cannot store it."""
+        override = accepted.request.override
+        if accepted.led is not None and override is not None:
+            await self._look_led.give_words(accepted.led.by_word, author, override.reason)
 
     def require_free(self, accepted: AcceptedStart) -> None:
         """Raise Conflict if a run keeps a robot from an accepted start by now: one that was over
@@ -354,7 +392,10 @@ class StartChecks:
                 found.append(preflight.with_verdict(name, [item]))
                 continue
             own = ready.by_robot[name]
-            listed = [self._free_item(name, own.name), *await self._engine_items(robot, own)]
+            listed = [
+                self._free_item(name, own.name),
+                *await self._engine_items(robot, own, is_led=True),
+            ]
             listed += await self._approval_items(robot, own, starter)
             found.append(preflight.with_verdict(name, listed, whole.digest, whole.tree_digest))
         return found
@@ -387,14 +428,17 @@ class StartChecks:
         digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
         return preflight.with_verdict(request.engine, items, *digests)
 
-    async def _engine_items(self, robot: KnownEngine, ready: Prepared | None) -> list[Item]:
+    async def _engine_items(
+        self, robot: KnownEngine, ready: Prepared | None, *, is_led: bool = False
+    ) -> list[Item]:
         try:
             view = await self._ask(robot)
         except NoAnswer as nothing:
             return [preflight.silence_item(robot.registration.name, str(nothing))]
         if ready is None:
             return [preflight.answer_item(view)]
-        return list(await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes))
+        items = await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes)
+        return [*items, *(await self._look_led.items(robot, view.answer) if is_led else ())]
 
     async def _approval_items(
         self, robot: KnownEngine, ready: Prepared | None, starter: str
@@ -430,12 +474,9 @@ def _require_plain(request: StartRequest) -> None:
 
 def require_led(robot: KnownEngine) -> None:
     """Raise Conflict unless the owner of a robot allows runs that the runner leads step by step."""
-    if not robot.registration.led:
-        name = robot.registration.name
-        raise Conflict(
-            f"Led runs are off for {name}: its owner can switch them on in its registration.",
-            where={"path": "/robots", "item": "led"},
-        )
+    item = preflight.led_item(robot.registration)
+    if item.verdict == "blocked":
+        raise Conflict(item.text, where={"path": "/robots", "item": item.code})
 
 
 async def _all_accepted(
@@ -462,6 +503,11 @@ async def _all_accepted(
             f"Nothing was started. {reasons}", where={"path": "/engines", "engines": engines}
         )
     return [accepted[each.engine] for each in requests]
+
+
+def _each_once(*despite: Iterable[Overridden]) -> tuple[Overridden, ...]:
+    """Return the overridden problems of the whole graph and of its robots, each of them once."""
+    return tuple(dict.fromkeys(itertools.chain.from_iterable(despite)))[:_MOST_OVERRIDDEN]
 
 
 def _overridden(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:

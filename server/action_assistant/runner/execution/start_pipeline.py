@@ -137,6 +137,7 @@ class StartPipeline:
         stored."""
         number, at = self._runs.next_number(), self._clock_us()
         requested, order = _to_store(accepted, author, at=at, number=number, group=group)
+        await self._checks.give_words(accepted, author)
         self._checks.require_free(accepted)
         with anyio.CancelScope(shield=True):
             run = await self._claims.store(requested)

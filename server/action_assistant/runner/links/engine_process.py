@@ -1,11 +1,12 @@
-"""Identifies the operating system's process of an engine on this computer, and its threads.
+"""Identifies the operating system's process of an engine on this computer, its arguments and threads.
 
 The code of an action has ended when the engine's process has, since all threads of a process end with it.
 That can only be seen on this computer: in another container or after a reboot nothing is known.
 """
 
+import itertools
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -18,6 +19,7 @@ _FIRST_PORT: Final = 7400  # of DDS; each domain has the next 250
 _PORTS: Final = 250
 _NUM_THREADS: Final = 17  # its place among the fields of `stat` from the state on
 _LOOKS: Final = 3  # at a list of threads of which one has just ended
+_EMULATOR: Final = "simulate-robot"  # the command of this program that plays an engine
 
 
 class Thread(msgspec.Struct, frozen=True):
@@ -80,6 +82,62 @@ def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProc
     return process(found[0]) if len(found) == 1 else None
 
 
+def indexes_again(known: EngineProcess) -> bool | None:
+    """Return whether the process of an engine reads its folders again while it runs; None if that is
+    not known, as on another computer or for another program than the engine's own node."""
+    try:
+        words = command_line(known.pid)
+        is_same = _here() == (known.boot, known.namespace) and _started(known.pid) == known.started
+    except OSError:
+        return None
+    return indexes_by(words) if is_same else None
+
+
+def indexes_by(words: Sequence[str]) -> bool | None:
+    """Return whether an engine with this command line reads its folders again while it runs; None if
+    the program is not known. An emulated engine can be asked at any time."""
+    if is_engine_node(words):
+        return indexing_rate(words) != "0"
+    return False if _is_emulator(words) else None
+
+
+def command_line(pid: int) -> list[str]:
+    """Return the words with which a process was started. Raise OSError if the kernel does not show
+    them."""
+    return (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
+
+
+def is_engine_node(words: Sequence[str]) -> bool:
+    """Return whether a command line starts the engine's own node, also through another program."""
+    return any(Path(word).name == _PROGRAM for word in words[:2])
+
+
+def _is_emulator(words: Sequence[str]) -> bool:
+    """Return whether a command line starts the engine of an emulated robot, which is this program."""
+    programs = {"action_assistant", "action-assistant"}
+    return any(
+        command == _EMULATOR and Path(program).name in programs
+        for program, command in itertools.pairwise(words[:6])
+    )
+
+
+def indexing_rate(words: Sequence[str]) -> str:
+    """Return the indexing rate in a command line of the engine's node: "0" for an engine that indexes
+    once, "" if none is given, so that it indexes every 2 s."""
+    rate = argument(words, "--indexing-rate")
+    return "0" if rate.isdecimal() and int(rate) == 0 else rate
+
+
+def argument(words: Sequence[str], option: str) -> str:
+    """Return the value of an option in a command line of the engine's node; "" without it. The value
+    stands behind the option or `=`; the node also takes an option that is cut short."""
+    for word, following in zip(words, [*words[1:], ""], strict=True):
+        name, equals, value = word.partition("=")
+        if len(name) > len("--") and name.startswith("--") and option.startswith(name):
+            return value if equals else following
+    return ""
+
+
 def threads(known: EngineProcess) -> frozenset[Thread] | None:
     """Return the threads of the process of an engine's own node; None if unknown.
 
@@ -89,7 +147,7 @@ def threads(known: EngineProcess) -> frozenset[Thread] | None:
     """
     folder = _PROC / str(known.pid)
     try:
-        program = (folder / "cmdline").read_bytes().partition(b"\0")[0].decode(errors="replace")
+        program = command_line(known.pid)[0]
         if _here() != (known.boot, known.namespace) or Path(program).name != _PROGRAM:
             return None
         found = next(filter(None, (_listed(folder / "task") for _ in range(_LOOKS))), None)

@@ -94,7 +94,8 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     `newcomers`: names of nodes that receive starts and may be a second engine, which does not serve
     its get yet. `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: other
     publishers of starts. `actor`: the name in its feedback, "" before any. `process`: the engine's,
-    if on this computer.
+    if on this computer. `indexes`: it reads its folders again while it runs, so that asking it then
+    may end it (H15); None if that is not known.
     """
 
     state: EngineState
@@ -107,6 +108,7 @@ class Standing(msgspec.Struct, frozen=True, kw_only=True):
     actor: str = ""
     process: EngineProcess | None = None
     newcomers: tuple[str, ...] = ()
+    indexes: bool | None = None
 
     @property
     def doubt(self) -> str:

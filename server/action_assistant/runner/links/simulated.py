@@ -148,7 +148,11 @@ class SimulatedLink:
         if self._why:
             return Standing(state=self._state, why=self._why, incarnation=self._incarnation)
         return Standing(
-            state="answering", incarnation=self._incarnation, generation="current", servers=1
+            state="answering",
+            incarnation=self._incarnation,
+            generation="current",
+            servers=1,
+            indexes=False,
         )
 
     @property

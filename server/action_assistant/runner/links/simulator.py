@@ -150,7 +150,11 @@ class SimulatorLink:
         if self._dead is not None:
             return Standing(state="gone", why=self._dead, incarnation=self._incarnation)
         return Standing(
-            state="answering", incarnation=self._incarnation, generation="current", servers=1
+            state="answering",
+            incarnation=self._incarnation,
+            generation="current",
+            servers=1,
+            indexes=False,
         )
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:

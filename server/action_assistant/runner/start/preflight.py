@@ -27,7 +27,7 @@ from action_assistant.runner.index_folders.comparison import (
 )
 from action_assistant.runner.index_folders.scan import IndexedFiles, scanned, shown_path
 from action_assistant.runner.links.observations import Snapshot, failed_in
-from action_assistant.runner.links.port import Answer, Standing
+from action_assistant.runner.links.port import Answer, Registration, Standing
 from action_assistant.runner.robots.engine import EngineIndex, foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import graphs_in
@@ -230,6 +230,15 @@ def led_items(ready: PreparedPieces) -> tuple[Item, ...]:
                 )
             )
     return tuple(found)
+
+
+def led_item(robot: Registration) -> Item:
+    """Return the item that says whether the owner of a robot allows runs that the runner leads."""
+    if robot.led:
+        text = f"The owner of {robot.name} allows led runs."
+        return Item(code="led", verdict="passed", text=text)
+    text = f"Led runs are off for {robot.name}: its owner can switch them on in its registration."
+    return Item(code="led", verdict="blocked", text=text)
 
 
 def answer_item(view: EngineView) -> Item:

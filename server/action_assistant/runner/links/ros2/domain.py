@@ -37,6 +37,7 @@ from action_assistant.runner.links.port import Command, Feedback
 from action_assistant.runner.links.ros2.message_queue import MessageQueue
 from action_assistant.runner.links.ros2.outlets import Message, Outlet, Outlets, Topics, qos
 from action_assistant.runner.links.ros2.ros_values import (
+    EMULATED,
     Endpoint,
     GetResult,
     LogLine,
@@ -170,6 +171,11 @@ class Domain:
     def publishers(self, topic: str) -> tuple[Endpoint, ...]:
         """Return the publishers on a topic, without those of this process."""
         return self._others(self._node.get_publishers_info_by_topic(topic))
+
+    def is_emulated(self, path: str, server: Endpoint) -> bool:
+        """Return whether the server of a path says that it is an emulated engine."""
+        marks = self.publishers(f"{_absolute(path)}/{EMULATED}")
+        return any(each.process == server.process for each in marks)
 
     def paths(self) -> tuple[str, ...]:
         """Return every path with a get service of the engines' type."""

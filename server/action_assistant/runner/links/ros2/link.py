@@ -13,7 +13,7 @@ from typing import Final, TypeAlias, assert_never
 import anyio
 from temoto_msgs.msg import UmrfGraphModify, UmrfGraphPause, UmrfGraphResume, UmrfGraphStart
 
-from action_assistant.runner.links.engine_process import engine_process
+from action_assistant.runner.links.engine_process import engine_process, indexes_again
 from action_assistant.runner.links.engine_text import NotAGraph
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.port import (
@@ -267,12 +267,15 @@ class Ros2Link:
         incarnation = servers[0].gid if len(servers) == 1 else ""
         before = self._standing
         known = before.incarnation
-        process = before.process
+        process, indexes = before.process, before.indexes
         if incarnation and incarnation != known:
             process = engine_process(servers[0].process, domain.process, self._number, self._name)
+            indexes = None if process is None else indexes_again(process)
             self._known_since = time.monotonic()
             self._answered, self._unanswered_since = False, None
             self._restarted = bool(known)
+        if indexes is None and incarnation and domain.is_emulated(self._path, servers[0]):
+            indexes = False
         state, why = self._judged(domain, servers)
         listeners = {
             each: len(belonging(servers, domain.listeners(getattr(self._topics, each))))
@@ -289,6 +292,7 @@ class Ros2Link:
                 others=len(domain.publishers(self._topics.start)),
                 actor=self._actor(domain),
                 process=process,
+                indexes=indexes,
                 newcomers=self._newcomers.among(
                     domain.listeners(self._topics.start),
                     servers,

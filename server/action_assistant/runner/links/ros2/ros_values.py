@@ -20,6 +20,9 @@ _GRAPH: Final = re.compile(
     re.MULTILINE,
 )
 
+#: An emulated engine has a publisher of this name below its get service. It may be asked at any time.
+EMULATED: Final = "emulated"
+
 
 class Endpoint(msgspec.Struct, frozen=True):
     """A publisher, subscription or server on a domain. `gid` changes with every restart; `process`:

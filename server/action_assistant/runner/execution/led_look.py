@@ -1,0 +1,106 @@
+"""The look at a robot before an action of a led run begins on it: the one place for its rules.
+
+A led run begins actions at its start and with each piece, minutes later: the next one, one after a
+*go on*, after a restart of the runner, or after an outcome by word. `LedLook.items` is called for each
+of them, by a pre-flight too: a rule that is added there counts everywhere (docs/decisions/113).
+"""
+
+from typing import Final
+
+import anyio
+import msgspec
+
+from action_assistant.errors import Refused
+from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.links.port import Answer, NoAnswer, NotSent
+from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
+from action_assistant.runner.runs.events import Author, Requested
+from action_assistant.runner.start.indexing import IndexingWords, indexing_item
+from action_assistant.runner.start.preflight import Item, is_blocking, led_item
+from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+
+_GET_S: Final = 2.0  # within which a robot has to answer before a piece leaves
+_FRESH_S: Final = 3.0  # for which a look at a robot counts
+
+
+class Cleared(msgspec.Struct, frozen=True):
+    """A robot on which a piece may begin. `life`: of its engine; `at`: when it was looked at, in
+    seconds of the event loop."""
+
+    robot: KnownEngine
+    life: str
+    at: float
+
+    def require_still(self) -> None:
+        """Look again, without waiting, in the step in which a piece leaves. Raise NotSent if the
+        robot has changed, or was looked at too long ago."""
+        standing = self.robot.standing
+        if standing.incarnation not in {"", self.life} or standing.doubt:
+            raise NotSent("its robot has changed before it left")
+        if anyio.current_time() - self.at > _FRESH_S:
+            raise NotSent("its turn came too late after its robot was looked at")
+
+
+class LedLook:
+    """Looks at a robot before something of a led run begins there."""
+
+    def __init__(
+        self, runs: OpenRuns, foreign_stops: ForeignStopLoop, indexing: IndexingWords
+    ) -> None:
+        self._runs = runs
+        self._foreign_stops = foreign_stops
+        self._indexing = indexing
+
+    async def items(self, robot: KnownEngine, answer: Answer, cleared: str = "") -> list[Item]:
+        """Return an item of each rule for a robot that has just given this answer. `cleared`: the life
+        of its engine that was looked at before the start, "" before that. Raise Unavailable if the
+        journal cannot be read."""
+        return [
+            led_item(robot.registration),
+            await self._indexing_item(robot, answer.incarnation, cleared),
+        ]
+
+    async def _indexing_item(self, robot: KnownEngine, life: str, cleared: str) -> Item:
+        name, standing = robot.registration.name, robot.standing
+        if life == cleared and standing.indexes is None:  # how it was started does not change
+            standing = msgspec.structs.replace(standing, indexes=False)
+        return indexing_item(name, robot.facts, standing, await self._indexing.of(name, life))
+
+    async def before_piece(self, robot: KnownEngine, run: Requested) -> Cleared:
+        """Ask a robot, and return that a piece of a led run may begin on it. Raise NoAnswer with the
+        reason if none may."""
+        assert run.led is not None
+        name = robot.registration.name
+        await robot.indexed()
+        try:
+            with anyio.fail_after(_GET_S):
+                answer = await robot.get()
+        except TimeoutError as late:
+            raise NoAnswer(f"it has not answered for {_GET_S:.0f} s. {robot.why}") from late
+        if answer.incarnation != run.led.lives.get(name):
+            raise NoAnswer("its engine was restarted since the start of this run")
+        if robot.standing.doubt:
+            raise NoAnswer(robot.standing.doubt)
+        if self._foreign_stops.is_stopping(name):
+            raise NoAnswer("something that others have started is being stopped there")
+        others = foreign_graphs(answer, self._runs.on(name))
+        if others:
+            raise NoAnswer(f"somebody else runs {others[0]} there")
+        taken = self._runs.occupying(name, apart_from=run.run)
+        if taken is not None:
+            raise NoAnswer(f"run {taken.number} is {taken.state} there")
+        try:
+            items = await self.items(robot, answer, answer.incarnation)
+        except Refused as unreadable:
+            raise NoAnswer(unreadable.detail) from unreadable
+        overridden = run.override.codes if run.override is not None else ()
+        for item in items:
+            if is_blocking(item, overridden):
+                raise NoAnswer(item.text)
+        return Cleared(robot, answer.incarnation, anyio.current_time())
+
+    async def give_words(self, lives: dict[str, str], author: Author, reason: str) -> None:
+        """Store what a starter answers for at these robots, for these lives of their engines. Raise
+        Unavailable if the journal cannot store it."""
+        for robot, life in lives.items():
+            await self._indexing.give(robot, life, author, reason)
