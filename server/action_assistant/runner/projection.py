@@ -54,7 +54,8 @@ def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
         case Requested(piece=PieceOf()):
             return ()  # a part of its conducted run, which has a row
         case Requested() as asked:
-            words = holds(asked.run, asked.graph_name, asked.engine, asked.author.name)
+            robots = asked.led.robots.values() if asked.led is not None else ()
+            words = holds(asked.run, asked.graph_name, asked.engine, asked.author.name, *robots)
             return (_run(asked), *words)
         case Published() as sent:
             return (change.values(started_at=sent.at),)

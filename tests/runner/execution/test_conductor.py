@@ -10,12 +10,15 @@ import msgspec
 import pytest
 
 from action_assistant.errors import Conflict, Refused
+from action_assistant.runner.analysis import statistics
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import EngineChanged, Registration
 from action_assistant.runner.links.simulator import SimulatorLink, in_this_process
+from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Override
-from action_assistant.runner.runs.views import time
+from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.views import RobotRestShown, run_view, time
 from action_assistant.runner.start.admission import GoOnRequest, WordRequest
 from action_assistant.umrf.model import Graph
 from runner.harness import (
@@ -283,13 +286,94 @@ async def test_the_word_of_a_person_counts_once_rest_is_seen_and_is_not_called_o
         piece = control.open[run].run.actions["Work_0"].piece
         await control.confirm_rest(piece, RestRequest("I stand beside it."), BEN)
         await until(lambda: "without an outcome" in control.open[run].run.alarms[-1].text)
+        shown = run_view(control.open[run].run)
+        assert [name for name, each in shown.actions.items() if each.asks] == ["Work_0"]
+        assert [(each.robot, each.state, each.by) for each in rests_of(control.open[run].run)] == [
+            ("Carol", "unused", None),
+            ("David", "seen", BEN),
+        ]
         await control.give_outcome(run, word, BEN)
+        await until(lambda: not run_view(control.open[run].run).actions["Work_0"].asks)
         held = control.open[run].run.held
         assert held is not None
         await control.go_on(run, GoOnRequest(time(held.at)), BEN)
         assert await ended(control, run) == "finished"
         visit = lab.harness.journal.history(run).actions["Work_0"].visits[-1]
         assert (visit.result, visit.how) == ("true", "inferred")
+        said = run_view(lab.harness.journal.history(run)).actions["Work_0"].visits[-1].said
+        assert said is not msgspec.UNSET
+        assert (said.by, said.reason) == (BEN, "It stands at the door.")
+
+
+def rests_of(run: Run) -> list[RobotRestShown]:
+    """Return what a page is told of the rest of each robot of a run."""
+    shown = run_view(run).rests
+    assert shown is not msgspec.UNSET
+    return shown
+
+
+def rests(control: ExecutionService, run: str) -> dict[str, str]:
+    """Return the state of the rest of each robot of an open run."""
+    return {each.robot: each.state for each in rests_of(control.open[run].run)}
+
+
+@virtual
+async def test_the_rest_of_each_robot_is_told_apart_and_the_worst_is_never_hidden() -> None:
+    lab = Lab({"*": [{"after_s": 30, "stop_s": 0.5}]})
+    graph = shared(two_ends("task"), "Scout", "Carrier")
+    async with lab.runner() as control:
+        request = led(graph, lost="wait", override=Override(("H12",), "I look."))
+        run = (await control.start(request, ANN)).run.id
+        await until(lambda: bool(lab.david.starts) and bool(lab.carol.starts))
+        assert rests(control, run) == {"Carol": "going", "David": "going"}
+        lab.carol.silent = True
+        await until(lambda: rests(control, run)["Carol"] == "silent")
+        await control.stop(run, BEN)
+        await until(lambda: rests(control, run)["David"] == "proven")
+        (carol, david) = rests_of(control.open[run].run)
+        assert (carol.state, carol.stops, carol.action) == ("silent", True, "Work_1")
+        assert david.since is not None
+        await anyio.sleep(20)
+        assert rests(control, run) == {"Carol": "silent", "David": "proven"}
+        lab.carol.silent = False
+        assert await ended(control, run) == "stopped"
+        found = lab.harness.journal.history(run)
+        assert {each.state for each in rests_of(found)} == {"proven"}
+
+
+@virtual
+async def test_a_robot_that_was_given_nothing_is_called_neither_stopped_nor_moving() -> None:
+    lab = Lab({"*": [{"never": True, "stop_s": 0.5}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control)
+        assert rests(control, run) == {"Carol": "unused", "David": "going"}
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+        shown = rests_of(lab.harness.journal.history(run))
+        assert {each.robot: each.state for each in shown} == {"Carol": "unused", "David": "proven"}
+
+
+@virtual
+async def test_a_led_run_is_one_run_and_found_by_each_of_its_robots() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    async with lab.runner() as control:
+
+        async def found(**wanted: Any) -> list[str]:
+            rows = await control.history.rows(queries.listed(queries.Filter(**wanted), 10))
+            return [row.id for row in rows]
+
+        run = await lab.led_run(control)
+        assert await found() == await found(text="arol") == [run]
+        assert await ended(control, run) == "finished"
+        other = await control.start(order(sequence("other"), engine="Carol"), ANN)
+        assert await ended(control, other.run.id) == "finished"
+        assert await found(engine="David") == [run]
+        assert await found(engine="Carol") == [other.run.id, run]
+        assert await found(engine="Carol", graph="task") == await found(engine="conducted") == [run]
+        assert await found(engine="Dave") == []
+        assert await found(text="avid") == [run]
+        stored = await control.history.rows(statistics.runs_of("task", "David", 10))
+        assert [row.id for row in stored] == [run]
 
 
 class Dying:
@@ -426,11 +510,14 @@ async def test_a_stop_reaches_a_piece_that_moves_again() -> None:
         await lab.david.engine.start(lab.david.starts[0])
         await until(lambda: control.open[run].run.held is not None)
         assert await lab.david.moving("task--Work_0")
+        assert rests(control, run)["David"] == "going"
         await control.stop(run, BEN)
         with anyio.fail_after(20):
             assert await ended(control, run) == "stopped"
         assert not await lab.david.moving("task--Work_0")
-        assert (await control.find(run)).held is None
+        found = await control.find(run)
+        assert found.held is None
+        assert {each.state for each in rests_of(found)} == {"proven"}
 
 
 @virtual

@@ -30,7 +30,8 @@ export interface RunnerApi {
      * ActionShown
      * @description One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
      *     may have been missed. `visits` are the newest ones; `older`: how many are not listed. `robot`:
-     *     the engine that plays it in a conducted run; `piece`: the id of the run of its newest piece.
+     *     the engine that plays it in a conducted run; `piece`: the id of the run of its newest piece;
+     *     `asks`: it has ended without an outcome, which a person has to give.
      */
     ActionShown: {
         aid: string | null;
@@ -46,6 +47,8 @@ export interface RunnerApi {
         robot?: string;
         /** @default  */
         piece?: string;
+        /** @default false */
+        asks?: boolean;
     };
     /**
      * ActionStatistics
@@ -1263,6 +1266,31 @@ export interface RunnerApi {
         files: RunnerApi["GraphFile"][];
     };
     /**
+     * RobotRestShown
+     * @description The knowledge about the rest of one robot of a conducted run. `state`: nothing of the run was
+     *     ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is proven
+     *     ("stopping"), it does not answer ("silent"), no answer can prove rest any more ("unproven"), an
+     *     answer has proven it ("proven"), somebody or something has seen it ("seen"), nothing of the last
+     *     action began ("unsent"), or nothing was recorded of it ("unknown"). `since`: when that began;
+     *     `action`, `piece`: the action and the run of its piece; `why`: the reason, or how rest was seen;
+     *     `by`: who has seen it; `stops`: a Stop is asked for, and repeated until rest is proven.
+     */
+    RobotRestShown: {
+        robot: string;
+        /** @enum {string} */
+        state: "going" | "proven" | "seen" | "silent" | "stopping" | "unknown" | "unproven" | "unsent" | "unused";
+        since?: string;
+        /** @default  */
+        action?: string;
+        /** @default  */
+        piece?: string;
+        /** @default  */
+        why?: string;
+        by?: RunnerApi["Author"];
+        /** @default false */
+        stops?: boolean;
+    };
+    /**
      * RobotStopped
      * @description The targets of a Stop of a robot: the ids of this runner's runs, and the names of graphs that
      *     others started.
@@ -1341,7 +1369,8 @@ export interface RunnerApi {
     /**
      * RunShown
      * @description A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
-     *     robot whose engine the simulator plays; `behaviours`: whether its actions have Python behaviours.
+     *     robot whose engine the simulator plays; `behaviours`: whether its actions have Python behaviours;
+     *     `rests`: of a conducted run, what is known of the rest of each robot.
      */
     RunShown: {
         id: string;
@@ -1383,6 +1412,7 @@ export interface RunnerApi {
             [key: string]: RunnerApi["ActionShown"];
         };
         log: RunnerApi["MessageShown"][];
+        rests?: RunnerApi["RobotRestShown"][];
     };
     /**
      * RunSummary
@@ -1472,6 +1502,7 @@ export interface RunnerApi {
             [key: string]: RunnerApi["ActionShown"];
         };
         log: RunnerApi["MessageShown"][];
+        rests?: RunnerApi["RobotRestShown"][];
         /** @description A UMRF graph. */
         umrf: {
             [key: string]: unknown;
@@ -1488,6 +1519,16 @@ export interface RunnerApi {
         tree_digest: string | null;
     };
     RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
+    /**
+     * SaidShown
+     * @description The word of a person for the result of a visit.
+     */
+    SaidShown: {
+        by: RunnerApi["Author"];
+        /** Format: date-time */
+        at: string;
+        reason: string;
+    };
     /**
      * Script
      * @description Behaviours of actions by key. A key has one behaviour for each call of the action; the last
@@ -1714,7 +1755,7 @@ export interface RunnerApi {
      *     (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
      *     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
      *     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
-     *     none were seen.
+     *     none were seen. `said`: who gave the result by word, where no answer has shown it.
      */
     VisitShown: {
         /** Format: date-time */
@@ -1729,6 +1770,7 @@ export interface RunnerApi {
         inputs: {
             [key: string]: string;
         } | null;
+        said?: RunnerApi["SaidShown"];
     };
     /**
      * Where

@@ -238,6 +238,8 @@ def _steps(
     for pair in action_pairs:
         left, right = pair.of(a, b)
         visits_a, visits_b = _visits(left), _visits(right)
+        words_a = views.words_for(a.said.get(pair.a or "", ()))
+        words_b = views.words_for(b.said.get(pair.b or "", ()))
         for number in sorted(visits_a.keys() | visits_b.keys()):
             one, other = visits_a.get(number), visits_b.get(number)
             yield ComparedVisit(
@@ -246,8 +248,8 @@ def _steps(
                 name=pair.place.name,
                 aid=(right or left or ActionRun()).aid,
                 visit=number,
-                a=views.visit_view(one) if one else None,
-                b=views.visit_view(other) if other else None,
+                a=views.visit_view(one, words_a.get(number, msgspec.UNSET)) if one else None,
+                b=views.visit_view(other, words_b.get(number, msgspec.UNSET)) if other else None,
                 relation=missed.relation(pair, _relation(one, other)),
                 slower=_slower(one, other),
             )

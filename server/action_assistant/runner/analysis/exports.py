@@ -159,7 +159,8 @@ class _Track:
             known = () if was is None else was.visits
             for number, visit in enumerate(action.visits, action.older + 1):
                 if visit.until is not None and visit not in known:
-                    shown = msgspec.to_builtins(views.visit_view(visit))
+                    said = views.words_for(after.said.get(name, ())).get(number, msgspec.UNSET)
+                    shown = msgspec.to_builtins(views.visit_view(visit, said))
                     counts = counts or visit_counts(after)
                     missed = counts[name].at_least
                     body = {"visit": number, **shown, "took": of_visit(visit), "at_least": missed}

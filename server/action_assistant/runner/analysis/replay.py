@@ -4,7 +4,7 @@ A frame has only the differences to the one before it. So the page shows at ever
 what the live view showed then, without later knowledge.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from typing import Any
 
@@ -175,7 +175,7 @@ def _head(before: Run | None, after: Run) -> ReplayHead | msgspec.UnsetType:
 def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
     old = before.actions if before is not None else {}
     return {
-        name: _changed(old.get(name), action)
+        name: _changed(old.get(name), action, views.words_for(after.said.get(name, ())))
         for name, action in after.actions.items()
         if _looks_new(old.get(name), action)
     }
@@ -194,9 +194,11 @@ def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
     )
 
 
-def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
-    """Return the change of an action. Only its last visits can have changed, so the first different
-    one is searched from the end."""
+def _changed(
+    before: ActionRun | None, after: ActionRun, words: Mapping[int, views.SaidShown]
+) -> ActionFrame:
+    """Return the change of an action. `words`: who gave results by word, by visit. Only its last
+    visits can have changed, so the first different one is searched from the end."""
     total = after.older + len(after.visits)
     known = before.older + len(before.visits) if before is not None else 0
     first = total
@@ -215,6 +217,9 @@ def _changed(before: ActionRun | None, after: ActionRun) -> ActionFrame:
         aid=after.aid,
         state=after.state,
         first=first,
-        visits=[views.visit_view(each) for each in after.visits[first - after.older :]],
+        visits=[
+            views.visit_view(each, words.get(number, msgspec.UNSET))
+            for number, each in enumerate(after.visits[first - after.older :], first + 1)
+        ],
         messages=[views.MessageShown(views.time(each.at), each.text) for each in fresh],
     )

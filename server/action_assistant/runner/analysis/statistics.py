@@ -10,6 +10,7 @@ from sqlalchemy import Row, Select, select, union_all
 from action_assistant.runner.analysis.annotations import AT_LEAST
 from action_assistant.runner.analysis.levels import LevelPlace, places
 from action_assistant.runner.runs.durations import DurationBounds, at_rank, duration_bounds
+from action_assistant.runner.runs.queries import on_engine
 from action_assistant.runner.runs.run import Result, State
 from action_assistant.schema.runner_tables import action_sum, run
 from action_assistant.umrf.model import EXIT, PRECONDITIONS, Graph, Relation
@@ -89,12 +90,12 @@ def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
     """Select the newest runs of a graph (id or name) that are over, at most `last`."""
     newest = [
         select(run.c.id)
-        .where(column == graph, run.c.ended_at.is_not(None))
-        .where(*([] if engine is None else [run.c.engine == engine]))
+        .where(column == graph, run.c.ended_at.is_not(None), on)
         .order_by(run.c.number.desc())
         .limit(last)
         .subquery()
         for column in (run.c.graph, run.c.graph_name)
+        for on in on_engine(engine)
     ]
     wanted = (
         *(run.c.id, run.c.number, run.c.graph_name),

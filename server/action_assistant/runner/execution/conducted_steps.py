@@ -1,11 +1,13 @@
 """The steps of a conducted run, and the gate before them."""
 
 from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Final
 
 import anyio
 import msgspec
 
+from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.led_calls import LedCourse
 from action_assistant.runner.links.port import GraphOutline, Order
@@ -13,6 +15,7 @@ from action_assistant.runner.runs.events import (
     Author,
     Held,
     PieceOf,
+    PieceRest,
     PieceSeen,
     Requested,
     RunEvent,
@@ -160,6 +163,40 @@ def seen_of(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:
     )
 
 
+def rest_of(piece: Run, at: int, *, asks: bool = False) -> PieceRest:
+    """Return the event that says how far the rest of a piece is proven. `asks`: it has ended without
+    an outcome, and a person has to give one."""
+    assert piece.piece is not None
+    stops = piece.desired == "stopped" and piece.end is None
+    since = piece.stop_requested_at or piece.requested_at
+    known = PieceRest(
+        at=at,
+        piece=piece.id,
+        node=piece.piece.node,
+        engine=piece.engine,
+        state="stopping" if stops else "going",
+        since=since if stops else piece.requested_at,
+        why=piece.loading if stops else "",
+        stops=stops,
+        asks=asks,
+    )
+    say = partial(msgspec.structs.replace, known)
+    if piece.end is None:
+        if piece.lost or piece.unconfirmed:
+            return say(state="unproven", since=at, why=piece.lost or piece.unconfirmed)
+        if piece.unknown_since is not None:
+            return say(state="silent", since=piece.unknown_since, why="")
+        return known
+    since = piece.ended_at or at
+    if piece.at_rest is not None:
+        return say(state="seen", since=since, why=piece.at_rest.how, by=piece.at_rest.by)
+    if piece.end == "refused":
+        return say(state="unsent", since=since, why=piece.detail)
+    if piece.end == "lost":
+        return say(state="unproven", since=since, why=piece.detail)
+    return say(state="proven", since=piece.proof_at or since, why="")
+
+
 def order_of(first: Requested) -> Order:
     """Return the order that starts the whole graph of a conducted run."""
     graph = GraphOutline(first.graph_name, first.actions)
@@ -193,3 +230,26 @@ def piece_to_send(
     )
     graph = GraphOutline(name, actions)
     return requested, Order(run=piece, graph=graph, umrf=umrf, targets=(step.engine,))
+
+
+class RestNews:
+    """Tells how far the rest of each piece of a run is proven, whenever that has changed."""
+
+    def __init__(self, tell: Callable[[PieceRest], None], clock_us: ClockUs) -> None:
+        self._tell = tell
+        self._clock_us = clock_us
+        self._told: dict[str, PieceRest] = {}  # by piece
+
+    def show(self, piece: Run, *, asks: bool = False) -> None:
+        """Tell what has changed about the rest of a piece. `asks`: it has ended without an outcome; a
+        person is asked for that until the piece moves again."""
+        known = self._told.get(piece.id)
+        asks = asks or (piece.end is not None and known is not None and known.asks)
+        now = rest_of(piece, self._clock_us(), asks=asks)
+        if known is None or _words_of(known) != _words_of(now):
+            self._told[piece.id] = now
+            self._tell(now)
+
+
+def _words_of(rest: PieceRest) -> tuple[str, str, bool, bool]:
+    return rest.state, rest.why, rest.stops, rest.asks

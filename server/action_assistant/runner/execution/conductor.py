@@ -30,6 +30,7 @@ from action_assistant.runner.execution.conducted_steps import (
     Gate,
     Leading,
     LeftOpen,
+    RestNews,
     Step,
     Word,
     order_of,
@@ -155,6 +156,7 @@ class Conductor:
         self._again: dict[str, OpenRun] = {}  # pieces that had ended and move again
         self._ticked = anyio.current_time()
         self._unstored: set[RunRecorder] = set()  # of pieces that have ended
+        self._rests = RestNews(lambda event: self._run.tell(event), clock_us)
 
     def leads(self, leading: Leading) -> None:
         """Name the run that is led. Call this before the run is driven."""
@@ -508,6 +510,7 @@ class Conductor:
             step.shown = action
             self._states[step.node] = state
             self._run.tell(seen_of(step, action, state, self._clock_us()))
+        self._rests.show(run)
         if run.end is None:
             self._find_trouble(step, run)
             self._find_lacking_output(step, run)
@@ -564,6 +567,8 @@ class Conductor:
             return "on_true"
         if outcome is None or outcome == "on_stopped":
             self._trouble(step, "ended", f"{where} has ended without an outcome: {run.state}.")
+            if not step.is_stopped:
+                self._rests.show(run, asks=True)
             return None
         return outcome
 
@@ -655,8 +660,12 @@ class Conductor:
         step.decided.set()
 
     def moves_again(self, piece: OpenRun) -> None:
-        """Act on a piece that had ended and moves."""
+        """Act on a piece that had ended and moves, until it has ended again."""
         again = piece.run
+        if again.id in self._again or again.end is None:
+            self._rests.show(again)
+        if again.end is not None:
+            return
         is_known, self._again[again.id] = again.id in self._again, piece
         if self._gate.is_final and again.desired != "stopped":
             piece.stop(self._stopped_by, "")

@@ -124,9 +124,9 @@ class Conductors:
         conductor.give_word(node, word)
 
     def _see(self, opened: OpenRun) -> None:
-        """Tell a conductor of a piece that was over and closed, and moves again."""
+        """Tell a conductor of each change of a piece that was over and closed, and moves again."""
         piece = opened.run.piece
-        if piece is not None and not opened.is_led and opened.run.end is None:
+        if piece is not None and not opened.is_led:
             conductor = self._open.get(piece.run)
             if conductor is not None:
                 conductor.moves_again(opened)

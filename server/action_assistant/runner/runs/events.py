@@ -332,6 +332,33 @@ class PieceSeen(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     messages: tuple[str, ...] = ()
 
 
+class PieceRest(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """The knowledge about the rest of a piece of a conducted run has changed. `state`: it goes on
+    ("going"), gets Stops until rest is proven ("stopping"), its robot does not answer ("silent"), no
+    answer can prove its rest any more ("unproven"), an answer has proven it ("proven"), somebody or
+    something has seen it ("seen"), or nothing of it ever began ("unsent"). `since`: when that began;
+    `why`: the reason, or how rest was seen; `stops`: a Stop is asked for; `asks`: the piece has ended
+    without an outcome, which a person has to give."""
+
+    kind: ClassVar[str] = "run.piece_rest.v1"
+
+    at: int
+    piece: str
+    node: str
+    engine: str
+    state: Literal["going", "stopping", "silent", "unproven", "proven", "seen", "unsent"]
+    since: int
+    why: str = ""
+    by: Author | None = None
+    stops: bool = False
+    asks: bool = False
+
+    @property
+    def rests(self) -> bool:
+        """True once nothing of the piece goes on."""
+        return self.state in {"proven", "seen", "unsent"}
+
+
 class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A call of a conducted run has its outcome. `how`: by the states of the piece in an answer that
     was asked for after its end, by the word of a person, or because nothing of it was ever sent.
@@ -397,6 +424,7 @@ RunEvent: TypeAlias = (
     | MovesAgain
     | PieceBegan
     | PieceSeen
+    | PieceRest
     | PieceEnded
     | Held
     | Released
@@ -427,6 +455,7 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
         MovesAgain,
         PieceBegan,
         PieceSeen,
+        PieceRest,
         PieceEnded,
         Held,
         Released,

@@ -35,6 +35,7 @@ from action_assistant.runner.runs.events import (
     PauseRequested,
     PieceBegan,
     PieceEnded,
+    PieceRest,
     PieceSeen,
     Proof,
     Published,
@@ -48,7 +49,7 @@ from action_assistant.runner.runs.events import (
     Unconfirmed,
     Unknown,
 )
-from action_assistant.runner.runs.run import Alarm, Intervention, Run
+from action_assistant.runner.runs.run import Alarm, Intervention, Run, Said
 from action_assistant.runner.runs.visits import (
     KEPT,
     ActionRun,
@@ -172,7 +173,11 @@ def follow(run: Run, event: RunEvent) -> Run:
             return _piece_ended(run, event)
         case PieceBegan():
             action = replace(run.actions.get(event.node, _UNSEEN), piece=event.piece)
-            return replace(run, actions=run.actions | {event.node: action})
+            return _piece_rest(
+                replace(run, actions=run.actions | {event.node: action}), _going(event)
+            )
+        case PieceRest():
+            return _piece_rest(run, event)
         case Requested() | Unknown():
             return run
         case _:
@@ -370,14 +375,48 @@ def _piece_seen(run: Run, event: PieceSeen) -> Run:
 
 
 def _piece_ended(run: Run, event: PieceEnded) -> Run:
-    """Fold the outcome of a call of a conducted run."""
+    """Fold the outcome of a call of a conducted run. Streams without `PieceRest` events prove the
+    rest of a piece by its outcome where an answer has shown that."""
     action = after_outcome(
         run.actions.get(event.node, _UNSEEN),
         event.call,
         event.outcome,
         "inferred" if event.how == "word" else "observed",
     )
-    return replace(run, actions=run.actions | {event.node: action})
+    run = replace(run, actions=run.actions | {event.node: action})
+    if event.by is not None:
+        visit = action.older + len(action.visits)
+        word = Said(visit=visit, by=event.by, at=event.at, reason=event.reason)
+        words = (*run.said.get(event.node, ()), word)[-KEPT:]
+        run = replace(run, said=run.said | {event.node: words})
+    known = run.rests.get(event.piece)
+    if known is None:
+        return run
+    if not known.rests and event.how == "shape":
+        return _piece_rest(run, replace(known, state="proven", at=event.at, since=event.at))
+    return replace(run, rests=run.rests | {event.piece: replace(known, asks=False)})
+
+
+def _going(event: PieceBegan) -> PieceRest:
+    return PieceRest(
+        at=event.at,
+        piece=event.piece,
+        node=event.node,
+        engine=event.engine,
+        state="going",
+        since=event.at,
+    )
+
+
+def _piece_rest(run: Run, event: PieceRest) -> Run:
+    """Fold the rest of a piece. An earlier piece of its robot is kept while it may go on or waits for
+    an outcome."""
+    kept = {
+        piece: known
+        for piece, known in run.rests.items()
+        if known.engine != event.engine or not known.rests or known.asks
+    }
+    return replace(run, rests=kept | {event.piece: event})
 
 
 def observe(run: Run, seen: Iterable[Seen]) -> Run:

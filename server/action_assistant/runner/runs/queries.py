@@ -18,9 +18,12 @@ from sqlalchemy import (
     not_,
     or_,
     select,
+    true,
     union_all,
 )
+from sqlalchemy.sql.selectable import TableValuedAlias
 
+from action_assistant.runner.links.port import CONDUCTED
 from action_assistant.schema.runner_tables import FAILED, review, robot, run, run_label
 
 OPEN: Final = "open"
@@ -83,26 +86,42 @@ def listed(wanted: Filter, limit: int, among: Iterable[int] | None = None) -> Se
     if among is not None:
         numbers = func.json_each(msgspec.json.encode(sorted(among)).decode()).table_valued("value")
         query = query.where(run.c.number.in_(select(numbers.c.value)))
-        return _newest(_of_graph(query, wanted.graph), wanted, limit)
-    if wanted.graph is None:
+        query = query.where(*(or_(*each) for each in (_graph(wanted), on_engine(wanted.engine))))
+        return _newest(query, wanted, limit)
+    if wanted.graph is None and wanted.engine is None:
         return _newest(query, wanted, limit)
     ids = select(run.c.id).outerjoin(review, review.c.run == run.c.id)
-    # Two queries, each by an index in the order of the numbers: one with OR would read all runs.
+    # Several queries, each by an index in the order of the numbers: one with OR would read all runs.
     named = union_all(
         *(
-            select(_newest(ids.where(column == wanted.graph), wanted, limit).subquery())
-            for column in (run.c.graph, run.c.graph_name)
+            select(_newest(ids.where(of_graph, on), wanted, limit).subquery())
+            for of_graph in _graph(wanted)
+            for on in on_engine(wanted.engine)
         )
     )
     return query.where(run.c.id.in_(named)).order_by(run.c.number.desc()).limit(limit)
 
 
-def _of_graph(query: Select[Any], graph: str | None) -> Select[Any]:
-    return (
-        query
-        if graph is None
-        else query.where(or_(run.c.graph == graph, run.c.graph_name == graph))
-    )
+def _graph(wanted: Filter) -> tuple[ColumnElement[bool], ...]:
+    """Return the conditions of which a run of the wanted graph has one."""
+    if wanted.graph is None:
+        return (true(),)
+    return (run.c.graph == wanted.graph, run.c.graph_name == wanted.graph)
+
+
+def on_engine(engine: str | None) -> tuple[ColumnElement[bool], ...]:
+    """Return the conditions of which a run on this engine has one: a conducted run is on each engine
+    that plays an actor in it. None: any engine."""
+    if engine is None:
+        return (true(),)
+    robots = _robots()
+    has = select(robots.c.value).where(robots.c.value == engine).exists()
+    return (run.c.engine == engine, and_(run.c.engine == CONDUCTED, has))
+
+
+def _robots() -> TableValuedAlias:
+    """Return the engines of a conducted run as a table of one column, `value`."""
+    return func.json_each(run.c.summary, "$.robots").table_valued("value")
 
 
 def _newest(query: Select[Any], wanted: Filter, limit: int) -> Select[Any]:
@@ -115,8 +134,6 @@ def _newest(query: Select[Any], wanted: Filter, limit: int) -> Select[Any]:
 
 
 def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
-    if wanted.engine is not None:
-        yield run.c.engine == wanted.engine
     if wanted.states:
         yield run.c.state.in_([*wanted.states, OPEN])
     if wanted.failed is not None:
@@ -131,7 +148,10 @@ def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
     if wanted.text is not None:
         places = (run.c.graph_name, run.c.engine, run.c.author_name, review.c.words, review.c.note)
         found = (each.icontains(wanted.text, autoescape=True) for each in places)
-        yield or_(*found, cast(run.c.number, Text) == wanted.text)
+        robots = _robots()
+        named = robots.c.value.icontains(wanted.text, autoescape=True)
+        led = and_(run.c.engine == CONDUCTED, select(robots.c.value).where(named).exists())
+        yield or_(*found, led, cast(run.c.number, Text) == wanted.text)
     if wanted.label is not None:
         yield run.c.id.in_(select(run_label.c.run).where(run_label.c.label == wanted.label))
     if wanted.pinned is not None:

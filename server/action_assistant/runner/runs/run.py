@@ -15,6 +15,7 @@ from action_assistant.runner.runs.events import (
     Overridden,
     Override,
     PieceOf,
+    PieceRest,
 )
 from action_assistant.runner.runs.visits import ActionRun, Message
 from action_assistant.umrf.laps import Laps
@@ -66,6 +67,16 @@ class Intervention(msgspec.Struct, frozen=True, kw_only=True):
     active: tuple[str, ...] = ()
 
 
+class Said(msgspec.Struct, frozen=True, kw_only=True):
+    """The word of a person for the result of a visit that no answer has shown. `visit`: its number,
+    from 1."""
+
+    visit: int
+    by: Author
+    at: int
+    reason: str
+
+
 class Run(msgspec.Struct, frozen=True, kw_only=True):
     """The state of one run, folded from its events. Times are microseconds UTC."""
 
@@ -88,6 +99,9 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     led: Led | None = None  # of a conducted run
     piece: PieceOf | None = None  # of a piece of one
     held: Held | None = None  # why a conducted run begins nothing further
+    #: Of a conducted run, by piece: those that may go on, and the newest one of each robot.
+    rests: dict[str, PieceRest] = {}
+    said: dict[str, tuple[Said, ...]] = {}  # by the action of a conducted run
     desired: Desired = "running"
     incarnation: str | None = None  # None: nothing has been sent, as far as is known
     process: EngineProcess | None = None  # of the engine, where it can be seen to end

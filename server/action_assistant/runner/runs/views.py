@@ -1,8 +1,8 @@
 """The views of a run that pages and programs get (docs/contracts.md 4)."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any, Final
+from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 from msgspec.structs import replace
@@ -10,8 +10,8 @@ from sqlalchemy import Row
 
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import DurationBounds, of_run
-from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override
-from action_assistant.runner.runs.run import Desired, Result, Run, State
+from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override, PieceRest
+from action_assistant.runner.runs.run import Desired, Result, Run, Said, State
 from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgraphs_shown
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.safe_text import hold_names
@@ -35,6 +35,17 @@ _SAME: Final = (
     "result",
 )
 _SAME_TIMES: Final = ("requested_at", "started_at", "ended_at")
+RestState: TypeAlias = Literal[
+    "unused",
+    "going",
+    "stopping",
+    "silent",
+    "unproven",
+    "proven",
+    "seen",
+    "unsent",
+    "unknown",
+]
 _EPOCH: Final = datetime(1970, 1, 1, tzinfo=UTC)
 
 
@@ -43,7 +54,7 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
-    none were seen."""
+    none were seen. `said`: who gave the result by word, where no answer has shown it."""
 
     start: datetime
     not_before: datetime
@@ -52,6 +63,15 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     result: Outcome | None
     how: How
     inputs: dict[str, str] | None = None
+    said: "SaidShown | msgspec.UnsetType" = msgspec.UNSET
+
+
+class SaidShown(msgspec.Struct, frozen=True):
+    """The word of a person for the result of a visit."""
+
+    by: Author
+    at: datetime
+    reason: str
 
 
 class MessageShown(msgspec.Struct, frozen=True):
@@ -64,7 +84,8 @@ class MessageShown(msgspec.Struct, frozen=True):
 class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
     """One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
     may have been missed. `visits` are the newest ones; `older`: how many are not listed. `robot`:
-    the engine that plays it in a conducted run; `piece`: the id of the run of its newest piece."""
+    the engine that plays it in a conducted run; `piece`: the id of the run of its newest piece;
+    `asks`: it has ended without an outcome, which a person has to give."""
 
     aid: str | None
     state: str
@@ -75,6 +96,7 @@ class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
     at_least: bool = False
     robot: str = ""
     piece: str = ""
+    asks: bool = False
 
 
 class AlarmShown(msgspec.Struct, frozen=True):
@@ -104,6 +126,28 @@ class HeldShown(msgspec.Struct, frozen=True):
     by: Author | None
     why: str
     since: datetime
+
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
+
+
+class RobotRestShown(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The knowledge about the rest of one robot of a conducted run. `state`: nothing of the run was
+    ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is proven
+    ("stopping"), it does not answer ("silent"), no answer can prove rest any more ("unproven"), an
+    answer has proven it ("proven"), somebody or something has seen it ("seen"), nothing of the last
+    action began ("unsent"), or nothing was recorded of it ("unknown"). `since`: when that began;
+    `action`, `piece`: the action and the run of its piece; `why`: the reason, or how rest was seen;
+    `by`: who has seen it; `stops`: a Stop is asked for, and repeated until rest is proven."""
+
+    robot: str
+    state: RestState
+    since: datetime | None = None
+    action: str = ""
+    piece: str = ""
+    why: str = ""
+    by: Author | None = None
+    stops: bool = False
 
     def __post_init__(self) -> None:
         hold_names(self, "why")
@@ -169,12 +213,14 @@ class Listed(RunSummary, frozen=True, kw_only=True):
 
 class RunShown(RunSummary, frozen=True, kw_only=True):
     """A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
-    robot whose engine the simulator plays; `behaviours`: whether its actions have Python behaviours."""
+    robot whose engine the simulator plays; `behaviours`: whether its actions have Python behaviours;
+    `rests`: of a conducted run, what is known of the rest of each robot."""
 
     like: str | None
     behaviours: bool
     actions: dict[str, ActionShown]
     log: list[MessageShown]
+    rests: list[RobotRestShown] | msgspec.UnsetType = msgspec.UNSET
 
 
 class RunWhole(RunShown, frozen=True, kw_only=True):
@@ -215,23 +261,26 @@ class ActionViewCache:
     is valid while its `ActionRun` is the same object."""
 
     def __init__(self) -> None:
-        self._known: dict[str, tuple[ActionRun, int, VisitCount, ActionShown]] = {}
+        self._known: dict[str, tuple[ActionRun, tuple[Any, ...], ActionShown]] = {}
 
-    def action(self, name: str, action: ActionRun, most: int, count: VisitCount) -> ActionShown:
-        """Return the view of an action with at most `most` of its newest visits."""
+    def action(self, run: Run, name: str, most: int, count: VisitCount) -> ActionShown:
+        """Return the view of an action of a run with at most `most` of its newest visits."""
+        action, said = run.actions[name], run.said.get(name, ())
+        asks = any(each.node == name and each.asks for each in run.rests.values())
+        rest = (most, count, said, asks)
         known = self._known.get(name)
-        if known is not None and known[0] is action and known[1:3] == (most, count):
-            return known[3]
-        found = _action_view(action, most, count)
-        self._known[name] = action, most, count, found
+        if known is not None and known[0] is action and known[1] == rest:
+            return known[2]
+        found = _action_view(action, most, count, said, asks)
+        self._known[name] = action, rest, found
         return found
 
     def prepare(self, run: Run, at_once: int) -> Iterator[None]:
         """Fill the cache for `run_view`; yield after each `at_once` actions, so that the event loop
         can do other work in between."""
         most, counts = _most(run, _LIVE), visit_counts(run)
-        for number, (name, action) in enumerate(run.actions.items(), 1):
-            self.action(name, action, most, counts[name])
+        for number, name in enumerate(run.actions, 1):
+            self.action(run, name, most, counts[name])
             if number % at_once == 0:
                 yield
 
@@ -244,6 +293,7 @@ def run_view(run: Run, *, recorded: bool = True, cache: ActionViewCache | None =
         behaviours=run.behaviours,
         actions=_actions(run, _LIVE, cache),
         log=_log(run, _LINES),
+        rests=_rests(run),
     )
 
 
@@ -264,6 +314,7 @@ def whole_view(
         behaviours=run.behaviours,
         actions=actions,
         log=_log(run, len(run.log)),
+        rests=_rests(run),
         umrf=msgspec.Raw(graph.umrf.encode()),
         override=run.override,
         despite=list(run.despite),
@@ -369,8 +420,60 @@ def _at_rest(seen: AtRest | None) -> AtRestShown | None:
     return None if seen is None else AtRestShown(seen.by, time(seen.at), seen.how)
 
 
-def visit_view(each: Visit) -> VisitShown:
-    """Return one visit with its times as datetimes."""
+#: From the worst to the best.
+_WORST: Final = (
+    "unproven",
+    "unknown",
+    "silent",
+    "stopping",
+    "going",
+    "seen",
+    "proven",
+    "unsent",
+    "unused",
+)
+
+
+def _rests(run: Run) -> list[RobotRestShown] | msgspec.UnsetType:
+    """Return the rest of each robot of a conducted run: that of its piece which is the furthest from
+    being proven."""
+    if run.led is None:
+        return msgspec.UNSET
+    found: dict[str, list[RobotRestShown]] = {
+        robot: [] for robot in sorted(set(run.led.players.values()))
+    }
+    for each in run.rests.values():
+        found.setdefault(each.engine, []).append(_rest_view(run, each))
+    return [
+        min(shown, key=lambda each: _WORST.index(each.state))
+        if shown
+        else RobotRestShown(robot, "unused")
+        for robot, shown in found.items()
+    ]
+
+
+def _rest_view(run: Run, rest: PieceRest) -> RobotRestShown:
+    """Return the rest of one piece. The proof of a run that is over is made of those of its pieces."""
+    shown = RobotRestShown(
+        rest.engine,
+        rest.state,
+        time(rest.since),
+        rest.node,
+        rest.piece,
+        rest.why,
+        rest.by,
+        rest.stops,
+    )
+    if rest.rests or run.end is None:
+        return shown
+    is_proven = run.proof_at is not None and run.at_rest is None
+    at = _time(run.proof_at) if is_proven else None
+    state: RestState = "proven" if is_proven else "unknown"
+    return replace(shown, state=state, since=at, why="", stops=False)
+
+
+def visit_view(each: Visit, said: SaidShown | msgspec.UnsetType = msgspec.UNSET) -> VisitShown:
+    """Return one visit with its times as datetimes. `said`: who gave its result by word."""
     return VisitShown(
         time(each.start),
         time(each.not_before),
@@ -379,6 +482,7 @@ def visit_view(each: Visit) -> VisitShown:
         each.result,
         each.how,
         each.inputs,
+        said,
     )
 
 
@@ -390,13 +494,23 @@ def _most(run: Run, visits: int) -> int:
 
 def _actions(run: Run, visits: int, cache: ActionViewCache | None = None) -> dict[str, ActionShown]:
     cache, most, counts = cache or ActionViewCache(), _most(run, visits), visit_counts(run)
-    return {
-        name: cache.action(name, action, most, counts[name]) for name, action in run.actions.items()
-    }
+    return {name: cache.action(run, name, most, counts[name]) for name in run.actions}
 
 
-def _action_view(action: ActionRun, most: int, count: VisitCount) -> ActionShown:
-    visits = [visit_view(each) for each in action.visits[-most:]]
+def words_for(said: Iterable[Said]) -> dict[int, SaidShown]:
+    """Return who gave results by word, by the number of the visit, from 1."""
+    return {each.visit: SaidShown(each.by, time(each.at), each.reason) for each in said}
+
+
+def _action_view(
+    action: ActionRun, most: int, count: VisitCount, said: Sequence[Said], asks: bool
+) -> ActionShown:
+    words = words_for(said)
+    first = action.older + len(action.visits) - len(action.visits[-most:]) + 1
+    visits = [
+        visit_view(each, words.get(number, msgspec.UNSET))
+        for number, each in enumerate(action.visits[-most:], first)
+    ]
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]
     older = action.older + len(action.visits) - len(visits)
     return ActionShown(
@@ -409,6 +523,7 @@ def _action_view(action: ActionRun, most: int, count: VisitCount) -> ActionShown
         count.at_least,
         action.robot,
         action.piece,
+        asks,
     )
 
 
