@@ -91,7 +91,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         described=True,
     ),
     "watch": CommandEntry(
-        "watch.watch", "print each change of a graph as it comes, until Ctrl-C", described=True
+        "watch", "print each change of a graph as it comes, until Ctrl-C", described=True
     ),
     "link": CommandEntry(
         "people", "print the link that signs the owner in, of a server that runs", described=True

@@ -1,10 +1,11 @@
-"""A graph's room, joined as a stock Yjs client that never edits, and its changes on lines of their own."""
+"""`watch`: joins a graph's room as a stock Yjs client that never edits, and prints each change on a line."""
 
 import argparse
-import contextlib
 import sys
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from datetime import datetime
-from typing import Any, Final
+from typing import Any, Final, Literal, TypeAlias
 
 import anyio
 import httpx
@@ -20,12 +21,152 @@ from httpx_ws import (
 from pycrdt import Doc, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from action_assistant.commands.client import reach, running, sentence
-from action_assistant.commands.watch.changes import GraphChange, ShownGraph, changes
+from action_assistant.commands.client import add_server, reach, running, sentence
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents import document
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
+from action_assistant.umrf.difference import Difference, Field, difference
+from action_assistant.umrf.model import Graph
+
+Subject: TypeAlias = Literal["graph", "action", "arrow", "note", "comment"]
+
+_LONGEST: Final = 120  # characters of a value
+
+
+class GraphChange(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One difference. `name`: the full name of an action (the newer one), or the id of a note or
+    comment; `before` and `after` are None if there was or is no value."""
+
+    subject: Subject
+    change: Literal["added", "removed", "changed"]
+    words: str
+    name: str = ""
+    parent: str = ""
+    child: str = ""
+    field: str = ""
+    before: Any = None
+    after: Any = None
+
+
+class ShownGraph(msgspec.Struct, frozen=True):
+    """A graph and its comments."""
+
+    graph: Graph
+    comments: Mapping[str, object]
+
+
+def changes(before: ShownGraph, after: ShownGraph) -> list[GraphChange]:
+    """Return the differences between two states, one sentence each. A difference without a sentence
+    of its own, for example of an order, is described as a change of the graph."""
+    found = [
+        *_of_graph(difference((0, before.graph), (0, after.graph))),
+        *_of_texts("note", dict(before.graph.notes), dict(after.graph.notes)),
+        *_of_texts("comment", before.comments, after.comments),
+    ]
+    if not found and before != after:
+        found.append(GraphChange(subject="graph", change="changed", words="the graph changed"))
+    return found
+
+
+def _of_graph(different: Difference) -> Iterable[GraphChange]:
+    for field in different.fields:
+        yield _field("graph", "graph", field)
+    for action in sorted(different.actions, key=lambda each: (each.name, each.aid)):
+        words = f"action {action.name}"
+        if action.change != "changed":
+            yield GraphChange(
+                subject="action",
+                change=action.change,
+                words=f"{words} {action.change}",
+                name=action.name,
+            )
+        for field in action.fields:
+            yield _field("action", words, field, name=action.name)
+    for arrow in different.relations:
+        words = f"arrow {arrow.parent} → {arrow.child}"
+        ends = {"parent": arrow.parent, "child": arrow.child}
+        if arrow.change != "changed":
+            yield GraphChange(
+                subject="arrow", change=arrow.change, words=f"{words} {arrow.change}", **ends
+            )
+        for field in arrow.fields:
+            yield _field("arrow", words, field, **ends)
+
+
+def _of_texts(
+    subject: Subject, before: Mapping[str, object], after: Mapping[str, object]
+) -> Iterable[GraphChange]:
+    for name in sorted(before.keys() | after.keys()):
+        if before.get(name) == after.get(name):
+            continue
+        change: Literal["added", "removed", "changed"] = (
+            "added" if name not in before else "removed" if name not in after else "changed"
+        )
+        yield GraphChange(
+            subject=subject,
+            change=change,
+            words=f"{subject} {change}",
+            name=name,
+            before=before.get(name),
+            after=after.get(name),
+        )
+
+
+def _field(subject: Subject, who: str, field: Field, **ends: str) -> GraphChange:
+    return GraphChange(
+        subject=subject,
+        change="changed",
+        words=_field_words(subject, who, field),
+        field=field.field,
+        before=field.before,
+        after=field.after,
+        **ends,
+    )
+
+
+def _field_words(subject: Subject, who: str, field: Field) -> str:
+    before, after = _shown(field.before), _shown(field.after)
+    match subject, field.field:
+        case "action", "position":
+            return f"{who} moved"
+        case "action", "name":
+            return f"action {before} renamed to {after}"
+        case "graph", "name":
+            return f"graph {before} renamed to {after}"
+    if subject == "arrow" and field.field.startswith("waypoints/"):
+        return f"{who} {'straightened' if field.after is None else 'bent'}"
+    name = field.field.removeprefix("in/")
+    if subject == "action" and field.field.startswith("in/"):
+        name = f"parameter {name}"
+    elif subject == "action" and field.field.startswith("out/"):
+        name = f"output {field.field.removeprefix('out/')}"
+    if field.after is None:
+        return f"{who}: {name} removed (was {before})"
+    if field.before is None:
+        return f"{who}: {name} added: {after}"
+    return f"{who}: {name} is {after} (was {before})"
+
+
+def _shown(value: object) -> str:
+    """Return a value as text, shortened to fit into a line."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    text = value if isinstance(value, str) else str(value)
+    if not text:
+        return "empty"
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}…"
+
+
+def _add_watch(watch: argparse.ArgumentParser) -> None:
+    add_server(watch, "patrol")
+    watch.add_argument("graph", metavar="GRAPH", help="id or name")
+    watch.add_argument("--json", action="store_true", help="one JSON object for each line")
+    watch.set_defaults(handler=_watch)
+
+
+COMMANDS: Final = {"watch": _add_watch}
+
 
 _PAUSES: Final = (0.3, 1.0, 3.0, 10.0)  # seconds before coming again; the last one from then on
 #: Refusals of the upgrade after which coming again leads nowhere.
@@ -135,7 +276,7 @@ class WatchedGraph:
 
     def _meet(self, presence: messages.Presence) -> None:
         for entry in presence.entries:
-            with contextlib.suppress(msgspec.DecodeError):
+            with suppress(msgspec.DecodeError):
                 state = msgspec.json.decode(entry.state, type=_State | None)
                 if state is not None and state.user.name:
                     self._names[entry.client] = state.user.name
@@ -206,16 +347,15 @@ class QuietSocket(HttpxWebsocket):
         return message
 
     def _end(self, error: Exception) -> None:
-        with contextlib.suppress(anyio.WouldBlock):  # the first one counts
+        with suppress(anyio.WouldBlock):  # the first one counts
             self._ended.send_nowait(error)
 
 
-def watch(options: argparse.Namespace) -> int:
-    """Run the command `watch`: print changes of a graph until Ctrl-C. Raise CannotStart if the
-    server cannot be reached."""
-    with running(options) as server:
-        graph = server.graph_id(options.graph)
-    anyio.run(_follow, options, graph)
+def _watch(options: argparse.Namespace) -> int:
+    with suppress(KeyboardInterrupt):  # how it is meant to end
+        with running(options) as server:
+            graph = server.graph_id(options.graph)
+        anyio.run(_follow, options, graph)
     return 0
 
 

@@ -2,7 +2,7 @@
 
 from msgspec.structs import replace
 
-from action_assistant.commands.watch.changes import ShownGraph, changes
+from action_assistant.commands.watch import ShownGraph, changes
 from action_assistant.umrf.model import Action, Conditions, Graph, Parameter, Relation
 
 A = Action(key="a" * 12, name="A", inputs=(Parameter("pose/x", "5"),))

@@ -19,7 +19,7 @@ from httpx_ws import aconnect_ws
 from pycrdt import Doc, Map, Provider
 from pycrdt.websocket.websocket import HttpxWebsocket
 
-from action_assistant.commands.watch.room import QuietSocket, WatchedGraph
+from action_assistant.commands.watch import QuietSocket, WatchedGraph
 from action_assistant.editor.crdt import messages
 from support.product import COMMAND, TOKEN, Product, running
 

@@ -1,1 +1,0 @@
-"""watch: what people change in a graph, as it comes."""
