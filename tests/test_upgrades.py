@@ -18,7 +18,7 @@ import msgspec
 import pytest
 from sqlalchemy import Connection, inspect, text
 
-from action_assistant.commands.databases.going_back import go_back
+from action_assistant.commands.databases.migrate import go_back
 from action_assistant.errors import CannotStart
 from action_assistant.journal import migrate as journal_migrate
 from action_assistant.journal.copies import before_upgrade

@@ -1,11 +1,16 @@
-"""The command `runs` with its own commands: at rest, since, examples, verify, archive and restore."""
+"""The command `runs` with its own commands: at-rest, go-on, since, examples, verify, archive and copy."""
 
 import argparse
+import asyncio
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
+
+import msgspec
 
 from action_assistant import paths, settings
+from action_assistant.commands.backups.progress import Progress
 from action_assistant.commands.client import (
     Server,
     add_server,
@@ -15,15 +20,15 @@ from action_assistant.commands.client import (
     refused,
     running,
 )
-from action_assistant.commands.databases import runs_copy
 from action_assistant.commands.drafts import changes_lines
 from action_assistant.errors import CannotStart, Refused, RequestRefused
-from action_assistant.safe_text import one_line
+from action_assistant.safe_text import one_line, told
 from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.difference_text import lines, without_looks
 
 if TYPE_CHECKING:  # slow to load, and most calls do not need it
     from action_assistant.editor.history.course_search import SinceWhen
+    from action_assistant.runner.analysis.expected_runs import Expectation
 
 
 _TIME: Final = "%Y-%m-%dT%H:%M:%S"
@@ -52,7 +57,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     goes_on.add_argument("run", metavar="RUN", help="id of the run")
     goes_on.set_defaults(handler=_go_on)
     _add_archives(more)
-    runs_copy.add_to(more)
+    _add_copy(more)
     _add_since(more)
     brought = command(
         more,
@@ -123,10 +128,79 @@ def _examples(options: argparse.Namespace) -> int:
     return 0
 
 
-def _verify(options: argparse.Namespace) -> int:
-    from action_assistant.commands.verify_runs import verify
+class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
+    """The verdict on one expected run.
 
-    return verify(options)
+    `against`: the graph that was simulated, either the one that the run was sent (`then`) or the
+    present one (`now`).
+    """
+
+    name: str
+    run: str
+    against: Literal["then", "now"]
+    same: bool
+    why: str = ""
+
+
+def _verify(options: argparse.Namespace) -> int:
+    """Simulate every expected run again, with its graph of then and with the present one, and print
+    the verdicts. Return 0 if all go the same course, else 1."""
+    with running(options) as server:
+        verdicts = list(_verdicts(server, options))
+    if options.json:
+        print_json(msgspec.to_builtins(verdicts))
+    elif not verdicts:
+        print("Nothing is expected yet: open a run in the page and choose “Expect this course”.")
+    else:
+        for each in verdicts:
+            verdict = "same   " if each.same else "DIFFERS"
+            print(one_line(f"{verdict}  {each.name} ({each.against})"))
+            if each.why:
+                print(told(f"         {each.why}"))
+    return 0 if all(each.same for each in verdicts) else 1
+
+
+def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVerdict]:
+    from action_assistant.runner.analysis.expected_runs import Expectation
+
+    wanted = server.graph_id(options.graph) if options.graph else None
+    answer = server.runner("GET", "/api/expectations").content
+    for each in msgspec.json.decode(answer, type=list[Expectation]):
+        if wanted is not None and each.graph != wanted:
+            continue
+        yield _verdict(each, bytes(each.umrf), "then")
+        if each.graph is not None:
+            yield _now(server, each, each.graph)
+
+
+def _now(server: Server, each: "Expectation", graph: str) -> VerifyVerdict:
+    """Compare an expected run with the present state of its graph; the verdict is negative if the
+    graph does not exist any more."""
+    try:
+        umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
+    except RequestRefused as error:
+        return VerifyVerdict(
+            name=each.name, run=each.run, against="now", same=False, why=str(error)
+        )
+    return _verdict(each, umrf, "now")
+
+
+def _verdict(each: "Expectation", umrf: bytes, against: Literal["then", "now"]) -> VerifyVerdict:
+    from action_assistant.umrf.courses.expected import check_expected
+    from action_assistant.umrf.files import codec
+    from action_assistant.umrf.semantics import script_from
+
+    script = script_from(msgspec.json.decode(each.script))
+    try:
+        was, now = codec.read(bytes(each.umrf)).graph, codec.read(umrf).graph
+    except codec.Unreadable as wrong:
+        return VerifyVerdict(
+            name=each.name, run=each.run, against=against, same=False, why=wrong.message
+        )
+    check = check_expected(was, each.course, script, now)
+    return VerifyVerdict(
+        name=each.name, run=each.run, against=against, same=check.apart is None, why=check.why
+    )
 
 
 def _add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -255,9 +329,9 @@ def _sweep(server: Server, ages: dict[str, float | None]) -> int:
     problems: dict[str, None] = {}
     more = True
     while more:
-        told = server.runner("POST", "/api/archive", json=ages).json()
-        runs, hours, more = runs + told["runs"], hours + told["raw"], told["more"]
-        problems |= dict.fromkeys(told["problems"])
+        swept = server.runner("POST", "/api/archive", json=ages).json()
+        runs, hours, more = runs + swept["runs"], hours + swept["raw"], swept["more"]
+        problems |= dict.fromkeys(swept["problems"])
         if more:
             print(f"{runs} runs so far", file=sys.stderr)
     print(f"{runs} runs and {hours} hours of raw messages are in archives now")
@@ -298,3 +372,47 @@ def _restore(options: argparse.Namespace) -> int:
             continue
         print(f"{place}: {events} events, all of them sound")
     return code
+
+
+def _add_copy(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    """Add the command `runs copy`."""
+    copy = runs.add_parser(
+        "copy",
+        help="copy runs into the schema action_assistant_runs of a Postgres database, for your own "
+        "queries",
+        epilog="example: action-assistant runs copy --to postgresql://lab@db/lab --follow",
+    )
+    copy.add_argument("--to", required=True, metavar="URL", help="postgresql://USER@HOST/NAME")
+    copy.add_argument(
+        "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
+    )
+    copy.add_argument(
+        "--follow", action="store_true", help="go on, until Ctrl-C, also while the database is away"
+    )
+    copy.set_defaults(handler=_copy)
+
+
+def _copy(options: argparse.Namespace) -> int:
+    data = options.data.resolve()
+    path = data / "runner.db"
+    if not path.is_file():
+        raise CannotStart(f"There are no runs in {data}.")
+    from sqlalchemy import make_url
+    from sqlalchemy.exc import ArgumentError
+
+    try:
+        url = make_url(options.to)
+    except ArgumentError as error:
+        raise CannotStart("--to is not a URL such as postgresql://lab@db/lab.") from error
+    if url.drivername not in {"postgresql", "postgres"} or not url.database:
+        raise CannotStart("--to is a Postgres database: postgresql://USER@HOST/NAME.")
+    # Slow to load, and most who ask about runs do not need it.
+    from sqlalchemy.ext.asyncio import create_async_engine
+
+    from action_assistant.commands.databases.runs_copy import RunsCopier, followed, once
+
+    engine = create_async_engine(
+        url.set(drivername="postgresql+asyncpg"), connect_args={"timeout": 5}, pool_size=1
+    )
+    copier = RunsCopier(path, settings.keep(data).folder, engine, Progress())
+    return asyncio.run(followed(copier) if options.follow else once(copier, str(url.database)))

@@ -33,7 +33,7 @@ LOG: Final = frozenset({"event", "head"})
 CHILD: Final = """
 import os, signal, sys
 from pathlib import Path
-from action_assistant.commands.databases.going_back import go_back
+from action_assistant.commands.databases.migrate import go_back
 from action_assistant.editor.log import database_location
 from action_assistant.journal import alembic_scripts, postgres
 
