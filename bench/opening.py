@@ -14,8 +14,7 @@ from typing import Any, Final
 from pycrdt import Doc, Map
 from table import Table, seconds
 
-from action_assistant.editor.crdt.folding import fold_sound
-from action_assistant.editor.crdt.loading import LogTail, load
+from action_assistant.editor.crdt.loading import LogTail, fold_sound, load
 from action_assistant.editor.log.document_events import UPDATED
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.journal.events import Draft, nothing

@@ -17,10 +17,9 @@ from pathlib import Path
 from typing import Any, Final
 
 from action_assistant.editor.crdt import messages
-from action_assistant.editor.rooms.broadcast import UpdateBroadcast
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.room import Room
+from action_assistant.editor.rooms.room import Room, UpdateBroadcast
 from action_assistant.journal import commit_metrics
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal

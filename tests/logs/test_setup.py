@@ -110,7 +110,7 @@ def test_uncaught_errors_are_logged_as_json_too() -> None:
 def test_a_worker_writes_as_its_parent_does() -> None:
     code = (
         "import logging; from action_assistant.logs.setup import *;"
-        "from action_assistant.web.workers.child_process import child;"
+        "from action_assistant.web.workers.lanes import child;"
         "hand_on(LogSettings('json', 'warning'));"
         "work = logging.getLogger('action_assistant.x').warning;"
         "child(work, 'hello', name='files', nice=1, preloaded=[]).join()"

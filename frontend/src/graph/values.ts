@@ -2,7 +2,7 @@
  * Reads values of the document: total functions from anything to a value or nothing.
  *
  * The document can hold whatever some client wrote. A value that does not fit is left where it is
- * and read as if it were absent, here and in `editor/documents/reading.py` alike.
+ * and read as if it were absent, here and in `editor/documents/document.py` alike.
  */
 
 import { type Direction, type Position, RESPONSES, type Response } from "./model";

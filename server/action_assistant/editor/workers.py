@@ -14,8 +14,8 @@ T = TypeVar("T")
 
 #: Modules that the fork server imports before it forks a worker.
 _PRELOADED: Final = (
-    "action_assistant.web.workers.child_process",
-    "action_assistant.editor.crdt.folding",
+    "action_assistant.web.workers.lanes",
+    "action_assistant.editor.crdt.loading",
     "action_assistant.editor.crdt.updates.update_pieces",
     "action_assistant.editor.interchange.importing",
     "action_assistant.editor.interchange.rehearsal",

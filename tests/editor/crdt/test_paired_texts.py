@@ -7,7 +7,7 @@ import pytest
 from pycrdt import Doc, Text
 
 from action_assistant.editor.crdt.event_columns import EventColumns
-from action_assistant.editor.crdt.folding import fold, fold_sound
+from action_assistant.editor.crdt.loading import fold, fold_sound
 from action_assistant.editor.crdt.messages import Malformed, number, text
 from action_assistant.editor.crdt.replica import Replica, ReplicaState, UpdateEffect
 from action_assistant.editor.crdt.updates.paired_texts import MOST_BYTES

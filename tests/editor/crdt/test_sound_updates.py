@@ -15,8 +15,7 @@ from pycrdt import Array, Doc, Map, Text, merge_updates
 
 from action_assistant.editor.crdt import loading
 from action_assistant.editor.crdt.event_columns import EventColumns
-from action_assistant.editor.crdt.folding import Folded, fold, fold_sound
-from action_assistant.editor.crdt.loading import Stored, stored
+from action_assistant.editor.crdt.loading import Folded, Stored, fold, fold_sound, stored
 from action_assistant.editor.crdt.replica import Replica, ReplicaState, UpdateEffect
 from action_assistant.editor.crdt.sound_updates import lies_deep
 from action_assistant.editor.log.document_events import DEFERRED, UPDATED

@@ -3,7 +3,7 @@
 import pytest
 
 from action_assistant.editor.crdt.event_columns import EventColumns
-from action_assistant.editor.crdt.folding import fold, fold_sound
+from action_assistant.editor.crdt.loading import fold, fold_sound
 from action_assistant.editor.crdt.messages import NOTHING_NEW, number, text
 from action_assistant.editor.crdt.replica import ReplicaState
 from action_assistant.editor.log.document_events import DEFERRED, UPDATED

@@ -8,9 +8,8 @@ import pytest
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import Loaded, load
 from action_assistant.editor.rooms.batch import BatchOutcome
-from action_assistant.editor.rooms.broadcast import UpdateBroadcast
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.room import Room
+from action_assistant.editor.rooms.room import Room, UpdateBroadcast
 from action_assistant.journal.journal import Journal
 from editor.client import STREAM, Client, bodies, settle
 

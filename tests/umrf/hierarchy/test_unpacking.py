@@ -7,8 +7,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from action_assistant.umrf.hierarchy.equivalence import behaviour_differences
-from action_assistant.umrf.hierarchy.extraction import Extracted, extracted
+from action_assistant.umrf.hierarchy.extraction import Extracted, behaviour_differences, extracted
 from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
 from action_assistant.umrf.hierarchy.inlining import under_keys
 from action_assistant.umrf.hierarchy.unpacking import Unpackable, Unpacked, unpacked

@@ -2,9 +2,12 @@
 
 This module and `frontend/src/graph/document-keys.ts` are the only places that know the keys. Flat keys let
 two people fill in different things of one action without replacing each other's container, and let
-an undone delete bring back what a colleague changed meanwhile.
+an undone delete bring back what a colleague changed meanwhile. Reading a graph is total: it derives and
+never repairs; its twins are `read.ts` and `assemble.ts` beside that file, and the vectors in
+`tests/vectors/document` hold for both.
 """
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from typing import Final, TypeAlias, cast
 
@@ -12,14 +15,25 @@ from msgspec import json
 from msgspec.structs import replace
 from pycrdt import Doc, Map
 
-from action_assistant.editor.documents.reading import read_maps
-from action_assistant.editor.documents.values import ROOTS, Root, by_text, is_aid, relation_id
+from action_assistant.editor.documents import values as values
+from action_assistant.editor.documents.values import (
+    ROOTS,
+    Ends,
+    Root,
+    by_text,
+    ends_of,
+    is_aid,
+    relation_id,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.umrf.model import (
     ENTRY,
+    ENTRY_CONDITIONS,
     EXIT,
     PRECONDITIONS,
+    RESPONSES,
     Action,
+    Conditions,
     Graph,
     JsonText,
     Key,
@@ -28,6 +42,246 @@ from action_assistant.umrf.model import (
     Relation,
     Remap,
 )
+
+Fields: TypeAlias = Mapping[str, object]
+_Extra: TypeAlias = tuple[tuple[str, JsonText], ...]
+_NOTHING: Fields = {}
+
+
+def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
+    """Return the graph that the maps of a document show. Entries that make no part of a graph are
+    ignored, and no content raises an error."""
+    meta = maps.get("meta", _NOTHING)
+    positions = maps.get("positions", _NOTHING)
+    actions = _numbered(_actions(maps.get("actions", _NOTHING), positions))
+    taken_up = _ghosts_taken_up(actions)
+    alive = {ENTRY, EXIT, *(action.key for action in actions)}
+    relations = [
+        relation
+        for relation in _relations(maps.get("relations", _NOTHING), positions)
+        if relation.parent in alive and relation.child in alive
+    ]
+    return Graph(
+        name=values.text(meta.get("name")) or "",
+        description=values.text(meta.get("description")) or "",
+        actions=tuple(action for action in actions if action.key not in taken_up),
+        relations=tuple(sorted(_redirected(relations, taken_up), key=_ends)),
+        entry_position=values.position(positions.get(ENTRY)),
+        exit_position=values.position(positions.get(EXIT)),
+        direction=values.direction(meta.get("direction")),
+        notes=_under(positions, "g/"),
+        extra=_extra(meta, "x"),
+    )
+
+
+def _owners(fields: Fields) -> dict[str, dict[str, object]]:
+    """Group fields by the part of their key before the first `|`; the inner keys are the parts
+    after it."""
+    owners: dict[str, dict[str, object]] = defaultdict(dict)
+    for key, value in fields.items():
+        head, bar, rest = key.partition("|")
+        owners[head][rest if rest or not bar else "|"] = value
+    return owners
+
+
+def _under(fields: Fields, prefix: str) -> _Extra:
+    """Return the JSON texts whose keys have this prefix, sorted by name."""
+    found = (
+        (key.removeprefix(prefix), value)
+        for key, value in fields.items()
+        if key.startswith(prefix) and isinstance(value, str) and values.json_text(value) is not None
+    )
+    return tuple(sorted(found, key=lambda pair: by_text(pair[0])))
+
+
+def _extra(fields: Fields, head: str) -> _Extra:
+    """Return unknown fields in the stored order; fields that it lacks follow, sorted by name."""
+    texts = dict(_under(fields, f"{head}/"))
+    return tuple((field, texts[field]) for field in _listed(texts, fields.get(head)))
+
+
+# Actions
+
+
+def _actions(fields: Fields, positions: Fields) -> list[Action]:
+    """Return the actions in the order of the file."""
+    found: list[tuple[float, Key, Action]] = []
+    for key, own in _owners(fields).items():
+        name = values.text(own.get(""))
+        if name is None or not is_aid(key):
+            continue
+        action = _action(key, name, own, positions.get(key))
+        found.append((values.number(own.get("order")) or 0.0, key, action))
+    return [action for _, _, action in sorted(found, key=lambda item: item[:2])]
+
+
+def _action(key: Key, name: str, own: Fields, position: object) -> Action:
+    kind = values.text(own.get("type"))
+    return Action(
+        key=key,
+        name=name,
+        instance_id=values.instance_id(own.get("instance_id")) or 0,
+        type="sync" if kind is None else kind,
+        actor=values.text(own.get("actor")) or "",
+        description=values.text(own.get("description")) or "",
+        inputs=_parameters(own, "in"),
+        outputs=_parameters(own, "out"),
+        position=values.position(position),
+        missing=own.get("missing") is True,
+        twin=own.get("twin") is True,
+        extra=_extra(own, "x"),
+    )
+
+
+def _parameters(own: Fields, side: str) -> tuple[Parameter, ...]:
+    texts = dict(_under(own, f"{side}/"))
+    return tuple(Parameter(path, texts[path]) for path in _listed(texts, own.get(side)))
+
+
+def _listed(names: Iterable[str], order: object) -> list[str]:
+    """Return the names in the order of the list `order`; names that the list lacks follow in the
+    order of `names`."""
+    known = dict.fromkeys(names)
+    first = [name for name in dict.fromkeys(values.text_list(order) or ()) if name in known]
+    return list(dict.fromkeys([*first, *known]))
+
+
+def _numbered(actions: list[Action]) -> list[Action]:
+    """Return the actions, with a new number for each whose full name is taken: of equal names the
+    first by (instance_id, key) keeps its number, the others get the lowest free one. Twins and
+    ghosts keep theirs."""
+    groups: dict[str, list[Action]] = defaultdict(list)
+    for action in actions:
+        groups[action.name].append(action)
+    numbers: dict[Key, int] = {}
+    for group in groups.values():
+        if len(group) > 1:
+            numbers.update(_shared_out(group))
+    return [
+        replace(action, instance_id=numbers[action.key]) if action.key in numbers else action
+        for action in actions
+    ]
+
+
+def _shared_out(group: list[Action]) -> dict[Key, int]:
+    """Return the new numbers for those actions of one name that need one."""
+    fixed = [action.instance_id for action in group if action.twin or action.missing]
+    taken: set[int] = set()
+    rest: list[Key] = []
+    free = [action for action in group if not (action.twin or action.missing)]
+    for action in sorted(free, key=lambda action: (action.instance_id, action.key)):
+        if action.instance_id in taken:
+            rest.append(action.key)
+        else:
+            taken.add(action.instance_id)
+    taken.update(fixed)
+    numbers: dict[Key, int] = {}
+    lowest = 0
+    for key in rest:
+        while lowest in taken:
+            lowest += 1
+        taken.add(lowest)
+        numbers[key] = lowest
+    return numbers
+
+
+def _ghosts_taken_up(actions: list[Action]) -> dict[Key, Key]:
+    """Return the ghosts whose full name a real action has by now, each with that action."""
+    real: dict[str, Key] = {}
+    for action in actions:
+        if not action.missing:
+            real.setdefault(action.full_name, action.key)
+    return {
+        action.key: real[action.full_name]
+        for action in actions
+        if action.missing and action.full_name in real
+    }
+
+
+# Relations
+
+
+def _relations(fields: Fields, positions: Fields) -> list[Relation]:
+    led = _waypoints(positions)
+    found: list[Relation] = []
+    for head, own in _owners(fields).items():
+        ends = ends_of(head)
+        relation = _relation(ends, own, led.get(head, {})) if ends is not None else None
+        if relation is not None:
+            found.append(relation)
+    return found
+
+
+def _waypoints(positions: Fields) -> dict[str, dict[str, JsonText]]:
+    """Return the waypoints of arrows as JSON texts: for each id of a relation a mapping from
+    response to text."""
+    found: dict[str, dict[str, JsonText]] = defaultdict(dict)
+    for line, text in _under(positions, "w/"):
+        relation, _, response = line.partition("|")
+        found[relation][response] = text
+    return found
+
+
+def _relation(ends: Ends, own: Fields, led: Mapping[str, JsonText]) -> Relation | None:
+    answers = {outcome: values.response(own.get(outcome)) for outcome in PRECONDITIONS}
+    said = {outcome: answer for outcome, answer in answers.items() if answer is not None}
+    if ends.parent == ENTRY:
+        if said.get("on_true") != "run":
+            return None
+        conditions = ENTRY_CONDITIONS
+    else:
+        if not said:
+            return None
+        conditions = Conditions(**said)
+    only = own.get("only")
+    return Relation(
+        parent=ends.parent,
+        child=ends.child,
+        listing=ends.listing,
+        conditions=conditions,
+        required=own.get("required") is not False,
+        remap=_remaps(own),
+        only="parents" if only == "parents" else "children" if only == "children" else None,
+        parent_order=values.number(own.get("po")) or 0.0,
+        child_order=values.number(own.get("co")) or 0.0,
+        parents_extra=_extra(own, "x/parents"),
+        children_extra=_extra(own, "x/children"),
+        waypoints=tuple((response, led[response]) for response in RESPONSES if response in led),
+    )
+
+
+def _remaps(own: Fields) -> tuple[Remap, ...]:
+    targets = {
+        key.removeprefix("remap/"): value
+        for key, value in own.items()
+        if key.startswith("remap/") and isinstance(value, str)
+    }
+    sources = _listed(sorted(targets, key=by_text), own.get("remap"))
+    return tuple(Remap(source, targets[source]) for source in sources)
+
+
+def _ends(relation: Relation) -> Ends:
+    return Ends(relation.parent, relation.child, relation.listing)
+
+
+def _redirected(relations: list[Relation], taken_up: Mapping[Key, Key]) -> list[Relation]:
+    """Return the arrows, with those of replaced ghosts led to the real action. If that pair has an
+    arrow already, the other gets the next listing."""
+    touching = [r for r in relations if r.parent in taken_up or r.child in taken_up]
+    arrows = [r for r in relations if r.parent not in taken_up and r.child not in taken_up]
+    taken = {relation_id(relation) for relation in arrows}
+    for relation in sorted(touching, key=_ends):
+        parent = taken_up.get(relation.parent, relation.parent)
+        child = taken_up.get(relation.child, relation.child)
+        listing = relation.listing
+        if relation_id(Ends(parent, child, listing)) in taken:
+            listing = 0
+            while relation_id(Ends(parent, child, listing)) in taken:
+                listing += 1
+        taken.add(relation_id(Ends(parent, child, listing)))
+        arrows.append(replace(relation, parent=parent, child=child, listing=listing))
+    return arrows
+
 
 __all__ = [
     "PLAIN",

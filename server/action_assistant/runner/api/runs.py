@@ -1,4 +1,4 @@
-"""The routes of runs: starts, commands, queries, and the live socket."""
+"""The routes of runs: starts, commands, queries, approvals, expected courses, and the live socket."""
 
 from collections.abc import AsyncIterator
 from datetime import UTC, datetime
@@ -6,7 +6,7 @@ from typing import Annotated, Any, Final, get_args
 
 import anyio
 import msgspec
-from litestar import Request, Response, WebSocket, get, post, websocket
+from litestar import Request, Response, WebSocket, delete, get, post, websocket
 from litestar.exceptions import HTTPException
 from litestar.openapi import ResponseSpec
 from litestar.params import Parameter
@@ -14,8 +14,15 @@ from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound, TooMany
-from action_assistant.runner.api import approvals, courses, robots
-from action_assistant.runner.api import review as review
+from action_assistant.runner.analysis.course_checks import (
+    ArrowProposal,
+    CheckedCourses,
+    CheckRequest,
+    ProposalRequest,
+    propose,
+)
+from action_assistant.runner.analysis.expected_runs import Expect, Expectation
+from action_assistant.runner.api import review, robots
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of, start_of
 from action_assistant.runner.api.live import (
     PageMessage,
@@ -31,6 +38,7 @@ from action_assistant.runner.links.port import SIMULATOR
 from action_assistant.runner.review import listing
 from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.runs import queries, views
+from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.start.admission import (
     GoOnRequest,
@@ -39,6 +47,7 @@ from action_assistant.runner.start.admission import (
     decoded,
     read_request,
 )
+from action_assistant.runner.start.approvals import ApprovalGiven, ApprovalRequest
 from action_assistant.umrf.semantics import Script
 from action_assistant.web.auth.access import Needs, person_of, refuse, require
 from action_assistant.web.server.openapi import answer, exchanges, reads
@@ -64,8 +73,9 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         *_commands(services),
         *_queries(services),
         *robots.routes(services),
-        *approvals.routes(services),
-        *courses.routes(services),
+        *_approvals(services),
+        *_expected_courses(services),
+        *_course_checks(services),
         *review.routes(services),
         _live(services),
     ]
@@ -381,3 +391,125 @@ async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator
             await services.control.change(run, revision)
         if waited.cancelled_caught:
             yield b": alive\n\n"
+
+
+class Approval(msgspec.Struct, frozen=True, kw_only=True):
+    """A person's yes to exactly the graph with this digest."""
+
+    digest: str
+    author: Author
+    at: datetime
+    graph: str | None
+    version: str
+    note: str
+
+
+def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/approvals",
+        summary="The approvals of a graph, by its digest",
+        operation_id="listApprovals",
+    )
+    async def approvals(
+        digest: Annotated[str, Parameter(min_length=64, max_length=64)],
+    ) -> list[Approval]:
+        return [_approval(each) for each in await services.control.approvals.given_for(digest)]
+
+    @post(
+        "/api/approvals",
+        summary="Say yes to exactly one graph, so that somebody else may start it on robots that "
+        "demand a second person",
+        operation_id="approve",
+        guards=[Needs("operate")],
+    )
+    async def approve(data: ApprovalRequest, request: _Asking) -> Approval:
+        return _approval(await services.control.approvals.give(data, author_of(request)))
+
+    return [approvals, approve]
+
+
+def _approval(given: ApprovalGiven) -> Approval:
+    return Approval(
+        digest=given.digest,
+        author=given.author,
+        at=views.time(given.at),
+        graph=given.graph,
+        version=given.version,
+        note=given.note,
+    )
+
+
+def _expected_courses(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @get(
+        "/api/expectations",
+        summary="Courses that graphs are expected to take",
+        operation_id="listExpectations",
+    )
+    async def listed() -> Response[list[Expectation]]:
+        return json_of(
+            await services.worker_queries.text(StoredRuns.expectations), list[Expectation]
+        )
+
+    @post(
+        "/api/expectations",
+        summary="Save the course of a run, or of a dry-run, as an expected course",
+        operation_id="addExpectation",
+        opt=reads(Expect) | COUNTED,
+        guards=[Needs("edit")],
+        request_max_body_size=GRAPH_BODY,
+    )
+    async def expect(request: _Asking) -> Expectation:
+        async with body_of(request, services.body_limit) as body:
+            wanted = decoded(body, Expect)
+            return await services.review_service.expect(wanted, author_of(request))
+
+    @delete(
+        "/api/expectations/{name:str}",
+        summary="Remove an expected course",
+        operation_id="retireExpectation",
+        guards=[Needs("edit")],
+    )
+    async def retire(name: str, request: _Asking) -> None:
+        await services.review_service.retire(name, author_of(request))
+
+    return [listed, expect, retire]
+
+
+def _course_checks(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/expectations/check",
+        operation_id="checkExpectations",
+        status_code=200,
+        summary="The expected courses of a graph against it as it is now, and what they cover",
+        opt=reads(CheckRequest) | COUNTED,
+        guards=[Needs("see")],
+        request_max_body_size=GRAPH_BODY,
+    )
+    async def check(request: _Asking) -> Response[CheckedCourses]:
+        async with body_of(request, services.body_limit) as body:
+            check_request = decoded(body, CheckRequest)
+            text = await services.worker_queries.text(
+                StoredRuns.checked_courses,
+                check_request.graph,
+                bytes(check_request.umrf),
+                check_request.subgraphs,
+            )
+        return json_of(text, CheckedCourses)
+
+    @post(
+        "/api/expectations/proposal",
+        operation_id="proposeCourse",
+        status_code=200,
+        summary="What actions would have to do for an arrow to be taken, if anything makes it so",
+        opt=reads(ProposalRequest) | COUNTED,
+        guards=[Needs("see")],
+        request_max_body_size=GRAPH_BODY,
+    )
+    async def proposal(request: _Asking) -> ArrowProposal:
+        async with body_of(request, services.body_limit) as body:
+            wanted = decoded(body, ProposalRequest)
+            return await services.run_in_worker(
+                propose, bytes(wanted.umrf), wanted.arrow, wanted.subgraphs
+            )
+
+    return [check, proposal]
