@@ -1,11 +1,12 @@
-"""Cuts a graph into pieces of one action each, and reads the outcome of a piece from its states.
+"""Cuts a graph into pieces of one action each, and reads the outcome of a piece from its states. An
+action that stands for a graph is such a piece, too (`led_subgraphs`).
 
 A conducted run sends each robot one piece at a time (docs/umrf-and-the-engine.md 5). The exit of a
 piece runs only for `on_true`, so the states of the graph and of its action tell the outcome, which
 an engine otherwise never reports. Pure.
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Final
 
 import msgspec
@@ -44,17 +45,19 @@ class Obstacle(msgspec.Struct, frozen=True, kw_only=True):
     aid: Key | None = None
 
 
-def piece_name(graph: str, action: str) -> str:
-    """Return the name under which a robot runs the piece of an action. `action`: its full name. A
-    sub-graph of the whole graph never has this name."""
-    return f"{graph}--{action}"
+def piece_name(graph: str, action: str, visit: str = "") -> str:
+    """Return the name under which a robot runs the piece of an action. `action`: its full name;
+    `visit`: tells the visits apart where each has a name of its own. A sub-graph of the whole graph
+    never has this name."""
+    return f"{graph}--{action}--v{visit}" if visit else f"{graph}--{action}"
 
 
-def piece_of(graph: Graph, action: Action) -> Graph:
-    """Return the graph that has only this action of `graph`, with the values that stand in it."""
+def piece_of(graph: Graph, action: Action, visit: str = "") -> Graph:
+    """Return the graph that has only this action of `graph`, with the values that stand in it.
+    `visit`: as in `piece_name`."""
     alone = msgspec.structs.replace(action, actor="", position=None)
     return Graph(
-        name=piece_name(graph.name, action.full_name),
+        name=piece_name(graph.name, action.full_name, visit),
         actions=(alone,),
         relations=(
             Relation(parent=ENTRY, child=action.key, conditions=ENTRY_CONDITIONS),
@@ -69,31 +72,14 @@ def outcome_of(graph_state: str | None, action_state: str) -> Precondition | Non
     return _OUTCOMES.get((graph_state or "", action_state))
 
 
-def performers(graph: Graph) -> dict[str, tuple[Action, ...]]:
-    """Return the actions of a graph by their actor, "" for those without one."""
-    found: dict[str, list[Action]] = {}
-    for action in graph.actions:
-        if not action.missing:
-            found.setdefault(action.actor, []).append(action)
-    return {actor: tuple(actions) for actor, actions in sorted(found.items())}
-
-
-def obstacles(graph: Graph, subgraphs: Collection[str] = ()) -> tuple[Obstacle, ...]:
-    """Return the reasons why a graph cannot run as pieces; empty if it can. `subgraphs`: the names of
-    the graphs inside."""
+def obstacles(graph: Graph) -> tuple[Obstacle, ...]:
+    """Return the reasons why a graph cannot run as pieces, except those of its sub-graphs
+    (`subgraph_obstacles`); empty if it can."""
     return (
-        *_subgraphs(graph, subgraphs),
         *_values_across(graph),
         *_spontaneous(graph),
         *_pauses(graph),
     )
-
-
-def _subgraphs(graph: Graph, names: Collection[str]) -> Iterator[Obstacle]:
-    for action in graph.actions:
-        if action.name in names and not action.missing:
-            text = f"{action.full_name} is a sub-graph: flatten it, so that its steps can be led."
-            yield Obstacle(code="subgraph-across", text=text, aid=action.key)
 
 
 def _values_across(graph: Graph) -> Iterator[Obstacle]:

@@ -35,10 +35,12 @@ DEPTH = 4
 class EveryCall:
     """Carries out all actions, none of which ends by itself."""
 
+    takes_graphs = False
+
     def __init__(self) -> None:
         self.going: dict[int, Call] = {}
 
-    def performs(self, action: Action) -> bool:
+    def performs(self, action: Action, *, inside: bool) -> bool:
         return True
 
     def begin(self, call: Call) -> None:

@@ -20,12 +20,14 @@ from runner.harness import carousel, sequence, two_ends
 class Performing:
     """Writes down what it is told, and does nothing."""
 
+    takes_graphs = False
+
     def __init__(self, *names: str) -> None:
         self.names = names
         self.told: list[tuple[str, int]] = []
         self.calls: list[Call] = []
 
-    def performs(self, action: Action) -> bool:
+    def performs(self, action: Action, *, inside: bool) -> bool:
         return action.name in self.names
 
     def begin(self, call: Call) -> None:

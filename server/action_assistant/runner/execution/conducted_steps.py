@@ -10,6 +10,7 @@ import msgspec
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.led_calls import LedCourse
+from action_assistant.runner.links.observations import ACTIVE
 from action_assistant.runner.links.port import GraphOutline, Order
 from action_assistant.runner.runs.events import (
     Author,
@@ -22,16 +23,20 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
+from action_assistant.runner.start.admission import PieceText
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.laps import Laps
+from action_assistant.umrf.led_subgraphs import StatesInside, outcome_of_subgraph
 from action_assistant.umrf.model import Precondition
-from action_assistant.umrf.pieces import piece_name
+from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.semantics import Call
 
 #: Facts of the engine that plays the whole graph: only a proof ends what a robot does.
 CONDUCTED_FACTS: Final = msgspec.structs.replace(
     SIMULATED, synchronises=True, stop_timeout_ms=10**12
 )
+#: Bits of the number of a call in which the visits of an action inside of its sub-graph are counted.
+_VISIT_BITS: Final = 20
 #: Who stops an action in the name of the graph: an arrow of it, or its end.
 GRAPH: Final = Author("graph", "the graph itself", "program")
 #: Who stops a conducted run whose robot is lost, as the starter has chosen.
@@ -80,6 +85,7 @@ class Step:
         self.piece: OpenRun | None = None
         self.run: Run | None = None  # of its piece, as it is now
         self.shown: ActionRun | None = None  # as it was passed on last
+        self.shown_inside: dict[str, ActionRun] = {}  # the actions inside, as they were passed on
         self.is_stopped = False  # the graph or a person wants it to end
         self.has_not_left = False  # its piece was refused before it left, or by its robot
         self.lacks_output = False
@@ -114,6 +120,7 @@ class Step:
     def renew(self) -> None:
         """Forget a piece that has not left, so that another one can be sent."""
         self.piece, self.run, self.shown, self.has_not_left = None, None, None, False
+        self.shown_inside = {}
         self.over = anyio.Event()
 
 
@@ -197,6 +204,48 @@ def rest_of(piece: Run, at: int, *, asks: bool = False) -> PieceRest:
     return say(state="proven", since=piece.proof_at or since, why="")
 
 
+def seen_inside(step: Step, whole: str, at: int) -> list[PieceSeen]:
+    """Return the events that show what has changed of the actions inside of a step's sub-graph, and
+    note that they were passed on. `whole`: the name of the graph of the conducted run, under which
+    they have the names that they would have in a run on one robot.
+
+    An action inside may be visited several times by one call; the number of its visit stands in the
+    low bits of the number of the call.
+    """
+    run = step.run
+    if run is None:
+        return []
+    events: list[PieceSeen] = []
+    for name, action in run.actions.items():
+        inside = name.removeprefix(f"{run.graph_name}__")
+        if inside == name or "/" not in name or step.shown_inside.get(name) is action:
+            continue
+        step.shown_inside[name] = action
+        unseen = run.end is not None and action.state in ACTIVE
+        events.append(
+            PieceSeen(
+                at=at,
+                call=(step.call.number << _VISIT_BITS) + action.older + len(action.visits),
+                node=f"{whole}__{inside}",
+                state="ERROR" if unseen else action.state,
+                visit=action.visits[-1] if action.visits else None,
+                messages=tuple(each.text for each in action.messages),
+            )
+        )
+    return events
+
+
+def outcome_shown(run: Run, text: PieceText) -> Precondition | None:
+    """Return the outcome that the last states of a piece tell; None if they tell none. `text`: what
+    was sent."""
+    states = run.graph_state, run.actions[text.action.full_name].state
+    if not text.inside:
+        return outcome_of(*states)
+    inside = {name: each.state for name, each in run.actions.items() if "/" in name}
+    seen = StatesInside(run.parts, inside)
+    return outcome_of_subgraph(run.graph_name, text.action, states, seen, text.inside)
+
+
 def order_of(first: Requested) -> Order:
     """Return the order that starts the whole graph of a conducted run."""
     graph = GraphOutline(first.graph_name, first.actions)
@@ -205,11 +254,12 @@ def order_of(first: Requested) -> Order:
 
 
 def piece_to_send(
-    first: Requested, step: Step, piece: str, umrf: str, at: int
+    first: Requested, step: Step, piece: str, text: PieceText, at: int
 ) -> tuple[Requested, Order]:
     """Return the event that stores the piece of a step, and the order that its robot is sent.
-    `piece`: its id; `umrf`: its text."""
-    name, actions = piece_name(first.graph_name, step.node), {step.node: first.actions[step.node]}
+    `piece`: its id; `text`: what it sends."""
+    name, umrf = text.name(first.graph_name, piece), text.for_run(piece)
+    actions = {step.node: first.actions[step.node]}
     requested = Requested(
         at=at,
         run=piece,
@@ -225,11 +275,15 @@ def piece_to_send(
         actions=actions,
         umrf=umrf,
         laps=Laps(once=(step.node,)),
-        inner_laps=first.inner_laps,
+        inner_laps={
+            name: first.inner_laps[name] for name in text.inside if name in first.inner_laps
+        },
         piece=PieceOf(run=first.run, call=step.call.number, node=step.node),
     )
     graph = GraphOutline(name, actions)
-    return requested, Order(run=piece, graph=graph, umrf=umrf, targets=(step.engine,))
+    inside = tuple(each.umrf for each in first.subgraphs if each.name in text.inside)
+    order = Order(run=piece, graph=graph, umrf=umrf, targets=(step.engine,), inside=inside)
+    return requested, order
 
 
 class RestNews:

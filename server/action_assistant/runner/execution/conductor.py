@@ -34,7 +34,9 @@ from action_assistant.runner.execution.conducted_steps import (
     Step,
     Word,
     order_of,
+    outcome_shown,
     piece_to_send,
+    seen_inside,
     seen_of,
 )
 from action_assistant.runner.execution.led_look import Cleared, LedLook
@@ -83,7 +85,6 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import PieceText
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.umrf.model import Precondition
-from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.semantics import Returned
 
 log: Final = logging.getLogger(__name__)
@@ -440,8 +441,7 @@ class Conductor:
         with anyio.CancelScope(shield=True):
             self._pieces += 1
             piece, at = f"{self._first.run}.{self._pieces}", self._clock_us()
-            text = self._texts[step.node].for_run(piece)
-            requested, order = piece_to_send(self._first, step, piece, text, at)
+            requested, order = piece_to_send(self._first, step, piece, self._texts[step.node], at)
             try:
                 run = await self._claims.store(requested)
             except Refused as refused:
@@ -511,6 +511,8 @@ class Conductor:
             self._states[step.node] = state
             self._run.tell(seen_of(step, action, state, self._clock_us()))
         self._rests.show(run)
+        for event in seen_inside(step, self._first.graph_name, self._clock_us()):
+            self._run.tell(event)
         if run.end is None:
             self._find_trouble(step, run)
             self._find_lacking_output(step, run)
@@ -550,11 +552,10 @@ class Conductor:
             step.lacks_output = False
 
     def _outcome(self, step: Step) -> Precondition | None:
-        """Return the outcome of a piece that has ended; None if its states tell none, after that was
-        said."""
+        """Return the outcome of a piece that has ended; if its states tell none, say so: None."""
         assert step.run is not None
         run = step.run
-        outcome = outcome_of(run.graph_state, run.actions[step.node].state)
+        outcome = outcome_shown(run, self._texts[step.node])
         if step.is_stopped:
             return outcome or "on_stopped"
         where = f"{step.node} on {step.engine}"

@@ -102,7 +102,7 @@ class Conductors:
         on; what the robots still do is followed. Raise Unavailable if the journal cannot be read."""
         first = await self._history.requested(run.id)
         left = await _left_open(self._history, first, run)
-        texts = await self._runtime.run_in_worker(piece_texts, first.umrf)
+        texts = await self._runtime.run_in_worker(piece_texts, first.umrf, first.subgraphs)
         opened = self.open(first, run, texts, self._engine_for(first), seq=seq, left=left)
         if run.desired != "stopped":
             self._open[run.id].hold("The runner was restarted while it led this run.")

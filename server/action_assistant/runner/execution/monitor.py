@@ -413,7 +413,7 @@ class Monitor:
     def _is_told_by_shape(self, run: Run, shown: Sequence[Snapshot]) -> bool:
         """Return whether the states of a piece tell its outcome. It has one action, which nothing
         can begin again, so one answer is enough; after a Stop its usual proof is asked for."""
-        if run.piece is None or run.desired == "stopped" or len(shown) > 1:
+        if run.piece is None or run.desired == "stopped" or len(shown) > 1 or run.inner:
             return False
         return outcome_of(shown[0].state, shown[0].nodes.get(run.piece.node, "")) is not None
 

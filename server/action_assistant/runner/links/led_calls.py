@@ -29,6 +29,7 @@ class LedCalls:
     """Collects the calls of one engine until its link reports them. `led`: the full names of the
     actions that are carried out elsewhere; the script says how the others behave."""
 
+    takes_graphs = True
     is_killing = False
     has_returned = False
 
@@ -36,9 +37,10 @@ class LedCalls:
         self._led = frozenset(led)
         self._news: list[CallBegan | CallStopped] = []
 
-    def performs(self, action: Action) -> bool:
-        """Return whether this action is carried out elsewhere."""
-        return action.full_name in self._led
+    def performs(self, action: Action, *, inside: bool) -> bool:
+        """Return whether this action is carried out elsewhere. Those inside of a sub-graph are not:
+        either the engine plays the sub-graph, or it is carried out elsewhere as a whole."""
+        return not inside and action.full_name in self._led
 
     def begin(self, call: Call) -> None:
         """Note that a call has begun."""

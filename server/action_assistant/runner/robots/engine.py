@@ -362,11 +362,13 @@ def foreign_graphs(answer: Answer, own_runs: Collection[str]) -> list[str]:
     sub-graph counts as its top graph.
     """
     held = {each.graph for each in answer.graphs}
+    own = {each.graph for each in answer.graphs if each.run in own_runs}
     tops = {
         each.graph
         for each in answer.graphs
         if (each.active or (each.state == "RUNNING" and not _within(each.graph, held)))
         and (each.run is None or each.run not in own_runs)
+        and not (each.run is None and _within(each.graph, own))
     }
     return sorted(name for name in tops if not _within(name, tops))
 

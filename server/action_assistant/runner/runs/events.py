@@ -320,7 +320,8 @@ class PieceBegan(msgspec.Struct, frozen=True, kw_only=True):
 class PieceSeen(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The robot that plays an action of a conducted run shows it in another state. `visit`: its
     visit with the bounds that the observations of the robot allow; None before it was seen running
-    or over. `messages`: its newest messages."""
+    or over. `messages`: its newest messages. `node`: its full name; of an action inside of a
+    sub-graph, its name in a run on one robot, and `call` is another number for each of its visits."""
 
     kind: ClassVar[str] = "run.piece_seen.v1"
 

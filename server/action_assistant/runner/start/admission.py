@@ -16,6 +16,7 @@ from action_assistant.runner.runs.sent_graphs import (
     Inner,
     SentGraph,
     SentSubgraph,
+    graphs_in,
     read_inside,
     read_sent,
     tree_of,
@@ -27,8 +28,15 @@ from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import pointer
 from action_assistant.umrf.laps import Laps, laps
+from action_assistant.umrf.led_subgraphs import (
+    Inside,
+    graphs_within,
+    performers,
+    players,
+    subgraph_obstacles,
+)
 from action_assistant.umrf.model import Action, Graph, Problem
-from action_assistant.umrf.pieces import obstacles, performers, piece_name, piece_of
+from action_assistant.umrf.pieces import obstacles, piece_name, piece_of
 from action_assistant.umrf.run_size import RunSize, excess
 from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 
@@ -139,7 +147,7 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     """An admitted start without its graph, which only workers read: the name of the graph, the aid
     of each action by full name, and the text that will be sent, with the identity of the run in it.
     `problems`: at most as many as anybody is shown. `inner`: the names of actions inside of
-    `subgraphs`."""
+    `subgraphs`. `is_led`: these are the actions of one robot, which gets them one by one."""
 
     run: str
     name: str
@@ -154,6 +162,7 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     subgraphs: tuple[RunSubgraph, ...] = ()
     inner: tuple[str, ...] = ()
     tree_digest: str
+    is_led: bool = False
 
 
 def read_request(body: bytes) -> StartRequest:
@@ -297,13 +306,21 @@ def _placed(text: str) -> tuple[str, dict[str, object] | None]:
 
 
 class PieceText(msgspec.Struct, frozen=True):
-    """The text of a piece, in parts between which the id of its run stands."""
+    """The text of a piece, in parts between which the id of its run stands. `action`: the one that
+    it sends; `inside`: the graphs inside of it, by name, empty if it stands for none."""
 
     parts: tuple[str, ...]
+    action: Action
+    inside: dict[str, Graph] = {}
 
     def for_run(self, run: str) -> str:
         """Return the text with the id of this run."""
         return run.join(self.parts)
+
+    def name(self, graph: str, run: str) -> str:
+        """Return the name of the graph in the text for this run. `graph`: the name of the whole
+        graph."""
+        return piece_name(graph, self.action.full_name, run if self.inside else "")
 
 
 class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
@@ -328,44 +345,48 @@ def prepared_pieces(
     `admit` raises, BadInput for an actor without a robot or a robot without an actor, Conflict for a
     graph that cannot run as pieces."""
     whole = prepared(request, facts, run, approved=approved)
-    graph = codec.read(whole.umrf).graph
-    actors = performers(graph)
-    _check_robots(request.robots, actors)
-    hindering = obstacles(graph, {each.name for each in whole.subgraphs})
+    graph, inside = codec.read(whole.umrf).graph, graphs_in(whole.subgraphs)
+    _check_robots(request.robots, performers(graph, inside))
+    hindering = (*subgraph_obstacles(graph, inside, request.robots), *obstacles(graph))
     if hindering:
         more = f" (and {len(hindering) - 1} more)" if len(hindering) > 1 else ""
         raise Conflict(
             f"{hindering[0].text}{more}",
             where={"path": "/umrf", "obstacles": msgspec.to_builtins(hindering[:_MOST_SHOWN])},
         )
-    players = {
-        action.full_name: request.robots[actor]
-        for actor, actions in actors.items()
-        for action in actions
-    }
+    played = players(graph, inside, request.robots)
     by_robot: dict[str, list[Action]] = {}
-    for actor, actions in actors.items():
-        if request.robots[actor] != SIMULATOR:
-            by_robot.setdefault(request.robots[actor], []).extend(actions)
+    for action in graph.actions:
+        robot = played.get(action.full_name, SIMULATOR)
+        if robot != SIMULATOR:
+            by_robot.setdefault(robot, []).append(action)
     return PreparedPieces(
         whole=whole,
-        players={name: robot for name, robot in players.items() if robot != SIMULATOR},
-        texts=_texts_of(graph, codec.Stamp(whole.graph_id, request.version, run)),
+        players={name: robot for name, robot in played.items() if robot != SIMULATOR},
+        texts=_texts_of(graph, inside, codec.Stamp(whole.graph_id, request.version, run)),
         by_robot={
-            robot: msgspec.structs.replace(
-                whole,
-                name=piece_name(graph.name, robot),
-                umrf=codec.write(
-                    Graph(
-                        name=piece_name(graph.name, robot),
-                        actions=tuple(msgspec.structs.replace(each, actor="") for each in actions),
-                    )
-                ),
-                actions={each.full_name: each.key for each in actions},
-            )
+            robot: _part_of(whole, graph.name, robot, actions, inside)
             for robot, actions in by_robot.items()
         },
-        problems=tuple(_led_problems(graph, request.robots)),
+        problems=tuple(_led_problems(graph, played)),
+    )
+
+
+def _part_of(
+    whole: Prepared, graph: str, robot: str, actions: Sequence[Action], inside: Inside
+) -> Prepared:
+    """Return all actions of a robot as one graph without arrows, with the graphs inside of them."""
+    name = piece_name(graph, robot)
+    alone = tuple(msgspec.structs.replace(each, actor="") for each in actions)
+    within = frozenset[str]().union(*(graphs_within(each, inside) for each in actions))
+    return msgspec.structs.replace(
+        whole,
+        name=name,
+        umrf=codec.write(Graph(name=name, actions=alone)),
+        actions={each.full_name: each.key for each in actions},
+        inner_laps={name: laps for name, laps in whole.inner_laps.items() if name in within},
+        subgraphs=tuple(each for each in whole.subgraphs if each.name in within),
+        is_led=True,
     )
 
 
@@ -381,26 +402,29 @@ def _check_robots(robots: Mapping[str, str], actors: Collection[str]) -> None:
             raise BadInput(f"The graph has {who}.", where={"path": pointer("robots", actor)})
 
 
-def _led_problems(graph: Graph, robots: Mapping[str, str]) -> list[Problem]:
-    """Return what leading a graph means on these robots. Two actors on one robot count as one."""
+def _led_problems(graph: Graph, played: Mapping[str, str]) -> list[Problem]:
+    """Return what leading a graph means. `played`: the robot of each action by full name; two actors
+    on one robot count as one, and so do the actions inside of a sub-graph."""
     placed = tuple(
-        msgspec.structs.replace(each, actor=robots.get(each.actor, each.actor))
+        msgspec.structs.replace(each, actor=played.get(each.full_name, each.actor))
         for each in graph.actions
     )
     return led_problems(msgspec.structs.replace(graph, actions=placed), PINNED)
 
 
-def piece_texts(umrf: str) -> dict[str, PieceText]:
-    """Return the pieces of a graph as it was sent, by full name of their action. For workers."""
-    return _texts_of(codec.read(umrf).graph, codec.stamp_of(umrf))
+def piece_texts(umrf: str, subgraphs: Sequence[RunSubgraph]) -> dict[str, PieceText]:
+    """Return the pieces of a graph as it was sent, by full name of their action. `subgraphs`: the
+    graphs inside, as they were sent along. For workers."""
+    return _texts_of(codec.read(umrf).graph, graphs_in(subgraphs), codec.stamp_of(umrf))
 
 
-def _texts_of(graph: Graph, stamp: codec.Stamp) -> dict[str, PieceText]:
+def _texts_of(graph: Graph, inside: Inside, stamp: codec.Stamp) -> dict[str, PieceText]:
     texts: dict[str, PieceText] = {}
     for action in graph.actions:
-        if not action.missing:
-            text = codec.write(piece_of(graph, action), stamp)
-            texts[action.full_name] = PieceText(
-                tuple(text.split(stamp.run)) if stamp.run else (text,)
-            )
+        if action.missing:
+            continue
+        own = {name: inside[name] for name in sorted(graphs_within(action, inside))}
+        text = codec.write(piece_of(graph, action, (stamp.run or "") if own else ""), stamp)
+        parts = tuple(text.split(stamp.run)) if stamp.run else (text,)
+        texts[action.full_name] = PieceText(parts, action, own)
     return texts

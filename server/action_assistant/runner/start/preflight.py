@@ -267,7 +267,7 @@ def robot_items(view: EngineView, graph: Graph, inside: Collection[Graph] = ()) 
         _quiet(view, graph),
         _rest(view),
         _others(view),
-        _actors(view, (graph, *inside)),
+        _actors(view, graph, inside),
     )
 
 
@@ -475,17 +475,29 @@ def _others(view: EngineView) -> Item:
     return Item(code="others", verdict="blocked", text=text, codes=("others",), overridable=True)
 
 
-def _actors(view: EngineView, graphs: Collection[Graph]) -> Item:
+def _actors(view: EngineView, graph: Graph, inside: Collection[Graph]) -> Item:
     """Check that all actions belong to this robot, or that its engine synchronises with others."""
-    named = {each.actor for graph in graphs for each in graph.actions if not each.missing} - {""}
-    foreign = sorted(named - {view.name, view.standing.actor})
+    own = {"", view.name, view.standing.actor}
+    named = {each: _named_in(each) - own for each in (graph, *inside)}
+    foreign = sorted(frozenset[str]().union(*named.values()))
     if not foreign or view.facts.synchronises:
         return Item(code="actors", verdict="passed", text=f"The actions are {view.name}'s to do.")
+    where = sorted(each.name for each, actors in named.items() if actors)
+    is_inside = graph.name not in where
     text = (
-        f"Actions belong to {', '.join(foreign)}, not to {view.name}, and its engine cannot "
-        "synchronise with others: it refuses the graph. The runner can lead several robots through it."
+        f"Actions {f'inside of {_listed(where)} ' if is_inside else ''}belong to {', '.join(foreign)}, "
+        f"not to {view.name}, and its engine cannot synchronise with others: it refuses the graph. "
+    )
+    text += (
+        "Name no actor inside, or flatten the graph."
+        if is_inside
+        else "The runner can lead several robots through it."
     )
     return Item(code="actors", verdict="blocked", text=text, codes=("actors",), overridable=True)
+
+
+def _named_in(graph: Graph) -> frozenset[str]:
+    return frozenset(each.actor for each in graph.actions if not each.missing)
 
 
 def subgraph_items(view: EngineView, pinned: Mapping[str, Graph]) -> tuple[Item, ...]:
@@ -563,7 +575,27 @@ def engine_items(view: EngineView, ready: Prepared, prefixes: Sequence[Path]) ->
         *robot_items(view, graph, pinned.values()),
         *_library_items(view, graph, prefixes),
         *(_with_folder(each, view, pinned) for each in subgraph_items(view, pinned)),
+        *(_graphs_in_places_of_actions(view, graph, pinned) if ready.is_led else ()),
     )
+
+
+def _graphs_in_places_of_actions(
+    view: EngineView, graph: Graph, pinned: Mapping[str, Graph]
+) -> tuple[Item, ...]:
+    """Return the item about actions that are graphs in the index of the engine and none in this
+    version; empty without any. Their pieces would have the same name at each visit, and an engine
+    aborts when it starts a name with a sub-graph again (docs/decisions/026-names-that-are-held.md)."""
+    names = {each.name for each in graph.actions if not each.missing}
+    known = view.index.graphs.keys() - view.index.actions.keys() - pinned.keys()
+    taken = sorted(names & known)
+    if not taken:
+        return ()
+    text = (
+        f"{view.name} has indexed {_listed(taken)} as a graph, and this version has no graph of that "
+        "name inside: the robot would run what nobody has seen here. Import that graph, or rename "
+        "the action."
+    )
+    return (Item(code="subgraphs", verdict="blocked", text=text),)
 
 
 def _library_items(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[Item, ...]:

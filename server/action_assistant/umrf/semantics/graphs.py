@@ -80,7 +80,7 @@ class Graphs(Core):
         running = Running(name, graph, above, home)
         behaviours = {
             a.key: (PERFORMED,)
-            if self._performed.performs(a)
+            if self._performed.performs(a, inside=above is not None)
             else self.script.calls_of(name, graph.name, a.full_name, a.name)
             for a in graph.actions
         }
@@ -92,6 +92,8 @@ class Graphs(Core):
             if known is not None:
                 for slot in node.inputs.values():
                     slot.required = slot.name not in known.optional
+                continue
+            if node.call is PERFORMED and self._performed.takes_graphs:
                 continue
             if node.name not in taken:
                 node.subgraph = indexed.fitting(node.name, node.inputs.keys(), node.outputs.keys())

@@ -47,10 +47,14 @@ class Returned(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Performer(Protocol):
-    """Carries out calls beside the engine. No method waits."""
+    """Carries out calls beside the engine. No method waits. `takes_graphs`: it carries out also
+    actions that stand for graphs, each as one call."""
 
-    def performs(self, action: Action) -> bool:
-        """Return whether this performer carries out this action, rather than the script."""
+    takes_graphs: bool
+
+    def performs(self, action: Action, *, inside: bool) -> bool:
+        """Return whether this performer carries out this action, rather than the script. `inside`:
+        it is an action of a sub-graph."""
 
     def begin(self, call: Call) -> None:
         """Begin to carry out a call."""
@@ -81,9 +85,14 @@ class PerformedCalls:
         self._going: dict[int, tuple[Running, Node, Execution]] = {}
         self._newest = 0
 
-    def performs(self, action: Action) -> bool:
-        """Return whether this action is performed."""
-        return self._performer is not None and self._performer.performs(action)
+    def performs(self, action: Action, *, inside: bool) -> bool:
+        """Return whether this action is performed. `inside`: it is an action of a sub-graph."""
+        return self._performer is not None and self._performer.performs(action, inside=inside)
+
+    @property
+    def takes_graphs(self) -> bool:
+        """True if an action that stands for a graph is performed as one call."""
+        return self._performer is not None and self._performer.takes_graphs
 
     def begin(self, graph: Running, node: Node) -> None:
         """Begin a call of the action's code with its current inputs."""

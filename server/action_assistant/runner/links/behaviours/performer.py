@@ -37,6 +37,8 @@ def bound_address_space() -> None:
 class BehaviourPerformer:
     """The calls of one engine. `wake` is called on other threads when a call has ended."""
 
+    takes_graphs = False
+
     def __init__(self, folder: BehaviourFolder, wake: Callable[[], None] = lambda: None) -> None:
         self.wake = wake
         self._folder = folder
@@ -51,7 +53,7 @@ class BehaviourPerformer:
         with self._lock:
             return bool(self._given_up)
 
-    def performs(self, action: Action) -> bool:
+    def performs(self, action: Action, *, inside: bool) -> bool:
         """Return whether a file for actions of this name exists, usable or not."""
         return self._folder.has(action.name)
 

@@ -1,0 +1,244 @@
+"""Sub-graphs in a led run: one robot gets its own as one piece, several robots' are refused."""
+
+from typing import Any
+
+import anyio
+import msgspec
+import pytest
+
+from action_assistant.errors import Conflict
+from action_assistant.runner.runs.sent_graphs import SentSubgraph
+from action_assistant.runner.runs.views import time
+from action_assistant.runner.start.admission import GoOnRequest, WordRequest
+from action_assistant.umrf.digest import digest, tree_digest
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.model import Conditions, Graph, Relation
+from runner.execution.test_conductor import Lab, led, refused, shared
+from runner.harness import ANN, BEN, ended, sequence, until, virtual
+
+ALWAYS = Conditions(on_true="run", on_false="run", on_error="run")
+
+
+def named(graph: Graph, *names: str) -> Graph:
+    """The graph with its actions called like this, from the first on."""
+    renamed = tuple(
+        msgspec.structs.replace(each, name=name, instance_id=0)
+        for each, name in zip(graph.actions, names, strict=False)
+    )
+    return msgspec.structs.replace(graph, actions=(*renamed, *graph.actions[len(renamed) :]))
+
+
+def ending(graph: Graph, conditions: Conditions = ALWAYS) -> Graph:
+    """The graph with all its arrows to the exit like this."""
+    relations = tuple(
+        msgspec.structs.replace(each, conditions=conditions) if each.child == "exit" else each
+        for each in graph.relations
+    )
+    return msgspec.structs.replace(graph, relations=relations)
+
+
+def going_on(graph: Graph) -> Graph:
+    """The graph whose actions follow each other whatever their outcome is."""
+    relations = tuple(
+        each if each.parent == "entry" else msgspec.structs.replace(each, conditions=ALWAYS)
+        for each in graph.relations
+    )
+    return msgspec.structs.replace(graph, relations=relations)
+
+
+def sent(graph: Graph, *inside: Graph, **more: Any) -> Any:
+    """A start of a conducted run of a graph with these graphs inside."""
+    subgraphs = tuple(
+        SentSubgraph(
+            name=each.name, digest=digest(each), umrf=msgspec.Raw(codec.write(each).encode())
+        )
+        for each in inside
+    )
+    tree = tree_digest(digest(graph), ((each.name, each.digest) for each in subgraphs))
+    return led(graph, subgraphs=subgraphs, tree_digest=tree, **more)
+
+
+#: Scout picks something up, which is a graph of two steps, and Carrier follows.
+TASK = shared(named(sequence("task", 2), "Pick"), "Scout", "Carrier")
+PICK = sequence("Pick", 2)
+
+
+@virtual
+async def test_a_sub_graph_of_one_robot_goes_as_one_piece_and_is_shown_by_its_levels() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    async with lab.runner() as control:
+        run = (await control.start(sent(TASK, PICK), ANN)).run.id
+        assert await ended(control, run) == "finished"
+        found = lab.harness.journal.history(run)
+        (pick,) = lab.david.starts
+        assert pick.graph.name == f"task--Pick_0--v{run}.1"
+        assert [each.graph.name for each in lab.carol.starts] == ["task--Work_1"]
+        assert found.result == "on_true"
+        assert {name for name in found.actions if "/" in name} == {
+            "task__Pick__0/Work_0",
+            "task__Pick__0/Work_1",
+        }
+        first, second = (found.actions[f"task__Pick__0/Work_{n}"].visits[-1] for n in range(2))
+        assert found.actions["Pick_0"].visits[-1].result == "true"
+        assert first.not_after <= second.not_after <= found.actions["Work_1"].visits[-1].start
+        assert all(each.state == "FINISHED" for each in found.actions.values())
+
+
+@virtual
+async def test_each_visit_of_a_sub_graph_has_a_name_of_its_own() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    first, second = (each.key for each in TASK.actions)
+    back = Relation(parent=second, child=first, conditions=ALWAYS, required=False)
+    kept = tuple(each for each in TASK.relations if each.child != "exit")
+    loop = msgspec.structs.replace(TASK, relations=(*kept, back))
+    async with lab.runner() as control:
+        run = (await control.start(sent(loop, PICK), ANN)).run.id
+        await until(lambda: len(lab.david.starts) == 3 and len(lab.carol.starts) == 3)
+        names = [each.graph.name for each in lab.david.starts]
+        assert len(set(names)) == len(names)
+        assert {each.graph.name for each in lab.carol.starts} == {"task--Work_1"}
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+        visits = lab.harness.journal.history(run).actions["task__Pick__0/Work_0"].visits
+        assert len(visits) >= 3
+
+
+@pytest.mark.parametrize("outcome", ["on_true", "on_false", "on_error"])
+@virtual
+async def test_the_outcome_of_a_sub_graph_is_that_of_its_last_action(outcome: str) -> None:
+    lab = Lab({"Work_0": [{"after_s": 1, "result": outcome}], "*": [{"after_s": 1}]})
+    graph = going_on(TASK)
+    async with lab.runner() as control:
+        inside = ending(sequence("Pick", 1))
+        run = (await control.start(sent(graph, inside), ANN)).run.id
+        assert await ended(control, run) == "finished"
+        found = lab.harness.journal.history(run)
+        assert found.actions["Pick_0"].visits[-1].result == outcome.removeprefix("on_")
+        assert found.alarms == ()
+
+
+@virtual
+async def test_a_sub_graph_that_may_have_ended_false_or_with_an_error_asks_a_person() -> None:
+    lab = Lab(
+        {
+            "Work_0": [{"after_s": 1, "result": "on_error"}],
+            "Work_1": [{"after_s": 2, "result": "on_false"}],
+        }
+    )
+    line = sequence("Pick", 2)
+    first, second = (each.key for each in line.actions)
+    beside = msgspec.structs.replace(
+        line,
+        relations=tuple(
+            Relation(parent=parent, child=child, conditions=ALWAYS)
+            for parent, child in (
+                ("entry", first),
+                ("entry", second),
+                (first, "exit"),
+                (second, "exit"),
+            )
+        ),
+    )
+    async with lab.runner() as control:
+        run = (await control.start(sent(going_on(TASK), beside, lost="wait"), ANN)).run.id
+        await until(lambda: control.open[run].run.held is not None)
+        found = control.open[run].run
+        assert [each.code for each in found.alarms] == ["led_ended"]
+        assert lab.carol.starts == []
+        assert found.held is not None
+        await control.give_outcome(run, WordRequest("Pick_0", "false", "I saw it."), BEN)
+        await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
+        assert await ended(control, run) == "finished"
+
+
+@virtual
+async def test_a_stop_reaches_what_is_inside_of_a_piece() -> None:
+    lab = Lab({"*": [{"never": True, "stop_s": 0.5}]})
+    async with lab.runner() as control:
+        run = (await control.start(sent(TASK, PICK), ANN)).run.id
+        inner = "task__Pick__0/Work_0"
+        await until(
+            lambda: (
+                inner in (now := lab.harness.journal.history(run).actions)
+                and now[inner].state == "RUNNING"
+            )
+        )
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+        name = lab.david.starts[0].graph.name
+        assert not await lab.david.moving(name)
+        assert not await lab.david.moving(f"{name}__Pick__0")
+        assert lab.carol.starts == []
+
+
+@virtual
+async def test_a_restarted_runner_follows_a_sub_graph_and_reads_its_outcome() -> None:
+    lab = Lab({"*": [{"after_s": 4}]})
+    async with lab.runner() as control:
+        run = (await control.start(sent(TASK, PICK, lost="wait"), ANN)).run.id
+        await until(lambda: bool(lab.david.starts))
+        await anyio.sleep(2)
+    async with lab.runner() as control:
+        await anyio.sleep(30)
+        found = control.open[run].run
+        assert found.held is not None
+        assert found.actions["Pick_0"].visits[-1].result == "true"
+        assert found.actions["task__Pick__0/Work_1"].state == "FINISHED"
+        await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
+        assert await ended(control, run) == "finished"
+        assert len(lab.david.starts) == len(lab.carol.starts) == 1
+
+
+@virtual
+async def test_a_sub_graph_of_several_robots_is_refused_with_what_to_do() -> None:
+    lab = Lab()
+    inside = shared(PICK, "", "Carrier")
+    async with lab.runner() as control:
+        with pytest.raises(Conflict) as why:
+            await control.start(sent(TASK, inside), ANN)
+        assert "Pick_0 is a sub-graph of several robots" in why.value.detail
+        assert "Carol (Work_1), David (Work_0)" in why.value.detail
+        assert why.value.where is not None
+        (obstacle,) = why.value.where["obstacles"]
+        assert obstacle["code"] == "subgraph-across"
+        assert lab.david.starts == lab.carol.starts == []
+
+
+@virtual
+async def test_the_actor_of_a_sub_graph_is_that_of_its_actions() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    inside, robots = shared(PICK, "David"), {"David": "David", "Carrier": "Carol"}
+    async with lab.runner() as control:
+        for actor in ("", "David", "Carrier"):
+            task = shared(named(sequence("task", 2), "Pick"), actor, "Carrier")
+            request = msgspec.structs.replace(sent(task, inside), robots=robots)
+            run = (await control.start(request, ANN)).run.id
+            assert await ended(control, run) == "finished"
+        assert [each.graph.name.split("--v")[0] for each in lab.david.starts] == [
+            "task--Pick_0"
+        ] * 3
+        assert len(lab.carol.starts) == 3
+
+
+@virtual
+async def test_a_sub_graph_whose_actions_name_another_actor_than_its_robot_is_said_before() -> None:
+    lab = Lab()
+    async with lab.runner() as control:
+        why = await refused(control, sent(TASK, shared(PICK, "Scout")))
+        assert "inside of Pick belong to Scout, not to David" in why
+        assert lab.david.starts == []
+
+
+@virtual
+async def test_a_sub_graph_of_the_simulator_is_played_with_names_that_robots_have_too() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    task = shared(named(sequence("task", 2), "Pick"), "Scout", "Carrier")
+    robots = {"Scout": "simulator", "Carrier": "Carol"}
+    async with lab.runner() as control:
+        request = msgspec.structs.replace(sent(task, sequence("Pick", 2)), robots=robots)
+        run = (await control.start(request, ANN)).run.id
+        assert await ended(control, run) == "finished"
+        assert lab.david.starts == []
+        assert [each.graph.name for each in lab.carol.starts] == ["task--Work_1"]
+        found = lab.harness.journal.history(run)
+        assert found.actions["task__Pick__0/Work_1"].state == "FINISHED"
