@@ -410,6 +410,20 @@ def two_ends(name: str = "two_ends") -> Graph:
     return msgspec.structs.replace(line, relations=(*entries, *exits))
 
 
+def two_lines(name: str = "two_lines") -> Graph:
+    """Two actions side by side, `Work_0` and `Work_1`, each with one after it, `Work_2` and `Work_3`."""
+    line = sequence(name, 4)
+    keys = [each.key for each in line.actions]
+    relations = tuple(
+        Relation(
+            parent=parent, child=child, conditions=ENTRY_CONDITIONS if parent == ENTRY else GO_ON
+        )
+        for number in (0, 1)
+        for parent, child in itertools.pairwise((ENTRY, keys[number], keys[number + 2], EXIT))
+    )
+    return msgspec.structs.replace(line, relations=relations)
+
+
 async def until(true: Callable[[], bool], patience: float = 60.0) -> None:
     """Wait for something that must happen."""
     with anyio.fail_after(patience):

@@ -13,7 +13,7 @@ from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.analysis import statistics
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import EngineChanged, Registration
+from action_assistant.runner.links.port import EngineChanged, ForeignCommand, Registration
 from action_assistant.runner.links.simulator import SimulatorLink, in_this_process
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Override
@@ -32,6 +32,7 @@ from runner.harness import (
     order,
     sequence,
     two_ends,
+    two_lines,
     until,
     virtual,
 )
@@ -536,3 +537,75 @@ async def test_a_run_is_not_proven_where_only_a_person_has_seen_a_robot_at_rest(
         assert found.at_rest is not None
         assert found.at_rest.by == BEN
         assert found.actions["Work_0"].visits[-1].how == "inferred"
+
+
+def alarms(run: Run, code: str) -> list[str]:
+    """Return the texts of a run's alarms with this code."""
+    return [each.text for each in run.alarms if each.code == code]
+
+
+async def forked(lab: Lab, control: ExecutionService) -> str:
+    """Start a run with a step on each robot at once, both of which wait for a further one."""
+    request = led(shared(two_lines("task"), "Scout", "Carrier"), lost="wait")
+    return (await control.start(request, ANN)).run.id
+
+
+@virtual
+async def test_a_run_does_not_go_on_while_one_of_its_robots_is_silent() -> None:
+    lab = Lab({"*": [{"after_s": 5}]})
+    async with lab.runner() as control:
+        run = await forked(lab, control)
+        await until(lambda: bool(lab.david.starts and lab.carol.starts))
+        lab.carol.silent = True
+        await until(lambda: control.open[run].run.held is not None, 4.5)
+        await anyio.sleep(10)
+        held = control.open[run].run.held
+        assert held is not None
+        with pytest.raises(Conflict, match="Carol: it has not answered"):
+            await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+        assert control.open[run].run.held == held
+        assert len(lab.david.starts) == 1
+        lab.carol.silent = False
+        await anyio.sleep(20)
+        assert len(lab.david.starts) == 1
+        await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+        assert await ended(control, run) == "finished"
+
+
+@virtual
+async def test_each_silence_of_a_robot_is_one_alarm() -> None:
+    lab = Lab({"*": [{"after_s": 60}]})
+    async with lab.runner() as control:
+        run = await forked(lab, control)
+        held = None
+        await until(lambda: bool(lab.david.starts and lab.carol.starts))
+        for silences in (1, 2):
+            lab.carol.silent = True
+            await anyio.sleep(12)
+            held = control.open[run].run.held
+            assert held is not None
+            with pytest.raises(Conflict):
+                await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+            await anyio.sleep(5)
+            assert len(alarms(control.open[run].run, "led_silent")) == silences
+            lab.carol.silent = False
+            await anyio.sleep(3)
+        assert held is not None
+        await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+        assert await ended(control, run) == "finished"
+
+
+@virtual
+async def test_a_command_of_others_holds_a_run_once() -> None:
+    lab = Lab({"*": [{"after_s": 20}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+        lab.david.subscribers.tell(
+            ForeignCommand(at=clock_us(), command="start", graph="theirs", targets=("David",))
+        )
+        await until(lambda: control.open[run].run.held is not None)
+        held = control.open[run].run.held
+        assert held is not None
+        await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+        assert await ended(control, run) == "finished"
+        assert len(alarms(lab.harness.journal.history(run), "led_foreign_other")) == 1

@@ -43,6 +43,10 @@ GRAPH: Final = Author("graph", "the graph itself", "program")
 RUNNER: Final = Author("runner", "the runner", "program")
 
 
+_TICK_S: Final = 0.5
+_STALL_S: Final = 3.0  # for which nothing may have stood still before a piece leaves
+
+
 class Leading(msgspec.Struct, frozen=True, kw_only=True):
     """The run that a conductor leads, as far as it needs it: `tell` shows and records an event,
     `stored` waits until all told events are in the journal, `stop` begins a Stop of the whole run,
@@ -155,6 +159,34 @@ class Gate:
         """Wait until the gate is open."""
         while not self.is_open:
             await self._opened.wait()
+
+
+class StallWatch:
+    """Notices that this computer, this process or its clock has jumped: whatever was looked at before
+    is old then."""
+
+    def __init__(self, clock_us: ClockUs) -> None:
+        self._clock_us = clock_us
+        self._ticked = anyio.current_time()
+
+    @property
+    def stands_still(self) -> bool:
+        """True if the process stood still until now, which `run` could not notice yet."""
+        return anyio.current_time() - self._ticked > _STALL_S
+
+    async def run(self, hold: Callable[[str], None]) -> None:
+        """Call `hold` with the reason at each jump, until cancelled."""
+        offset = self._clock_us() / 1e6 - anyio.current_time()
+        while True:
+            await anyio.sleep(_TICK_S)
+            now = anyio.current_time()
+            jumped = self._clock_us() / 1e6 - now - offset
+            if now - self._ticked > _STALL_S:
+                hold(f"The runner stood still for {now - self._ticked:.0f} s.")
+            elif abs(jumped) > _STALL_S:
+                hold(f"The clock of the runner's computer jumped by {jumped:.0f} s.")
+                offset += jumped
+            self._ticked = now
 
 
 def seen_of(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:

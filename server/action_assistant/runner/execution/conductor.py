@@ -31,6 +31,7 @@ from action_assistant.runner.execution.conducted_steps import (
     Leading,
     LeftOpen,
     RestNews,
+    StallWatch,
     Step,
     Word,
     order_of,
@@ -89,11 +90,11 @@ from action_assistant.umrf.semantics import Returned
 
 log: Final = logging.getLogger(__name__)
 
-_TICK_S: Final = 0.5
-_STALL_S: Final = 3.0  # for which nothing may have stood still before a piece leaves
 _MOST_ENGINES: Final = 3  # that are begun for one run after the first
 _UNSET_S: Final = 1.0  # a piece whose action has ended and whose graph goes on lacks an output
-_FOREIGN: Final = frozenset({"foreign_start", "foreign_stop", "foreign_pause", "foreign_modify"})
+_FOREIGN: Final = frozenset(
+    {f"foreign_{what}" for what in ("start", "stop", "pause", "modify", "other")}
+)
 
 
 class Conductor:
@@ -155,7 +156,8 @@ class Conductor:
         self._is_told_to_stop = False
         self._replaced = 0
         self._again: dict[str, OpenRun] = {}  # pieces that had ended and move again
-        self._ticked = anyio.current_time()
+        self._stalls = StallWatch(clock_us)
+        self._silences: dict[str, Answer | None] = {}  # told, with the robot's last answer before
         self._unstored: set[RunRecorder] = set()  # of pieces that have ended
         self._rests = RestNews(lambda event: self._run.tell(event), clock_us)
 
@@ -254,7 +256,7 @@ class Conductor:
             tasks.start_soon(self._engine.run)
             for step in self._steps.values():  # begun before this task
                 tasks.start_soon(self._lead, step)
-            tasks.start_soon(self._watch_time)
+            tasks.start_soon(self._stalls.run, self.hold)
             left, self._left = self._left, None
             if left is not None:
                 self._began, self._course = left.course.began, list(left.course.steps)
@@ -326,21 +328,6 @@ class Conductor:
             log.warning("run %s: no engine leads it: %s", self._first.run, why)
             self.hold(f"What leads this run cannot be begun again: {why}")
             self._failed.set()
-
-    async def _watch_time(self) -> None:
-        """Hold the run when this computer, this process or its clock has jumped: what was looked at
-        before is old then."""
-        offset = self._clock_us() / 1e6 - anyio.current_time()
-        while True:
-            await anyio.sleep(_TICK_S)
-            now = anyio.current_time()
-            jumped = self._clock_us() / 1e6 - now - offset
-            if now - self._ticked > _STALL_S:
-                self.hold(f"The runner stood still for {now - self._ticked:.0f} s.")
-            elif abs(jumped) > _STALL_S:
-                self.hold(f"The clock of the runner's computer jumped by {jumped:.0f} s.")
-                offset += jumped
-            self._ticked = now
 
     def _now_ms(self) -> float:
         return (self._clock_us() - self._began) / 1000
@@ -487,7 +474,7 @@ class Conductor:
         Raise NotSent if the piece may not begin any more."""
         if not self._gate.is_open or step.is_stopped:
             raise NotSent("the run was held or stopped before it left")
-        if anyio.current_time() - self._ticked > _STALL_S:
+        if self._stalls.stands_still:
             raise NotSent("the runner stood still before it left")
         cleared.require_still()
 
@@ -525,13 +512,17 @@ class Conductor:
         where = f"{step.node} on {step.engine}"
         if run.unknown_since is not None:
             self._trouble(step, "silent", f"{where}: the robot does not answer.")
+        else:
+            step.troubles.discard("silent")
         if run.lost or run.unconfirmed:
             self._trouble(step, "lost", f"{where}: {run.lost or run.unconfirmed}")
         for alarm in run.alarms:
+            if (alarm.code, alarm.text) in step.alarms:
+                continue
+            step.alarms.add((alarm.code, alarm.text))
             if alarm.code in _FOREIGN:
                 self._trouble(step, alarm.code, f"{where}: {alarm.text}")
-            elif (alarm.code, alarm.text) not in step.alarms:
-                step.alarms.add((alarm.code, alarm.text))
+            else:
                 self._alarm(alarm.code, f"{where}: {alarm.text}")
 
     def _find_lacking_output(self, step: Step, run: Run) -> None:
@@ -609,14 +600,22 @@ class Conductor:
     # --- trouble ------------------------------------------------------------------------------
 
     def _trouble(self, step: Step, code: str, why: str) -> None:
-        """Say what is wrong with a step, once, and do what the starter has chosen for that."""
+        """Say what is wrong with a step, once, and do what the starter has chosen for that. A silence
+        is said once for all steps on its robot."""
         if code in step.troubles or step.is_stopped:
             return
         step.troubles.add(code)
-        self._act_on(why, f"led_{code}")
+        if code == "silent":
+            robot = self._robots.link(step.engine)
+            answer = robot.answer if robot is not None else None
+            is_told = step.engine in self._silences and self._silences[step.engine] is answer
+            self._silences[step.engine] = answer
+            code = "" if is_told else code
+        self._act_on(why, code and f"led_{code}")
 
     def _act_on(self, why: str, code: str) -> None:
-        self._alarm(code, why)
+        if code:
+            self._alarm(code, why)
         if self._led.lost == "stop":
             self._run.stop(RUNNER)
         else:
@@ -634,10 +633,19 @@ class Conductor:
             self._gate.hold(held)
             self._run.tell(held)
 
-    def go_on(self, author: Author) -> None:
-        """Let a held run go on. Raise Conflict if nothing can lead it any more."""
+    async def go_on(self, author: Author) -> None:
+        """Let a held run go on, once every robot that has a step of it has answered. Raise Conflict if
+        one of them may begin no piece, or nothing leads the run, or its gate has changed meanwhile."""
         if self._is_past_help:
             raise Conflict("What leads this run has failed too often: only Stop is left.")
+        if not self._has_engine:
+            raise Conflict("What leads this run is being begun again. Try that in some seconds.")
+        held = self._gate.held
+        names = {step.engine for step in self._steps.values() if not step.over.is_set()}
+        names |= {piece.run.engine for piece in self._again.values() if piece.run.end is None}
+        await self._look.before_going_on(self._robots, names, self._first)
+        if held is None or self._gate.held is not held or self._gate.is_final:
+            raise Conflict("The run has gone on, or was stopped, meanwhile.")
         for step in self._steps.values():
             step.troubles &= {"ended"}
         self._run.tell(Released(at=self._clock_us(), author=author))

@@ -112,9 +112,10 @@ class Conductors:
         led = frozenset(first.led.players if first.led is not None else ())
         return self._simulator(CONDUCTED_FACTS, first.script, self._runtime.clock_us, led=led)
 
-    def go_on(self, run: str, author: Author) -> None:
-        """Let a held run go on. Raise Conflict if nothing can lead it any more."""
-        self._open[run].go_on(author)
+    async def go_on(self, run: str, author: Author) -> None:
+        """Let a held run go on. Raise Conflict if nothing can lead it any more, or one of its robots
+        may begin no piece."""
+        await self._open[run].go_on(author)
 
     def give_word(self, run: str, node: str, word: Word) -> None:
         """Take the outcome of an action from a person. Raise Conflict if it is not asked for."""

@@ -5,15 +5,17 @@ A led run begins actions at its start and with each piece, minutes later: the ne
 of them, by a pre-flight too: a rule that is added there counts everywhere (docs/decisions/113).
 """
 
+from collections.abc import Iterable
 from typing import Final
 
 import anyio
 import msgspec
 
-from action_assistant.errors import Refused
+from action_assistant.errors import Conflict, Refused
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.port import Answer, NoAnswer, NotSent
 from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
+from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author, Requested
 from action_assistant.runner.start.indexing import IndexingWords, indexing_item
 from action_assistant.runner.start.preflight import Item, is_blocking, led_item
@@ -89,6 +91,7 @@ class LedLook:
         taken = self._runs.occupying(name, apart_from=run.run)
         if taken is not None:
             raise NoAnswer(f"run {taken.number} is {taken.state} there")
+        self._require_known(name, run.run)
         try:
             items = await self.items(robot, answer, answer.incarnation)
         except Refused as unreadable:
@@ -98,6 +101,42 @@ class LedLook:
             if is_blocking(item, overridden):
                 raise NoAnswer(item.text)
         return Cleared(robot, answer.incarnation, anyio.current_time())
+
+    def _require_known(self, name: str, run: str) -> None:
+        """Raise NoAnswer with the reason if a piece of this run on this robot is unknown, lost or
+        unconfirmed, or moves again: the robot gets no further one."""
+        for opened in self._runs.on(name).values():
+            piece = opened.run
+            if piece.piece is None or piece.piece.run != run:
+                continue
+            node = piece.piece.node
+            if piece.unknown_since is not None:
+                raise NoAnswer(f"it does not answer, and may still carry out {node}")
+            if piece.moves_again_at is not None:
+                raise NoAnswer(f"{node} moves again there")
+            if why := piece.lost or piece.unconfirmed:
+                raise NoAnswer(f"nobody knows whether {node} has ended there: {why}")
+
+    async def before_going_on(self, robots: Robots, names: Iterable[str], run: Requested) -> None:
+        """Look at the robots of these names, side by side, before a held run goes on. Raise Conflict,
+        with the reason of each on which no piece may begin."""
+        found: dict[str, str] = {}
+
+        async def look(name: str) -> None:
+            try:
+                await self.before_piece(robots.reachable(name), run)
+            except NoAnswer as why:
+                found[name] = str(why)
+            except Refused as why:
+                found[name] = why.detail
+
+        async with anyio.create_task_group() as tasks:
+            for name in names:
+                tasks.start_soon(look, name)
+        if found:
+            reasons = " ".join(f"{name}: {found[name].rstrip('. ')}." for name in sorted(found))
+            where: dict[str, object] = {"path": "/robots", "robots": found}
+            raise Conflict(f"Nothing has gone on. {reasons}", where=where)
 
     async def give_words(self, lives: dict[str, str], author: Author, reason: str) -> None:
         """Store what a starter answers for at these robots, for these lives of their engines. Raise

@@ -386,7 +386,9 @@ class OpenRun:
                 try:
                     with anyio.fail_after(_GET_S):
                         answer = await self._link.get()
+                    is_silent = False
                 except (NoAnswer, TimeoutError) as why:
+                    is_silent = True
                     with self._changing() as changes:
                         self.watch.unanswered(changes, self._link.standing, str(why))
                 else:
@@ -399,6 +401,8 @@ class OpenRun:
                         changes.engine_ended()
                 cost = anyio.current_time() - look.began
                 wait = max(self.watch.pace(self.run), 5 * cost)
+                if is_silent and self.run.unknown_since is None:  # known after 3 s, not later
+                    wait = max(0.0, self.watch.pace(self.run) - cost)
 
     async def _work_on(self, job: Job) -> None:
         """Carry out work of the monitor. It only helps people, so it is given up where no worker can be

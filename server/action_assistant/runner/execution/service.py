@@ -245,7 +245,8 @@ class ExecutionService:
 
     async def go_on(self, run: str, asked: GoOnRequest, author: Author) -> Run:
         """Let a held run go on, which may start actions on its robots. Raise NotFound if there is no
-        such run, Conflict if it is over, or not held as the person has seen it."""
+        such run, Conflict if it is over, not held as the person has seen it, or one of its robots
+        may begin nothing: only those that answer now are given more."""
         opened = await self._movable(run)
         held = opened.run.held
         if held is None:
@@ -257,7 +258,7 @@ class ExecutionService:
             )
         if opened.run.desired == "stopped":
             raise Conflict("The run is being stopped.")
-        self._conductors.go_on(run, author)
+        await self._conductors.go_on(run, author)
         return opened.run
 
     async def give_outcome(self, run: str, asked: WordRequest, author: Author) -> Run:
