@@ -165,7 +165,7 @@ CODES: Final[dict[str, Code]] = {
         "hazard", _WARNING, "several actors, and a profile that claims `synchronises`",
         "a robot that is not reached for 5 s, or two ends at about the same time, abort engines, and a graph that waits cannot be stopped",
     ),
-    "values-across-robots": Code("hazard", _WARNING, "an arrow that hands an output to an action of another actor", "a runner that leads the robots cannot hand values on"),
+    "values-across-robots": Code("hazard", _WARNING, "an arrow that hands an output to an action of another actor", "a runner that leads the robots can hand values on only with the package `zz_keep_values`"),
     "two-at-once": Code("hazard", _WARNING, "two actions of one actor that may run at the same time", "on a robot that is led, a Stop reaches the second one up to 5 s later"),
     "loaded-anew": Code("hazard", _WARNING, "an action that may run more than once", "on a robot that is led, it is loaded anew each time and forgets what it remembers"),
     "spontaneous-across": Code("hazard", _WARNING, "a spontaneous action that leads to an action of another actor", "a runner that leads the robots cannot stop what comes after it at each of its ends"),

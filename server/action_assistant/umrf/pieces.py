@@ -6,11 +6,12 @@ piece runs only for `on_true`, so the states of the graph and of its action tell
 an engine otherwise never reports. Pure.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from typing import Final
 
 import msgspec
 
+from action_assistant.umrf.kept_values import handing, hindered, named
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -23,7 +24,6 @@ from action_assistant.umrf.model import (
     Precondition,
     Relation,
 )
-from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
 
 #: The exit of a piece: only `on_true` reaches it, so that each outcome has states of its own.
 TELLING: Final = Conditions(on_true="run")
@@ -82,26 +82,25 @@ def obstacles(graph: Graph) -> tuple[Obstacle, ...]:
     )
 
 
+def handed_by(graph: Graph, actions: Collection[Key]) -> tuple[Obstacle, ...]:
+    """Return the arrows by which these actions, given by key, hand values to others: they need the
+    helper package on the robot that carries them out."""
+    names = {action.key: action.full_name for action in graph.actions}
+    return tuple(
+        Obstacle(
+            code="values-across",
+            text=f"{names[arrow.parent]} hands {named(handed)} to {names[arrow.child]}",
+            aid=arrow.child,
+        )
+        for arrow, handed in handing(graph)
+        if arrow.parent in actions
+    )
+
+
 def _values_across(graph: Graph) -> Iterator[Obstacle]:
-    """Yield each arrow that hands a value to another action: the engine clears the outputs of a
-    piece at its end, so they cannot be read."""
-    actions = {action.key: action for action in graph.actions if not action.missing}
-    for relation in graph.relations:
-        parent, child = actions.get(relation.parent), actions.get(relation.child)
-        if parent is None or child is None:
-            continue
-        inputs = slots_of(child.inputs)
-        try:
-            given = renamed(slots_of(parent.outputs), relation.remap, inputs)
-        except RemapUnknown:
-            continue  # a problem of the graph itself
-        if given:
-            names = ", ".join(f"“{name}”" for name in sorted(given)[:3])
-            text = (
-                f"{parent.full_name} hands {names} to {child.full_name}: a value cannot be handed "
-                "from one step to the next yet."
-            )
-            yield Obstacle(code="values-across", text=text, aid=child.key)
+    """Yield each arrow whose values no helper package can hand from one piece to another."""
+    for relation, why in hindered(graph):
+        yield Obstacle(code="values-across", text=why, aid=relation.child)
 
 
 def _spontaneous(graph: Graph) -> Iterator[Obstacle]:

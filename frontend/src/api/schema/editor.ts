@@ -1902,6 +1902,9 @@ export interface EditorPaths {
     "/api/graphs/{graph_id}/packages.zip": {
         get: EditorOperations["downloadPackages"];
     };
+    "/api/values-package.zip": {
+        get: EditorOperations["downloadValuesPackage"];
+    };
     "/api/actions": {
         get: EditorOperations["listActions"];
         post: EditorOperations["createAction"];
@@ -2874,6 +2877,15 @@ interface EditorOperations {
                 graph_id: string;
             };
         };
+        responses: {
+            200: {
+                content: {
+                    "application/zip": string;
+                };
+            };
+        };
+    };
+    downloadValuesPackage: {
         responses: {
             200: {
                 content: {

@@ -1755,7 +1755,8 @@ export interface RunnerApi {
      *     (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
      *     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
      *     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
-     *     none were seen. `said`: who gave the result by word, where no answer has shown it.
+     *     none were seen; `outputs`: likewise those that it gave, where an answer could show them. `said`:
+     *     who gave the result by word, where no answer has shown it.
      */
     VisitShown: {
         /** Format: date-time */
@@ -1771,6 +1772,9 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         said?: RunnerApi["SaidShown"];
+        outputs?: {
+            [key: string]: string;
+        };
     };
     /**
      * Where

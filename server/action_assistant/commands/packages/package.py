@@ -13,6 +13,7 @@ from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import ACTION_DIALECTS
+from action_assistant.umrf.kept_values import KEEPER_PACKAGE, keeper
 from action_assistant.umrf.model import Action
 from action_assistant.umrf.packages.bases import BASE_NAME
 from action_assistant.umrf.packages.bundling import bundle_files
@@ -148,6 +149,11 @@ def _add_package(package: argparse.ArgumentParser) -> None:
         help="of a graph's actions, or of the library's: these only",
     )
     package.add_argument(
+        "--values",
+        action="store_true",
+        help="the package that keeps values, so that runs which the runner leads can hand them on",
+    )
+    package.add_argument(
         "--together",
         metavar="PACKAGE",
         help="one package of this name with all the actions, instead of one for each",
@@ -165,10 +171,12 @@ COMMANDS: Final = {"package": _add_package}
 
 
 def _package(options: argparse.Namespace) -> int:
-    source = options.file or "library"
+    source = options.file or (KEEPER_PACKAGE if options.values else "library")
     refusals: tuple[NameRefusal, ...] = ()
     try:
-        if options.file is None:
+        if options.values:
+            actions = _keeping(options)
+        elif options.file is None:
             actions = _of_library(options)
         else:
             actions, refusals = _chosen(options.file, options.name)
@@ -201,6 +209,13 @@ def _regenerated(root: Path, found: PackagesPlan, options: argparse.Namespace) -
     if writing:
         tell_refused(found)
     return 1 if found.refused or (options.check and found.steps) else 0
+
+
+def _keeping(options: argparse.Namespace) -> tuple[Action, ...]:
+    """Return the action that keeps values. Raise CannotStart if others are named, too."""
+    if options.file is not None or options.name or options.together:
+        raise CannotStart("--values is a package of its own: name no FILE, --name or --together.")
+    return (keeper(),)
 
 
 def _of_library(options: argparse.Namespace) -> tuple[Action, ...]:

@@ -11,6 +11,7 @@ from action_assistant.editor.interchange import action_packages
 from action_assistant.editor.interchange.action_packages import PackageContents, PackageList
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
+from action_assistant.umrf.kept_values import KEEPER_PACKAGE
 from action_assistant.web.server.openapi import FileBytes, answer
 
 Packages = Annotated[list[str] | None, QueryParameter(name="package", max_items=1000)]
@@ -68,4 +69,18 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
             },
         )
 
-    return [list_packages, get_package, download_packages]
+    @get(
+        "/api/values-package.zip",
+        summary="The package that keeps values, with which conducted runs can hand them from robot to "
+        "robot, as a ZIP file",
+        operation_id="downloadValuesPackage",
+        responses={200: answer(FileBytes, media="application/zip")},
+    )
+    async def download_values_package() -> Response[bytes]:
+        return Response(
+            await app_state.services.workers.files(action_packages.keeper_archive),
+            media_type="application/zip",
+            headers={"content-disposition": f'attachment; filename="{KEEPER_PACKAGE}.zip"'},
+        )
+
+    return [list_packages, get_package, download_packages, download_values_package]

@@ -11,6 +11,7 @@ from action_assistant.editor.documents.contents import GraphAtSeq, first_action,
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.errors import NotFound
 from action_assistant.safe_text import hold_names
+from action_assistant.umrf.kept_values import keeper
 from action_assistant.umrf.model import Action, Graph
 from action_assistant.umrf.packages.choosing import disagreements, distinct_actions
 from action_assistant.umrf.packages.generating import ImpossiblePackage, package_files
@@ -89,9 +90,18 @@ def contents(sight: GraphAtSeq, kind: DocumentKind, package: str) -> bytes:
 def archive(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> bytes:
     """Return a ZIP file with a folder for each named package, or for every package if none is
     named; equal actions give equal bytes. Raise NotFound if no action has such a package."""
+    return _packed(_chosen(sight, kind, packages))
+
+
+def keeper_archive() -> bytes:
+    """Return a ZIP file with the package that keeps values for conducted runs."""
+    return _packed((keeper(),))
+
+
+def _packed(actions: Sequence[Action]) -> bytes:
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as file:
-        for action in _chosen(sight, kind, packages):
+        for action in actions:
             for path, content in package_files(action).items():
                 entry = zipfile.ZipInfo(f"{snake_case(action.name)}/{path}", _LONG_AGO)
                 entry.compress_type = zipfile.ZIP_DEFLATED

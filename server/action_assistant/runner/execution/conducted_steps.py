@@ -23,7 +23,7 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
-from action_assistant.runner.start.admission import PieceText
+from action_assistant.runner.start.piece_texts import PieceText
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.led_subgraphs import StatesInside, outcome_of_subgraph
@@ -98,6 +98,7 @@ class Step:
         self.word: Word | None = None
         self.decided = anyio.Event()  # it is to end, or a person has given its outcome
         self.over = anyio.Event()  # its piece has ended
+        self.rested = anyio.Event()  # its action has ended, and its graph goes on
         self._waiting = anyio.CancelScope()  # while nothing was sent
 
     @property
@@ -125,7 +126,7 @@ class Step:
         """Forget a piece that has not left, so that another one can be sent."""
         self.piece, self.run, self.shown, self.has_not_left = None, None, None, False
         self.shown_inside = {}
-        self.over = anyio.Event()
+        self.over, self.rested = anyio.Event(), anyio.Event()
 
 
 class Gate:
@@ -286,11 +287,11 @@ def order_of(first: Requested) -> Order:
 
 
 def piece_to_send(
-    first: Requested, step: Step, piece: str, text: PieceText, at: int
+    first: Requested, step: Step, piece: str, text: PieceText, umrf: str, at: int
 ) -> tuple[Requested, Order]:
     """Return the event that stores the piece of a step, and the order that its robot is sent.
-    `piece`: its id; `text`: what it sends."""
-    name, umrf = text.name(first.graph_name, piece), text.for_run(piece)
+    `piece`: its id; `text`: what it sends, as `umrf` with its values."""
+    name = text.name(first.graph_name, piece)
     actions = {step.node: first.actions[step.node]}
     requested = Requested(
         at=at,

@@ -42,6 +42,7 @@ from action_assistant.runner.execution.conducted_steps import (
 )
 from action_assistant.runner.execution.led_look import Cleared, LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.execution.piece_values import PieceValues, returned_of
 from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
 from action_assistant.runner.links.led_calls import LedCourse
 from action_assistant.runner.links.listeners import Listeners
@@ -77,14 +78,13 @@ from action_assistant.runner.runs.events import (
     Author,
     Held,
     PieceBegan,
-    PieceEnded,
     Released,
     Requested,
 )
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.start.admission import PieceText
 from action_assistant.runner.start.idempotency import IdempotentStarts
+from action_assistant.runner.start.piece_texts import PieceText
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.semantics import Returned
 
@@ -123,6 +123,7 @@ class Conductor:
         self._first = first
         self._led = first.led
         self._texts = texts
+        self._values = PieceValues(texts, first.led.keeping)
         self._engine = engine
         self._make_engine = make_engine
         self._failed = anyio.Event()  # the engine has ended by itself
@@ -396,7 +397,10 @@ class Conductor:
             if step.run is None:
                 await self._finish(step, "on_stopped", "unsent")
                 return
-            await step.over.wait()
+            async with anyio.create_task_group() as watching:
+                watching.start_soon(self._end_without_output, step)
+                await step.over.wait()
+                watching.cancel_scope.cancel()
             outcome = self._outcome(step)
             if outcome is not None:
                 is_shown = step.run.at_rest is None
@@ -428,7 +432,8 @@ class Conductor:
         with anyio.CancelScope(shield=True):
             self._pieces += 1
             piece, at = f"{self._first.run}.{self._pieces}", self._clock_us()
-            requested, order = piece_to_send(self._first, step, piece, self._texts[step.node], at)
+            text, umrf = self._texts[step.node], self._values.text(step, piece)
+            requested, order = piece_to_send(self._first, step, piece, text, umrf, at)
             try:
                 run = await self._claims.store(requested)
             except Refused as refused:
@@ -502,7 +507,8 @@ class Conductor:
             self._run.tell(event)
         if run.end is None:
             self._find_trouble(step, run)
-            self._find_lacking_output(step, run)
+            if _rests(step, run):
+                step.rested.set()
             return
         step.over.set()
         self._unproven = run if run.at_rest is not None else self._unproven
@@ -525,22 +531,18 @@ class Conductor:
             else:
                 self._alarm(alarm.code, f"{where}: {alarm.text}")
 
-    def _find_lacking_output(self, step: Step, run: Run) -> None:
-        """Stop a piece whose action has ended with an output unset: its graph would run for ever."""
-        ended = run.graph_state == "RUNNING" and run.actions[step.node].state == "FINISHED"
-        if ended and not step.lacks_output and self._tasks is not None:
-            step.lacks_output = True
-            self._tasks.start_soon(self._end_without_output, step)
-
     async def _end_without_output(self, step: Step) -> None:
-        await anyio.sleep(_UNSET_S)
-        run = step.run
-        if run is None or run.end is not None or step.is_stopped or step.piece is None:
-            step.lacks_output = False
-        elif run.graph_state == "RUNNING" and run.actions[step.node].state == "FINISHED":
-            step.piece.stop(GRAPH, "")
-        else:
-            step.lacks_output = False
+        """Stop a piece whose action has ended while its graph goes on, which it would do for ever: an
+        output is unset, or the keepers of its values wait."""
+        while True:
+            await step.rested.wait()
+            if not self._values.tells_false_by_rest(step):
+                await anyio.sleep(_UNSET_S)
+            if step.run is not None and step.piece is not None and _rests(step, step.run):
+                step.lacks_output = not step.is_stopped
+                step.piece.stop(GRAPH, "")
+                return
+            step.rested = anyio.Event()
 
     def _outcome(self, step: Step) -> Precondition | None:
         """Return the outcome of a piece that has ended; if its states tell none, say so: None."""
@@ -556,13 +558,17 @@ class Conductor:
                 self._trouble(step, "refused", f"{where} was not begun: {run.detail}")
             return None
         if outcome == "on_stopped" and step.lacks_output:
-            return "on_true"
+            outcome = "on_false" if self._values.tells_false_by_rest(step) else "on_true"
         if outcome is None or outcome == "on_stopped":
             self._trouble(step, "ended", f"{where} has ended without an outcome: {run.state}.")
             if not step.is_stopped:
                 self._rests.show(run, asks=True)
-            return None
-        return outcome
+        elif why := self._values.why_unknown(step):
+            self._trouble(step, "ended", f"What {where} has given is not known: {why}.")
+            self._rests.show(run, asks=True)
+        else:
+            return outcome
+        return None
 
     async def _finish(
         self, step: Step, outcome: Precondition, how: Literal["shape", "word", "unsent"]
@@ -570,21 +576,11 @@ class Conductor:
         """Tell the engine of the whole graph the outcome of a step."""
         self._steps.pop(step.call.number, None)
         self._over.add(step.call.number)
-        piece = step.run.id if step.run is not None else ""
-        self._run.tell(
-            PieceEnded(
-                at=self._clock_us(),
-                call=step.call.number,
-                node=step.node,
-                outcome=outcome,
-                how=how,
-                piece=piece,
-                by=step.word.by if step.word is not None else None,
-                reason=step.word.reason if step.word is not None else "",
-            )
-        )
-        result = "on_true" if outcome == "on_stopped" else outcome
-        returned = Returned(number=step.call.number, result=result)
+        ended = self._values.ended(step, outcome, how, self._clock_us())
+        self._run.tell(ended)
+        if lacking := self._values.lacking(ended):
+            self._alarm("led_unset", f"{step.node} on {step.engine} {lacking}")
+        returned = returned_of(ended)
         self._course.append((self._now_ms(), returned))
         with suppress(NotSent, NoAnswer):  # another engine is told by its course
             await self._engine.returned(returned)
@@ -685,3 +681,8 @@ class Conductor:
     def _run(self) -> Leading:
         assert self._leading is not None
         return self._leading
+
+
+def _rests(step: Step, run: Run) -> bool:
+    """Return whether the action of a piece has ended and its graph goes on."""
+    return run.graph_state == "RUNNING" and run.actions[step.node].state == "FINISHED"

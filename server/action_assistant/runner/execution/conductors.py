@@ -15,6 +15,7 @@ from action_assistant.runner.execution.conducted_steps import (
 from action_assistant.runner.execution.conductor import Conductor
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
+from action_assistant.runner.execution.piece_values import returned_of
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.led_calls import LedCourse
 from action_assistant.runner.links.simulator import LeadableLink, Simulator
@@ -31,8 +32,8 @@ from action_assistant.runner.runs.events import (
 from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
-from action_assistant.runner.start.admission import PieceText, piece_texts
 from action_assistant.runner.start.idempotency import IdempotentStarts
+from action_assistant.runner.start.piece_texts import PieceText, piece_texts
 from action_assistant.umrf.semantics import Returned
 
 _PAGE: Final = 500  # events read at once
@@ -149,12 +150,11 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
                 case PieceBegan(call=call, piece=piece):
                     sent = max(sent, int(piece.rpartition(".")[2]))
                     calls[call] = sent
-                case PieceEnded(at=at, call=call, outcome=outcome, how=how, piece=piece):
+                case PieceEnded(at=at, call=call, how=how, piece=piece) as ended:
                     if how == "word":
                         unproven = (await history.left(piece))[0]
                     calls.pop(call, None)
-                    result = "on_true" if outcome == "on_stopped" else outcome
-                    ends.append((at, Returned(number=call, result=result)))
+                    ends.append((at, returned_of(ended)))
                 case StopRequested(at=at):
                     ends.append((at, "stop"))
     pieces: dict[int, tuple[Run, int]] = {}

@@ -42,6 +42,7 @@ from action_assistant.runner.start.preflight import EngineView, Item, Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.check import forbids_start
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
+from action_assistant.umrf.kept_values import has_keeper
 
 #: Facts of the simulator when it plays no robot: there a paused run can be stopped.
 _SIMULATOR_FACTS: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
@@ -67,7 +68,8 @@ NO_SOURCES: Final = StartSources()
 
 class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     """A start that nothing prevents. It goes over `link`, which the run owns if simulated, to the
-    life `incarnation` of the engine. `despite`: problems that a person overrides."""
+    life `incarnation` of the engine. `despite`: problems that a person overrides; `keeps`: the engine
+    has the helper package, so that values can be read from it."""
 
     request: StartRequest
     prepared: Prepared
@@ -76,6 +78,7 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     incarnation: str
     despite: tuple[Overridden, ...] = ()
     led: "LedStart | None" = None
+    keeps: bool = False
 
     @property
     def overridden(self) -> tuple[str, ...]:
@@ -86,11 +89,13 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
 class LedStart(msgspec.Struct, frozen=True, kw_only=True):
     """The part of an accepted start that only a conducted run has. `lives`: the life of the engine
     of each robot, as it was looked at; `by_word`: those of them of which only the starter says that
-    they index once; `engine`: plays the whole graph."""
+    they index once; `keeping`: the robots that have the helper package; `engine`: plays the whole
+    graph."""
 
     pieces: PreparedPieces
     lives: dict[str, str]
     by_word: dict[str, str]
+    keeping: tuple[str, ...]
     engine: LeadableLink
 
 
@@ -208,6 +213,7 @@ class StartChecks:
                     for each in accepted
                     if any(problem.code == INDEXING for problem in each.despite)
                 },
+                keeping=tuple(each.request.engine for each in accepted if each.keeps),
                 engine=engine,
             ),
         )
@@ -287,6 +293,7 @@ class StartChecks:
             is_simulated=False,
             incarnation=view.answer.incarnation,
             despite=_overridden(ready, (free, *items)),
+            keeps=has_keeper(view.index.actions),
         )
         preflight.require_clear([free], accepted.overridden)
         preflight.require_clear(items, accepted.overridden)

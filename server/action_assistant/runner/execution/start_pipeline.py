@@ -218,6 +218,7 @@ def _led_of(accepted: AcceptedStart) -> Led | None:
         robots=request.robots,
         players=accepted.led.pieces.players,
         lives=accepted.led.lives,
+        keeping=accepted.led.keeping,
         lost=request.lost,
         together="two-at-once" in accepted.overridden,
     )

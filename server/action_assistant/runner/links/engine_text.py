@@ -11,6 +11,7 @@ import msgspec
 
 from action_assistant.runner.links.observations import ACTIVE, Snapshot
 from action_assistant.runner.links.parameter_texts import Values, reported
+from action_assistant.umrf.kept_values import KEEPER, NOTHING_KEPT, is_given, kept_in
 
 #: The log line that an engine writes when it receives a start, before it acts.
 RECEIVED_START: Final = "Received request to start UMRF graph: "
@@ -102,7 +103,12 @@ def snapshot(
         graph = _GRAPH.decode(text)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
         raise NotAGraph(f"This is no graph as engines write them: {error}") from error
-    nodes = {f"{each.name}_{each.instance_id}": each for each in graph.actions}
+    keepers = tuple(each for each in graph.actions if _keeps(each))
+    nodes = {
+        f"{each.name}_{each.instance_id}": each
+        for each in graph.actions
+        if not keepers or each not in keepers
+    }
     messages = {name: _messages(each) for name, each in nodes.items()}
     failed = frozenset(name for name, each in nodes.items() if each.state == "ERROR")
     return Snapshot(
@@ -121,7 +127,16 @@ def snapshot(
             for name, each in nodes.items()
             if each.type == "spontaneous" and each.state != "UNINITIALIZED"
         ),
+        kept=kept_in({each.instance_id: bytes(each.input_parameters) for each in keepers})
+        if keepers
+        else NOTHING_KEPT,
     )
+
+
+def _keeps(action: _Action) -> bool:
+    """Return whether an action is a keeper, which never runs."""
+    idle = action.name == KEEPER and action.state == "UNINITIALIZED"
+    return idle and not is_given(bytes(action.input_parameters))
 
 
 def name_of(text: str) -> str:

@@ -10,6 +10,8 @@ from typing import Final, Literal, TypeAlias
 
 import msgspec
 
+from action_assistant.umrf.kept_values import NOTHING_KEPT, KeptValues
+
 _NAMED: Final = 3
 
 
@@ -96,7 +98,8 @@ class Snapshot(
     started. `messages`: all runtime messages so far, by node (the engine keeps ten). `inputs`:
     values of nodes that move, if readable. `same`: nodes that are not listed are unchanged, also in
     messages. `stoppable`: nodes in ERROR that the graph's own rules may have stopped or paused.
-    `spontaneous`: nodes that have begun and begin again by themselves.
+    `spontaneous`: nodes that have begun and begin again by themselves. `kept`: the outputs that the
+    keepers of a piece hold (`umrf.kept_values`), which are no nodes here.
     """
 
     at: int
@@ -113,6 +116,7 @@ class Snapshot(
     stoppable: tuple[str, ...] = ()
     spontaneous: tuple[str, ...] = ()
     since_asked: int | None = None
+    kept: KeptValues = NOTHING_KEPT
 
     @property
     def active(self) -> bool:

@@ -58,7 +58,11 @@ def sent(umrf: str) -> dict[str, Values]:
 
 
 def _text(value: Any) -> str:
-    text = msgspec.json.encode(_whole(value, MAX_DEPTH)).decode(errors="replace")
+    return shortened(msgspec.json.encode(_whole(value, MAX_DEPTH)).decode(errors="replace"))
+
+
+def shortened(text: str) -> str:
+    """Return the text of a value for people, cut to `LONGEST` characters."""
     return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
 
 

@@ -47,6 +47,7 @@ from action_assistant.runner.links.port import (
 from action_assistant.umrf import semantics
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.kept_values import KeptValues, is_keeper, kept_in
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Returned, Script
 
@@ -105,6 +106,10 @@ def in_this_process(
     return SimulatorLink(
         engine_of(facts, script, performer), clock_us=clock_us, performer=performer
     )
+
+
+def _keeps(node: str, state: str) -> bool:
+    return is_keeper(node) and state == "UNINITIALIZED"
 
 
 def engine_of(
@@ -251,13 +256,28 @@ class SimulatorLink:
                 at=at,
                 graph=name,
                 state=now.state,
-                nodes=dict(now.nodes),
+                nodes={node: state for node, state in now.nodes.items() if not _keeps(node, state)},
                 asked_at=at,
                 run=self._run_of(name),
+                kept=self._kept(name, now.nodes),
             )
             for name, now in self._engine.states().items()
         )
         return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=graphs)
+
+    def _kept(self, graph: str, nodes: Mapping[str, str]) -> KeptValues:
+        """Return the values that the keepers of a graph hold, as a real engine shows them."""
+        inside = self._engine.graphs[graph].nodes
+        held: dict[int, bytes] = {}
+        for node in (each for each, state in nodes.items() if _keeps(each, state)):
+            slots = inside[node].inputs.items()
+            leaves = {
+                name: {"pvf_type": slot.type}
+                | ({"pvf_value": slot.value} if slot.has_value() else {})
+                for name, slot in slots
+            }
+            held[inside[node].instance_id] = msgspec.json.encode(leaves)
+        return kept_in(held)
 
     async def run(self, heard: Callable[[], Awaitable[None]] | None = None) -> None:
         """Run the engine until cancelled. After each batch of reports, wait until `heard` returns;

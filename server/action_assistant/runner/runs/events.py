@@ -70,6 +70,7 @@ class Led(msgspec.Struct, frozen=True, kw_only=True):
     lives: dict[str, str] = {}
     lost: Literal["stop", "wait"] = "stop"
     together: bool = False
+    keeping: tuple[str, ...] = ()
 
 
 class PieceOf(msgspec.Struct, frozen=True, kw_only=True):
@@ -363,7 +364,8 @@ class PieceRest(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A call of a conducted run has its outcome. `how`: by the states of the piece in an answer that
     was asked for after its end, by the word of a person, or because nothing of it was ever sent.
-    `hash`: the SHA-256 of that answer."""
+    `hash`: the SHA-256 of that answer. `outputs`: the values that the action gave, as JSON by flat
+    name, and `unset` those that it did not give; both empty where no answer can show them."""
 
     kind: ClassVar[str] = "run.piece_ended.v1"
 
@@ -376,6 +378,8 @@ class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     hash: str = ""
     by: Author | None = None
     reason: str = ""
+    outputs: dict[str, str] = {}
+    unset: tuple[str, ...] = ()
 
 
 class Held(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):

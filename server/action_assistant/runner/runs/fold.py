@@ -21,6 +21,7 @@ from action_assistant.runner.links.observations import (
     Seen,
     Snapshot,
 )
+from action_assistant.runner.links.parameter_texts import shortened
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Answered,
@@ -66,6 +67,7 @@ from action_assistant.runner.runs.visits import (
     with_possible_pause,
 )
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.kept_values import NOTHING_KEPT
 from action_assistant.umrf.laps import Laps, laps
 
 _SEEN: Final[Callable[[RunEvent], tuple[Seen, ...]]] = attrgetter("seen")  # of `Observed` events
@@ -257,6 +259,8 @@ def is_news(run: Run, shown: Snapshot) -> bool:
     own = shown.graph == run.graph_name
     if shown.state != (run.graph_state if own else run.parts.get(shown.graph)):
         return True
+    if _has_new_values(run, shown):
+        return True
     for node, state in shown.nodes.items():
         action = run.actions.get(key_of(run, shown.graph, node))
         if action is None or action.state != state:
@@ -267,6 +271,12 @@ def is_news(run: Run, shown: Snapshot) -> bool:
         if len(messages) != action.heard or not is_heard(action, messages):
             return True
     return False
+
+
+def _has_new_values(run: Run, shown: Snapshot) -> bool:
+    """Return whether an answer shows other outputs of a piece than are known. Feedback may be old."""
+    is_answer = shown.graph == run.graph_name and shown.source == "get"
+    return is_answer and run.piece is not None and shown.kept != run.kept
 
 
 def thin(run: Run, seen: Iterable[Seen]) -> tuple[Seen, ...]:
@@ -295,7 +305,8 @@ def _thin(run: Run, shown: Snapshot) -> Snapshot:
             if messages:
                 said[node] = messages
     inputs = {name: values for name, values in shown.inputs.items() if name in news}
-    return replace(shown, nodes=news, messages=said, inputs=inputs, same=True)
+    kept = shown.kept if _has_new_values(run, shown) else NOTHING_KEPT
+    return replace(shown, nodes=news, messages=said, inputs=inputs, same=True, kept=kept)
 
 
 def _modified(run: Run, event: ModifyRequested) -> Run:
@@ -382,6 +393,7 @@ def _piece_ended(run: Run, event: PieceEnded) -> Run:
         event.call,
         event.outcome,
         "inferred" if event.how == "word" else "observed",
+        {name: shortened(text) for name, text in event.outputs.items()} or None,
     )
     run = replace(run, actions=run.actions | {event.node: action})
     if event.by is not None:
@@ -469,6 +481,8 @@ def _after_snapshot(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> 
     """Fold a snapshot into the actions of its graph. Failures and sub-graphs come first, since they
     affect the other actions of the same snapshot."""
     own = item.graph == run.graph_name
+    if item.kept != NOTHING_KEPT and _has_new_values(run, item):
+        run = replace(run, kept=item.kept)
     failed = run.failed or not own or "ERROR" in item.nodes.values()
     looked = max(run.looked.get(item.graph, 0), _before(item))
     asked = _asked_at(item)

@@ -18,6 +18,7 @@ from action_assistant.runner.runs.events import (
     PieceRest,
 )
 from action_assistant.runner.runs.visits import ActionRun, Message
+from action_assistant.umrf.kept_values import NOTHING_KEPT, KeptValues
 from action_assistant.umrf.laps import Laps
 
 State: TypeAlias = Literal[
@@ -116,6 +117,9 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     reshaped: bool = False
     failed: bool = False  # an action has failed, or may have in a sub-graph
     stoppable: bool = False  # an arrow or a person may have stopped an action
+    kept: KeptValues = (
+        NOTHING_KEPT  # of a piece: what its action gave, as the newest answer shows it
+    )
     result: str | None = None
     started_at: int | None = None
     ended_at: int | None = None

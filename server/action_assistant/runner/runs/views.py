@@ -54,7 +54,8 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
-    none were seen. `said`: who gave the result by word, where no answer has shown it."""
+    none were seen; `outputs`: likewise those that it gave, where an answer could show them. `said`:
+    who gave the result by word, where no answer has shown it."""
 
     start: datetime
     not_before: datetime
@@ -64,6 +65,7 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     how: How
     inputs: dict[str, str] | None = None
     said: "SaidShown | msgspec.UnsetType" = msgspec.UNSET
+    outputs: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
 
 
 class SaidShown(msgspec.Struct, frozen=True):
@@ -483,6 +485,7 @@ def visit_view(each: Visit, said: SaidShown | msgspec.UnsetType = msgspec.UNSET)
         each.how,
         each.inputs,
         said,
+        msgspec.UNSET if each.outputs is None else each.outputs,
     )
 
 

@@ -66,7 +66,8 @@ class Visit(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     no end was seen) and at `not_after` or earlier (None: as far as is known it may still go on). So
     `until` may lie before `start`: then no moment is known at which it was going on for certain.
     `how` says whether start and result were seen or inferred. `inputs`: the values that the engine
-    reported during the visit; None when nobody saw them.
+    reported during the visit; None when nobody saw them. `outputs`: those that an answer showed after
+    it; None likewise.
     """
 
     start: int
@@ -76,6 +77,7 @@ class Visit(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     result: Outcome | None = None
     how: How = "observed"
     inputs: dict[str, str] | None = None
+    outputs: dict[str, str] | None = None
 
     @property
     def least(self) -> int:
@@ -267,14 +269,17 @@ def after_piece(
     )
 
 
-def after_outcome(action: ActionRun, call: int, outcome: str, how: How) -> ActionRun:
+def after_outcome(
+    action: ActionRun, call: int, outcome: str, how: How, outputs: dict[str, str] | None = None
+) -> ActionRun:
     """Return an action of a conducted run after the call with this number has an outcome. `how`: by
-    an answer of its robot, or else."""
+    an answer of its robot, or else; `outputs`: the values that the answer showed, as texts for
+    people."""
     if action.call != call or not action.visits:  # nothing of it was ever seen
         return action
     last = action.visits[-1]
     known = how if last.how == "observed" else last.how
-    ended = replace(last, result=_OUTCOMES.get(outcome), how=known)
+    ended = replace(last, result=_OUTCOMES.get(outcome), how=known, outputs=outputs)
     return replace(action, visits=_and(action.visits[:-1], ended))
 
 

@@ -21,6 +21,7 @@ from action_assistant.runner.runs.sent_graphs import (
     read_sent,
     tree_of,
 )
+from action_assistant.runner.start.piece_texts import PieceText, texts_of
 from action_assistant.umrf.check import blocking, check, forbids_start, is_final
 from action_assistant.umrf.checks.actors import led_problems
 from action_assistant.umrf.digest import digest
@@ -36,7 +37,7 @@ from action_assistant.umrf.led_subgraphs import (
     subgraph_obstacles,
 )
 from action_assistant.umrf.model import Action, Graph, Problem
-from action_assistant.umrf.pieces import obstacles, piece_name, piece_of
+from action_assistant.umrf.pieces import Obstacle, handed_by, obstacles, piece_name
 from action_assistant.umrf.run_size import RunSize, excess
 from action_assistant.umrf.semantics import SCRIPT, Script, script_from
 
@@ -147,7 +148,8 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     """An admitted start without its graph, which only workers read: the name of the graph, the aid
     of each action by full name, and the text that will be sent, with the identity of the run in it.
     `problems`: at most as many as anybody is shown. `inner`: the names of actions inside of
-    `subgraphs`. `is_led`: these are the actions of one robot, which gets them one by one."""
+    `subgraphs`. `is_led`: these are the actions of one robot, which gets them one by one; `handing`:
+    the arrows by which these hand values to others."""
 
     run: str
     name: str
@@ -163,6 +165,7 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     inner: tuple[str, ...] = ()
     tree_digest: str
     is_led: bool = False
+    handing: tuple[Obstacle, ...] = ()
 
 
 def read_request(body: bytes) -> StartRequest:
@@ -305,24 +308,6 @@ def _placed(text: str) -> tuple[str, dict[str, object] | None]:
     return message, {"path": path}
 
 
-class PieceText(msgspec.Struct, frozen=True):
-    """The text of a piece, in parts between which the id of its run stands. `action`: the one that
-    it sends; `inside`: the graphs inside of it, by name, empty if it stands for none."""
-
-    parts: tuple[str, ...]
-    action: Action
-    inside: dict[str, Graph] = {}
-
-    def for_run(self, run: str) -> str:
-        """Return the text with the id of this run."""
-        return run.join(self.parts)
-
-    def name(self, graph: str, run: str) -> str:
-        """Return the name of the graph in the text for this run. `graph`: the name of the whole
-        graph."""
-        return piece_name(graph, self.action.full_name, run if self.inside else "")
-
-
 class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     """An admitted start of a conducted run: the whole graph, and what robots get of it.
 
@@ -363,9 +348,9 @@ def prepared_pieces(
     return PreparedPieces(
         whole=whole,
         players={name: robot for name, robot in played.items() if robot != SIMULATOR},
-        texts=_texts_of(graph, inside, codec.Stamp(whole.graph_id, request.version, run)),
+        texts=texts_of(graph, inside, codec.Stamp(whole.graph_id, request.version, run)),
         by_robot={
-            robot: _part_of(whole, graph.name, robot, actions, inside)
+            robot: _part_of(whole, graph, robot, actions, inside)
             for robot, actions in by_robot.items()
         },
         problems=tuple(_led_problems(graph, played)),
@@ -373,10 +358,10 @@ def prepared_pieces(
 
 
 def _part_of(
-    whole: Prepared, graph: str, robot: str, actions: Sequence[Action], inside: Inside
+    whole: Prepared, graph: Graph, robot: str, actions: Sequence[Action], inside: Inside
 ) -> Prepared:
     """Return all actions of a robot as one graph without arrows, with the graphs inside of them."""
-    name = piece_name(graph, robot)
+    name = piece_name(graph.name, robot)
     alone = tuple(msgspec.structs.replace(each, actor="") for each in actions)
     within = frozenset[str]().union(*(graphs_within(each, inside) for each in actions))
     return msgspec.structs.replace(
@@ -387,6 +372,7 @@ def _part_of(
         inner_laps={name: laps for name, laps in whole.inner_laps.items() if name in within},
         subgraphs=tuple(each for each in whole.subgraphs if each.name in within),
         is_led=True,
+        handing=handed_by(graph, {each.key for each in actions}),
     )
 
 
@@ -410,21 +396,3 @@ def _led_problems(graph: Graph, played: Mapping[str, str]) -> list[Problem]:
         for each in graph.actions
     )
     return led_problems(msgspec.structs.replace(graph, actions=placed), PINNED)
-
-
-def piece_texts(umrf: str, subgraphs: Sequence[RunSubgraph]) -> dict[str, PieceText]:
-    """Return the pieces of a graph as it was sent, by full name of their action. `subgraphs`: the
-    graphs inside, as they were sent along. For workers."""
-    return _texts_of(codec.read(umrf).graph, graphs_in(subgraphs), codec.stamp_of(umrf))
-
-
-def _texts_of(graph: Graph, inside: Inside, stamp: codec.Stamp) -> dict[str, PieceText]:
-    texts: dict[str, PieceText] = {}
-    for action in graph.actions:
-        if action.missing:
-            continue
-        own = {name: inside[name] for name in sorted(graphs_within(action, inside))}
-        text = codec.write(piece_of(graph, action, (stamp.run or "") if own else ""), stamp)
-        parts = tuple(text.split(stamp.run)) if stamp.run else (text,)
-        texts[action.full_name] = PieceText(parts, action, own)
-    return texts

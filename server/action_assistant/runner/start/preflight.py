@@ -38,7 +38,9 @@ from action_assistant.umrf.check import check, forbids_start, is_final
 from action_assistant.umrf.codes import QUIET
 from action_assistant.umrf.facts import EngineFacts
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.kept_values import KEEPER_PACKAGE, has_keeper
 from action_assistant.umrf.model import Graph, Problem
+from action_assistant.umrf.pieces import Obstacle
 
 Verdict: TypeAlias = Literal["passed", "warned", "blocked"]
 
@@ -574,6 +576,7 @@ def engine_items(view: EngineView, ready: Prepared, prefixes: Sequence[Path]) ->
     return (
         *robot_items(view, graph, pinned.values()),
         *_library_items(view, graph, prefixes),
+        *_value_items(view, ready.handing),
         *(_with_folder(each, view, pinned) for each in subgraph_items(view, pinned)),
         *(_graphs_in_places_of_actions(view, graph, pinned) if ready.is_led else ()),
     )
@@ -596,6 +599,19 @@ def _graphs_in_places_of_actions(
         "the action."
     )
     return (Item(code="subgraphs", verdict="blocked", text=text),)
+
+
+def _value_items(view: EngineView, handing: Sequence[Obstacle]) -> tuple[Item, ...]:
+    """Return the item about values that steps of a conducted run on this robot hand to others: they
+    can be read there only with the helper package. Empty without such values, or with the package."""
+    if not handing or has_keeper(view.index.actions):
+        return ()
+    more = f" (and {len(handing) - 1} more)" if len(handing) > 1 else ""
+    text = (
+        f"{handing[0].text}{more}. A value can be read from {view.name} only with the package "
+        f"{KEEPER_PACKAGE}: download it, build it there, and restart its engine."
+    )
+    return (Item(code="values", verdict="blocked", text=text),)
 
 
 def _library_items(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[Item, ...]:

@@ -16,6 +16,7 @@ from action_assistant.umrf.checks.places import Subject, joined, more
 from action_assistant.umrf.checks.subgraphs import Resolution, SubGraphs, at_action, place_inside
 from action_assistant.umrf.components import Mask, nodes_in, reachable
 from action_assistant.umrf.facts import EngineFacts
+from action_assistant.umrf.kept_values import KEEPER_PACKAGE
 from action_assistant.umrf.laps import repeated
 from action_assistant.umrf.model import (
     ENTRY,
@@ -173,8 +174,8 @@ def _check_arrow(
         return
     if values := _handed_over(subject, relation):
         message = (
-            f"{one} hands {joined(values)} to {other}. An engine does not tell its outputs, so a runner "
-            "that leads the robots cannot hand values from one to another."
+            f"{one} hands {joined(values)} to {other}. A runner that leads the robots can hand values from "
+            f"one to another only where the first one has the package {KEEPER_PACKAGE}."
         )
         subject.report("values-across-robots", "warning", message, relation=relation)
 

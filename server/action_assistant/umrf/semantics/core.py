@@ -38,7 +38,7 @@ from action_assistant.umrf.semantics.trace import (
     NotReady,
 )
 from action_assistant.umrf.semantics.transitions import EFFECTS
-from action_assistant.umrf.semantics.values import RemapUnknown, fill_outputs, hand_over
+from action_assistant.umrf.semantics.values import MISSING, RemapUnknown, fill_outputs, hand_over
 
 #: An action that starts this many times at one instant runs in a loop that takes no time.
 INSTANT_LAPS = 3
@@ -333,7 +333,7 @@ class Core(Clock):
             node.call = replace(
                 PERFORMED,
                 result=returned.result,
-                outputs=returned.outputs,
+                outputs=returned.outputs | dict.fromkeys(returned.unset, MISSING),
                 message=returned.message,
             )
             self._ended(graph, node, _OUTCOMES[returned.result])

@@ -36,14 +36,15 @@ class Call(msgspec.Struct, frozen=True, kw_only=True):
 class Returned(msgspec.Struct, frozen=True, kw_only=True):
     """The end of a call, sent when none of its code runs any more. `result`: one of `OUTCOMES`.
 
-    `outputs`: the values of outputs, of the types that the call named, by flat name. `message`: a
-    text about the end for people.
+    `outputs`: the values of outputs, of the types that the call named, by flat name; `unset`: outputs
+    that are known to have none, others get their default. `message`: a text about the end for people.
     """
 
     number: int
     result: str
     outputs: dict[str, Any] = {}
     message: str | None = None
+    unset: tuple[str, ...] = ()
 
 
 class Performer(Protocol):

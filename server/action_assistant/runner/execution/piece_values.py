@@ -1,0 +1,104 @@
+"""The values that pieces of a conducted run give each other.
+
+The engine of the whole graph holds them: it says with which inputs an action begins, and is told the
+outputs that an answer of the robot showed (`umrf.kept_values`).
+"""
+
+from collections.abc import Collection, Mapping
+from typing import Literal
+
+import msgspec
+
+from action_assistant.runner.execution.conducted_steps import Step
+from action_assistant.runner.runs.events import PieceEnded
+from action_assistant.runner.start.piece_texts import PieceText
+from action_assistant.umrf.kept_values import named
+from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.semantics import Returned
+
+
+class GivenOutputs(msgspec.Struct, frozen=True):
+    """The outputs of a piece that has ended, as `PieceEnded` has them: JSON texts by flat name, and the
+    names of those that the action has not set."""
+
+    values: dict[str, str] = {}
+    unset: tuple[str, ...] = ()
+
+
+class PieceValues:
+    """Fills inputs into the texts of pieces, and reads their outputs. `texts`: by full name of the
+    action; `keeping`: the engines that have the helper package."""
+
+    def __init__(self, texts: Mapping[str, PieceText], keeping: Collection[str]) -> None:
+        self._texts = texts
+        self._keeping = frozenset(keeping)
+        self._said: set[tuple[str, tuple[str, ...]]] = set()
+
+    def text(self, step: Step, piece: str) -> str:
+        """Return the text of a piece of this step. `piece`: its id."""
+        keeps = step.engine in self._keeping
+        return self._texts[step.node].for_run(piece, step.call.inputs, keeps=keeps)
+
+    def tells_false_by_rest(self, step: Step) -> bool:
+        """Return whether the graph of a step goes on after its action has ended with false, and with
+        no other outcome."""
+        return step.engine in self._keeping and self._texts[step.node].taken_on_false
+
+    def why_unknown(self, step: Step) -> str:
+        """Return why the values that a step hands on are not known, as part of a sentence; "" if they
+        are known, or nobody takes them."""
+        if step.run is None or step.engine not in self._keeping:
+            return ""
+        return step.run.kept.wrong if self._texts[step.node].is_taken else ""
+
+    def ended(
+        self, step: Step, outcome: Precondition, how: Literal["shape", "word", "unsent"], at: int
+    ) -> PieceEnded:
+        """Return the event that ends the call of a step at `at` (microseconds UTC)."""
+        given = self._given(step, outcome, how)
+        return PieceEnded(
+            at=at,
+            call=step.call.number,
+            node=step.node,
+            outcome=outcome,
+            how=how,
+            piece=step.run.id if step.run is not None else "",
+            by=step.word.by if step.word is not None else None,
+            reason=step.word.reason if step.word is not None else "",
+            outputs=given.values,
+            unset=given.unset,
+        )
+
+    def lacking(self, ended: PieceEnded) -> str:
+        """Return what a call that has ended has not given, as the end of a sentence; "" where that is
+        nothing, or was said before."""
+        if not ended.unset or ended.how == "unsent" or (ended.node, ended.unset) in self._said:
+            return ""
+        self._said.add((ended.node, ended.unset))
+        names = named(ended.unset)
+        known = (
+            "has ended without giving" if ended.how == "shape" else "has ended, without a sight of"
+        )
+        return f"{known} {names}: nothing is handed on from there."
+
+    def _given(self, step: Step, outcome: Precondition, how: str) -> GivenOutputs:
+        text = self._texts[step.node]
+        names = tuple(each.name for each in text.outputs)
+        if step.run is None or step.engine not in self._keeping or outcome == "on_error":
+            return GivenOutputs()
+        is_known = outcome == "on_true" or (outcome == "on_false" and text.taken_on_false)
+        if how != "shape" or not is_known or step.run.kept.wrong:
+            return GivenOutputs(unset=names if text.is_taken else ())
+        kept = step.run.kept.values
+        values = {each.name: kept[each.place] for each in text.outputs if each.place in kept}
+        return GivenOutputs(values, tuple(name for name in names if name not in values))
+
+
+def returned_of(ended: PieceEnded) -> Returned:
+    """Return the end of a call as the engine of the whole graph takes it."""
+    return Returned(
+        number=ended.call,
+        result="on_true" if ended.outcome == "on_stopped" else ended.outcome,
+        outputs={name: msgspec.json.decode(text) for name, text in ended.outputs.items()},
+        unset=ended.unset,
+    )
