@@ -31,6 +31,7 @@ _ANY: Final[frozenset[Precondition]] = frozenset(PRECONDITIONS)
 _NONE: Final[frozenset[Precondition]] = frozenset()
 _NAMED: Final = 3  # robots, and actions of each, in one sentence
 _DEEPEST: Final = 32  # levels that are looked into
+_BUDGET: Final = 200_000  # states that are examined for a refusal
 
 
 class StatesInside(msgspec.Struct, frozen=True):
@@ -134,13 +135,14 @@ def _who(action: Action, inside: Inside, robots: Mapping[str, str]) -> str:
 
 def _remedy(graph: Graph, inside: Inside) -> str:
     """Return what to do about sub-graphs of several robots, as a sentence."""
-    flat = flattened(graph, inside)
+    flat = flattened(graph, inside, budget=_BUDGET)
     if isinstance(flat, Flattened):
-        return "Flatten this graph (One flat graph …) and start that: it does the same."
+        return "Make one graph without graphs inside of it, and start that: it does the same."
     first = flat.reasons[0]
     place = f"{' › '.join(each.action for each in first.at)}: " if first.at else ""
     return (
-        "One flat graph is not known to do the same, so unpack it or give all of it to one robot. "
+        "That one graph without graphs inside does the same is not known: give all of it to one "
+        "robot, or unpack it. "
         f"{place}{first.message}"
     )
 

@@ -7,11 +7,13 @@ import msgspec
 import pytest
 
 from action_assistant.errors import Conflict
+from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.sent_graphs import SentSubgraph
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest, WordRequest
 from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.hierarchy.extraction import Extracted, extracted
 from action_assistant.umrf.model import Conditions, Graph, Relation
 from runner.execution.test_conductor import Lab, led, refused, shared
 from runner.harness import ANN, BEN, ended, sequence, until, virtual
@@ -242,3 +244,78 @@ async def test_a_sub_graph_of_the_simulator_is_played_with_names_that_robots_hav
         assert [each.graph.name for each in lab.carol.starts] == ["task--Work_1"]
         found = lab.harness.journal.history(run)
         assert found.actions["task__Pick__0/Work_1"].state == "FINISHED"
+
+
+def beside(*actors: str) -> Graph:
+    """`Work_0` starts `Work_1` and `Work_2`, and `Work_3` waits for both; their actors, in this order."""
+    line = shared(sequence("task", 4), *actors)
+    first, one, other, last = (each.key for each in line.actions)
+    pairs = (
+        ("entry", first),
+        (first, one),
+        (first, other),
+        (one, last),
+        (other, last),
+        (last, "exit"),
+    )
+    relations = tuple(
+        Relation(parent=a, child=b, conditions=ALWAYS, parent_order=n, child_order=n)
+        for n, (a, b) in enumerate(pairs)
+    )
+    return msgspec.structs.replace(line, relations=relations)
+
+
+def made(graph: Graph, name: str, *chosen: str) -> tuple[Graph, Graph]:
+    """The graph with a sub-graph of these actions, and that, as somebody makes it in the editor."""
+    keys = [each.key for each in graph.actions if each.full_name in chosen]
+    found = extracted(graph, keys, name, "made00000000")
+    assert isinstance(found, Extracted)
+    assert found.differences == ()
+    return codec.read(codec.write(found.outer)).graph, codec.read(codec.write(found.inner)).graph
+
+
+@virtual
+async def test_three_actions_in_a_row_go_as_one_piece_once_they_are_made_a_sub_graph() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    row = going_on(shared(sequence("task", 5), "Carrier", "Scout", "Scout", "Scout", "Carrier"))
+    outer, inner = made(row, "Round", "Work_1", "Work_2", "Work_3")
+    async with lab.runner() as control:
+        run = (await control.start(sent(outer, inner), ANN)).run.id
+        assert await ended(control, run) == "finished"
+        assert [each.graph.name for each in lab.david.starts] == [f"task--Round_0--v{run}.2"]
+        assert len(lab.carol.starts) == 2
+        found = lab.harness.journal.history(run)
+        assert {name.rpartition("/")[2] for name in found.actions if "/" in name} == {
+            "Work_1",
+            "Work_2",
+            "Work_3",
+        }
+
+
+@virtual
+async def test_what_a_sub_graph_would_take_away_is_said_and_it_does() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    graph = beside("Carrier", "Scout", "Scout", "Carrier")
+    async with lab.runner() as control:
+        why = await refused(control, led(graph))
+        assert "Make a sub-graph of Work_1 and Work_2: then they go as one step." in why
+        outer, inner = made(graph, "Both", "Work_1", "Work_2")
+        run = (await control.start(sent(outer, inner), ANN)).run.id
+        assert await ended(control, run) == "finished"
+        assert len(lab.david.starts) == 1
+
+
+@virtual
+async def test_a_sub_graph_beside_another_action_of_its_robot_is_two_at_once() -> None:
+    lab = Lab({"*": [{"after_s": 2}]})
+    graph = named(beside("Carrier", "Scout", "Scout", "Carrier"), "Work", "Pick")
+    accepted = Override(("two-at-once",), "They are far apart.")
+    async with lab.runner() as control:
+        why = await refused(control, sent(graph, PICK))
+        assert "Pick_0 may run at the same time as Work_2" in why
+        assert "Make a sub-graph" in why
+        run = (await control.start(sent(graph, PICK, override=accepted), ANN)).run.id
+        await until(lambda: len(lab.david.starts) == 2)
+        assert await ended(control, run) == "finished"
+        assert control.open.get(run) is None
+        assert [each.code for each in lab.harness.journal.history(run).alarms] == []

@@ -29,6 +29,7 @@ from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import pointer
 from action_assistant.umrf.laps import Laps, laps
+from action_assistant.umrf.led_steps import as_one_step
 from action_assistant.umrf.led_subgraphs import (
     Inside,
     graphs_within,
@@ -313,7 +314,8 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
 
     `players`: the robot of each action that a robot plays, by full name; `texts`: the pieces;
     `by_robot`: all actions of a robot as one graph without arrows, which is looked at
-    before the start and never sent. `problems`: what leading the graph means.
+    before the start and never sent. `problems`: what leading the graph means; `remedies`: what
+    would take a problem away, by its code, as a sentence.
     """
 
     whole: Prepared
@@ -321,6 +323,7 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     texts: dict[str, PieceText]
     by_robot: dict[str, Prepared]
     problems: tuple[Problem, ...]
+    remedies: dict[str, str] = {}
 
 
 def prepared_pieces(
@@ -340,6 +343,8 @@ def prepared_pieces(
             where={"path": "/umrf", "obstacles": msgspec.to_builtins(hindering[:_MOST_SHOWN])},
         )
     played = players(graph, inside, request.robots)
+    placed = _placed_on(graph, played)
+    problems = led_problems(placed, PINNED)
     by_robot: dict[str, list[Action]] = {}
     for action in graph.actions:
         robot = played.get(action.full_name, SIMULATOR)
@@ -353,7 +358,8 @@ def prepared_pieces(
             robot: _part_of(whole, graph, robot, actions, inside)
             for robot, actions in by_robot.items()
         },
-        problems=tuple(_led_problems(graph, played)),
+        problems=tuple(problems),
+        remedies=as_one_step(placed, problems, PINNED),
     )
 
 
@@ -388,11 +394,11 @@ def _check_robots(robots: Mapping[str, str], actors: Collection[str]) -> None:
             raise BadInput(f"The graph has {who}.", where={"path": pointer("robots", actor)})
 
 
-def _led_problems(graph: Graph, played: Mapping[str, str]) -> list[Problem]:
-    """Return what leading a graph means. `played`: the robot of each action by full name; two actors
-    on one robot count as one, and so do the actions inside of a sub-graph."""
+def _placed_on(graph: Graph, played: Mapping[str, str]) -> Graph:
+    """Return the graph with the robot of each action as its actor. `played`: the robots by full
+    name; two actors on one robot become one, and a sub-graph has one."""
     placed = tuple(
         msgspec.structs.replace(each, actor=played.get(each.full_name, each.actor))
         for each in graph.actions
     )
-    return led_problems(msgspec.structs.replace(graph, actions=placed), PINNED)
+    return msgspec.structs.replace(graph, actions=placed)

@@ -219,13 +219,13 @@ def led_items(ready: PreparedPieces) -> tuple[Item, ...]:
     for code, verdict, text in _LED:
         problems = tuple(each for each in ready.problems if each.code == code)
         if problems:
+            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+            said = (f"{problems[0].message}{more}", text, ready.remedies.get(code, ""))
             found.append(
                 Item(
                     code=code,
                     verdict=verdict,
-                    text=f"{problems[0].message} {text}".rstrip()
-                    if len(problems) == 1
-                    else f"{problems[0].message} (and {len(problems) - 1} more) {text}".rstrip(),
+                    text=" ".join(filter(None, said)),
                     codes=(code,) if verdict == "blocked" else (),
                     overridable=verdict == "blocked",
                     problems=problems[:_SHOWN],

@@ -289,9 +289,12 @@ def _handed(selection: Selection, relation: Relation, inputs: Collection[str]) -
 def _inner(
     selection: Selection, name: str, plan: CutPlan, given: Mapping[tuple[Key, str], Parameter]
 ) -> Graph:
+    shared = _actor(selection)
+
     def without_given(action: Action) -> Action:
         inputs = (_open(p) if (action.key, p.path) in given else p for p in action.inputs)
-        return replace(action, inputs=tuple(inputs))
+        actor = "" if action.actor == shared else action.actor  # the action around it names that
+        return replace(action, inputs=tuple(inputs), actor=actor)
 
     graph = Graph(
         name=name,
@@ -369,6 +372,7 @@ def _labels(graph: Graph) -> Iterator[tuple[str, str]]:
 
 
 def _actor(selection: Selection) -> str:
+    """Return the actor of all chosen actions; "" if they have several, or none."""
     actors = {action.actor for action in selection.chosen.values()}
     return actors.pop() if len(actors) == 1 else ""
 

@@ -169,9 +169,12 @@ class Unextractable(msgspec.Struct, frozen=True, tag="unextractable", tag_field=
 Extraction: TypeAlias = Extracted | Unextractable
 
 
-def extracted(graph: Graph, chosen: Collection[Key], name: str, key: Key) -> Extraction:
+def extracted(
+    graph: Graph, chosen: Collection[Key], name: str, key: Key, *, budget: int | None = None
+) -> Extraction:
     """Move the `chosen` actions into a new graph of this name. `key`: the key of the action that
-    will stand for it."""
+    will stand for it. `budget`: the most states that are examined for each way to cut,
+    as many as `flattened` does without one."""
     reasons = [*_unfit_names(graph, name), *_unfit(graph, chosen)]
     selection = selection_of(graph, chosen)
     if selection.chosen:
@@ -186,7 +189,7 @@ def extracted(graph: Graph, chosen: Collection[Key], name: str, key: Key) -> Ext
         if not isinstance(found, CutGraphs):
             uncut = uncut or found
             continue
-        differences = _differences(graph, found)
+        differences = _differences(graph, found, budget)
         if best is None or len(differences) < len(best.differences):
             best = Extracted(found.inner, found.outer, key, differences)
         if not differences or any(each.code == "undecided" for each in differences):
@@ -234,9 +237,11 @@ def _plans(selection: Selection) -> Iterator[CutPlan]:
     yield CutPlan(closing=False, all_ends=False)
 
 
-def _differences(graph: Graph, found: CutGraphs) -> tuple[FlatteningReason, ...]:
+def _differences(
+    graph: Graph, found: CutGraphs, budget: int | None
+) -> tuple[FlatteningReason, ...]:
     """Return the ways in which both new graphs may behave differently from the old graph."""
-    flat = flattened(found.outer, {found.inner.name: found.inner})
+    flat = flattened(found.outer, {found.inner.name: found.inner}, budget=budget)
     if not isinstance(flat, Flattened):
         return flat.reasons
     keys = {origin.key: origin.levels[-1].key for origin in flat.origins}

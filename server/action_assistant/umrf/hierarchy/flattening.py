@@ -190,15 +190,20 @@ Flattening: TypeAlias = Flattened | Unflattenable
 
 
 def flattened(
-    graph: Graph, graphs: Mapping[str, Graph], known: Container[str] = frozenset()
+    graph: Graph,
+    graphs: Mapping[str, Graph],
+    known: Container[str] = frozenset(),
+    *,
+    budget: int | None = None,
 ) -> Flattening:
     """Return one graph without sub-graphs that runs the same actions in the same order with the
     same values, and ends alike.
 
     `graphs`: the graphs that the engine has indexed, by name. `known`: names of actions, which take
-    precedence over graphs of the same name.
+    precedence over graphs of the same name. `budget`: the most states that are examined,
+    `BUDGET` without one.
     """
-    hierarchy = _Hierarchy(graphs, known)
+    hierarchy = _Hierarchy(graphs, known, BUDGET if budget is None else budget)
     if not any(hierarchy.is_sub(action) for action in graph.actions):
         return Flattened(graph, tuple(_plain(graph)))
     actions = hierarchy.actions_of(graph)
@@ -234,10 +239,10 @@ class _Found(NamedTuple):
 class _Hierarchy:
     """Flattens the graphs of a hierarchy, each only once, wherever it stands."""
 
-    def __init__(self, graphs: Mapping[str, Graph], known: Container[str]) -> None:
+    def __init__(self, graphs: Mapping[str, Graph], known: Container[str], budget: int) -> None:
         self.graphs = graphs
         self.known = known
-        self.budget = BUDGET
+        self.budget = budget
         self._indexed = IndexedGraphs(graphs)
         self._found: dict[str, _Found] = {}
 
