@@ -15,7 +15,7 @@ from pycrdt import Doc, Map
 from table import Table, seconds
 
 from action_assistant.editor.crdt.loading import LogTail, fold_sound, load
-from action_assistant.editor.log.document_events import UPDATED
+from action_assistant.editor.log.graph_events import UPDATED
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal

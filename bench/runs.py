@@ -26,8 +26,7 @@ from action_assistant.runner.analysis.replay import run_replay
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.links.observations import NodeResult, NodeState
 from action_assistant.runner.review.background_loops import due_after
-from action_assistant.runner.review.listing import numbers_with
-from action_assistant.runner.review.stored_runs import StoredRuns
+from action_assistant.runner.review.stored_runs import StoredRuns, numbers_with
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import queries, views

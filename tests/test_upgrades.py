@@ -28,8 +28,7 @@ from action_assistant.journal.databases import database_of, migrate
 from action_assistant.journal.events import nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.lock import own
-from action_assistant.journal.migrate import recognize, revisions_of
-from action_assistant.journal.program_version import last_writer
+from action_assistant.journal.migrate import last_writer, recognize, revisions_of
 from action_assistant.journal.sqlite import inspected
 from action_assistant.version import VERSION, described
 from record_first import answers

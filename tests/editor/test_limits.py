@@ -8,8 +8,8 @@ import pytest
 from pycrdt import Doc, Map
 
 from action_assistant.editor.crdt import document_quota, messages
+from action_assistant.editor.rooms.member import AT_ONCE, PER_MINUTE, ByteRateLimits
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.rate_limits import AT_ONCE, PER_MINUTE, ByteRateLimits
 from action_assistant.editor.rooms.room import Room
 from action_assistant.errors import TooLarge
 from action_assistant.journal.journal import Journal

@@ -18,9 +18,9 @@ from action_assistant.editor.history.restoring import Restoring
 from action_assistant.editor.library.library import Library, LibraryEdits
 from action_assistant.editor.people.invitations import Invitations
 from action_assistant.editor.people.people import People
-from action_assistant.editor.rooms.colours import PersonColours
+from action_assistant.editor.rooms.member import ByteRateLimits
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.rate_limits import ByteRateLimits
+from action_assistant.editor.rooms.presence import PersonColours
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings

@@ -3,7 +3,7 @@
 import logging
 import re
 from collections.abc import Callable
-from typing import Final
+from typing import Final, NamedTuple
 
 from sqlalchemy import Connection, insert, inspect, select
 
@@ -12,9 +12,10 @@ from action_assistant.errors import AnothersDatabase, CannotStart, NewerSchema
 from action_assistant.journal.database import Before, no_copy
 from action_assistant.journal.database import Branch as Branch
 from action_assistant.journal.events import Event
-from action_assistant.journal.program_version import last_writer, sign
+from action_assistant.kit.clock import utc_us
 from action_assistant.schema.branches import BRANCHES, VERSIONS
-from action_assistant.version import described
+from action_assistant.schema.editor_tables import written_by
+from action_assistant.version import VERSION, commit, described
 
 #: The pattern of the names of our revisions, also of later ones; a script's file begins with its name.
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
@@ -137,3 +138,39 @@ def _is_foreign(connection: Connection, current: set[str]) -> bool:
         return True
     columns = {column["name"] for column in inspect(connection).get_columns("event")}
     return not columns >= {*Event.__struct_fields__, "chain"}
+
+
+# The table is the same for both branches.
+_LAST: Final = select(written_by).order_by(written_by.c.since.desc()).limit(1)
+_SHORT: Final = 8
+
+
+class ProgramVersion(NamedTuple):
+    """A version that wrote, and the revision of the tables then. `build`: its commit, "" if unknown."""
+
+    version: str
+    build: str
+    revision: str
+
+    def __str__(self) -> str:
+        return f"{self.version} (commit {self.build[:_SHORT]})" if self.build else self.version
+
+
+def last_writer(connection: Connection) -> ProgramVersion | None:
+    """Return the version that wrote last; None if no version was stored."""
+    if not inspect(connection).has_table(written_by.name):
+        return None
+    row = connection.execute(_LAST).first()
+    return None if row is None else ProgramVersion(row.version, row.build, row.revision)
+
+
+def sign(connection: Connection, revision: str) -> None:
+    """Store that this version writes from now on. Nothing is written if it was the last writer."""
+    if not inspect(connection).has_table(written_by.name):
+        return  # brought to an earlier revision, by a test
+    row = connection.execute(_LAST).first()
+    mine = ProgramVersion(VERSION, commit() or "", revision)
+    if row is not None and (row.version, row.build, row.revision) == mine:
+        return
+    since = max(utc_us(), 0 if row is None else row.since + 1)
+    connection.execute(insert(written_by).values(since=since, **mine._asdict()))

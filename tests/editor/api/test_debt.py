@@ -9,9 +9,8 @@ from action_assistant.editor.api.room import (
     serve_directly,
 )
 from action_assistant.editor.crdt import messages
-from action_assistant.editor.rooms.member import Member
+from action_assistant.editor.rooms.member import AT_ONCE, PER_MINUTE, ByteRateLimits, Member
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.editor.rooms.rate_limits import AT_ONCE, PER_MINUTE, ByteRateLimits
 from action_assistant.editor.rooms.room import Room
 from action_assistant.web.auth.keys import Person
 from editor.client import STREAM

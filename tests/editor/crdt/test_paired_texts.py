@@ -6,12 +6,11 @@ from typing import Any
 import pytest
 from pycrdt import Doc, Text
 
-from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.loading import fold, fold_sound
 from action_assistant.editor.crdt.messages import Malformed, number, text
-from action_assistant.editor.crdt.replica import Replica, ReplicaState, UpdateEffect
+from action_assistant.editor.crdt.replica import EventColumns, Replica, ReplicaState, UpdateEffect
 from action_assistant.editor.crdt.updates.paired_texts import MOST_BYTES
-from action_assistant.editor.log.document_events import UPDATED
+from action_assistant.editor.log.graph_events import UPDATED
 
 
 def written(words: str, *, client: int = 7, clock: int = 0) -> bytes:

@@ -14,7 +14,7 @@ from pycrdt import Doc, Map
 
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.crdt.loading import Loaded, load
-from action_assistant.editor.log.document_events import UPDATED
+from action_assistant.editor.log.graph_events import UPDATED
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Draft, nothing

@@ -14,11 +14,10 @@ from hypothesis import strategies as st
 from pycrdt import Array, Doc, Map, Text, merge_updates
 
 from action_assistant.editor.crdt import loading
-from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.loading import Folded, Stored, fold, fold_sound, stored
-from action_assistant.editor.crdt.replica import Replica, ReplicaState, UpdateEffect
+from action_assistant.editor.crdt.replica import EventColumns, Replica, ReplicaState, UpdateEffect
 from action_assistant.editor.crdt.sound_updates import lies_deep
-from action_assistant.editor.log.document_events import DEFERRED, UPDATED
+from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.web.workers.lanes import Crashed

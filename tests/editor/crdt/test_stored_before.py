@@ -2,11 +2,10 @@
 
 import pytest
 
-from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.loading import fold, fold_sound
 from action_assistant.editor.crdt.messages import NOTHING_NEW, number, text
-from action_assistant.editor.crdt.replica import ReplicaState
-from action_assistant.editor.log.document_events import DEFERRED, UPDATED
+from action_assistant.editor.crdt.replica import EventColumns, ReplicaState
+from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal

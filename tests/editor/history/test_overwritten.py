@@ -13,8 +13,7 @@ from action_assistant.editor.history.change_index import ChangeIndex
 from action_assistant.editor.history.graph_history import history_of
 from action_assistant.editor.history.index_queries import between, overwritten_between
 from action_assistant.editor.history.key_changes import observed, unpacked
-from action_assistant.editor.log.document_events import UPDATED
-from action_assistant.editor.log.graph_events import graph_stream
+from action_assistant.editor.log.graph_events import UPDATED, graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal

@@ -5,7 +5,7 @@ import time
 
 import pytest
 
-from action_assistant.editor.rooms.batch_window import BatchWindow, TurnEnd
+from action_assistant.editor.rooms.batch import BatchWindow, TurnEnd
 
 
 async def test_edits_that_come_together_are_handled_in_one_window() -> None:

@@ -6,7 +6,7 @@ from itertools import combinations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.editor.rooms.colours import NOBODYS, PALETTE, PersonColours, colour_at
+from action_assistant.editor.rooms.presence import NOBODYS, PALETTE, PersonColours, colour_at
 
 #: Surfaces on which people are drawn: those of `frontend/src/ui/tokens.css`, light and dark.
 SURFACES = ("#ffffff", "#f6f7f9", "#f1f3f6", "#fbfcfd", "#12151b", "#191d25", "#1e232d", "#14181f")

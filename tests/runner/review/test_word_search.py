@@ -18,7 +18,7 @@ from action_assistant.journal.databases import database_of
 from action_assistant.journal.journal import Journal
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.review.background_loops import index_words
-from action_assistant.runner.review.listing import numbers_with
+from action_assistant.runner.review.stored_runs import numbers_with
 from action_assistant.runner.runs import queries, word_index
 from action_assistant.runner.runs.events import Author
 from action_assistant.schema.runner_tables import RUNNER, review, run, unindexed_run

@@ -7,10 +7,16 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
-from action_assistant.umrf.hierarchy.extraction import Extracted, behaviour_differences, extracted
+from action_assistant.umrf.hierarchy.extraction import (
+    Extracted,
+    Unpackable,
+    Unpacked,
+    behaviour_differences,
+    extracted,
+    unpacked,
+)
 from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
 from action_assistant.umrf.hierarchy.inlining import under_keys
-from action_assistant.umrf.hierarchy.unpacking import Unpackable, Unpacked, unpacked
 from action_assistant.umrf.model import Conditions, Graph
 from support.doses import examples, is_share
 from umrf.hierarchy.hierarchies import Hierarchy, hierarchies, leaf

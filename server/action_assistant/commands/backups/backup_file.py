@@ -20,8 +20,7 @@ import msgspec
 from action_assistant.commands.backups.progress import Progress
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
-from action_assistant.journal.migrate import revisions_of
-from action_assistant.journal.program_version import ProgramVersion
+from action_assistant.journal.migrate import ProgramVersion, revisions_of
 from action_assistant.private_files import sync
 from action_assistant.schema.branches import BRANCHES
 from action_assistant.version import VERSION, commit, described

@@ -30,8 +30,7 @@ from action_assistant.journal.copies.copying import sentence
 from action_assistant.journal.database import Branch, no_copy
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.lock import own
-from action_assistant.journal.migrate import recognize, revisions_of
-from action_assistant.journal.program_version import last_writer
+from action_assistant.journal.migrate import last_writer, recognize, revisions_of
 from action_assistant.journal.sqlite import inspected, unchanged
 from action_assistant.private_files import opener, sync
 from action_assistant.schema.branches import BRANCHES, VERSIONS

@@ -10,7 +10,7 @@ from action_assistant.editor.interchange.importing import Pieces
 from action_assistant.editor.interchange.rehearsal import Rehearsal, Rehearsing, rehearsed
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
-from action_assistant.umrf.json.embedded import JsonObject
+from action_assistant.umrf.json.text import JsonObject
 from action_assistant.umrf.semantics import Script
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.server.application import BODY_LIMIT

@@ -16,7 +16,7 @@ from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
-from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.version import VERSION, commit
 from action_assistant.web.auth.access import person_of
 from action_assistant.web.auth.keys import PersonRef

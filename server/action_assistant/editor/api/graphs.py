@@ -18,7 +18,7 @@ from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
+from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.application import BODY_LIMIT

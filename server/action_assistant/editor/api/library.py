@@ -22,7 +22,7 @@ from action_assistant.editor.workers import encoded
 from action_assistant.errors import BadInput
 from action_assistant.umrf.action_updates import NO_RENAMES, Renames
 from action_assistant.umrf.difference import Difference
-from action_assistant.umrf.json.embedded import JsonObject
+from action_assistant.umrf.json.text import JsonObject
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.application import BODY_LIMIT
 from action_assistant.web.server.openapi import answer, reads

@@ -14,8 +14,7 @@ from litestar.types import ControllerRouterHandler, Receive, Send
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.log import graph_events as h
-from action_assistant.editor.rooms.member import Member
-from action_assistant.editor.rooms.rate_limits import ByteRateLimits
+from action_assistant.editor.rooms.member import ByteRateLimits, Member
 from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused

@@ -15,7 +15,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.umrf.run_size import MOST_ACTIONS, MOST_INSIDE, excess
 from action_assistant.web.auth.keys import PersonRef
 

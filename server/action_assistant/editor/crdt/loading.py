@@ -13,9 +13,8 @@ import msgspec
 from sqlalchemy import bindparam, select
 
 from action_assistant.editor.crdt.applying import Panicked
-from action_assistant.editor.crdt.event_columns import EventColumns
 from action_assistant.editor.crdt.messages import Malformed
-from action_assistant.editor.crdt.replica import Replica, ReplicaState
+from action_assistant.editor.crdt.replica import EventColumns, Replica, ReplicaState
 from action_assistant.editor.crdt.sound_updates import Uncertain
 from action_assistant.editor.crdt.updates.update_pieces import PIECE_BYTES, pieces_of
 from action_assistant.errors import Refused, Unavailable

@@ -1,12 +1,13 @@
 """A Yjs document in memory that checks each update and tells its effect."""
 
 import asyncio
+import itertools
 import logging
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from enum import Enum
-from typing import Any, Final, Literal
+from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
 from pycrdt import Doc
@@ -21,7 +22,6 @@ from action_assistant.editor.crdt.applying import (
     clocks,
 )
 from action_assistant.editor.crdt.document_quota import DocumentQuota
-from action_assistant.editor.crdt.event_columns import EventColumns, EventRow
 from action_assistant.editor.crdt.messages import NO_CLOCKS, NOTHING_NEW, ByteReader, Malformed
 from action_assistant.editor.crdt.nesting import Nesting
 from action_assistant.editor.crdt.opening_time import OpeningTime
@@ -33,9 +33,77 @@ from action_assistant.editor.crdt.updates.paired_texts import (
 )
 from action_assistant.editor.crdt.updates.update_outline import PairedText, UpdateOutline
 from action_assistant.editor.crdt.updates.update_scan import outline, stored_outline
-from action_assistant.editor.log.document_events import DEFERRED, UPDATED
+from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Event
 from action_assistant.kit.packing import is_packed, packed, unpacked
+
+#: Kind, author and body of an event.
+EventRow: TypeAlias = tuple[str, str, bytes]
+
+
+class EventColumns(msgspec.Struct, frozen=True):
+    """Consecutive events of one stream, column by column. `first`: the seq of the first event.
+
+    Single values would take longer on their way to a worker than being put together.
+    """
+
+    first: int
+    kinds: list[str]
+    authors: list[str]
+    bodies: list[bytes]
+
+    @classmethod
+    def of(cls, events: Iterable[Event]) -> "EventColumns":
+        """Make columns of events, of which there must be at least one."""
+        rows = [(each.seq, each.kind, each.author, each.body) for each in events]
+        seqs, kinds, authors, bodies = (list(column) for column in zip(*rows, strict=True))
+        return cls(seqs[0], kinds, authors, bodies)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        bodies = msgspec.msgpack.encode(self.bodies)
+        return _received, (self.first, self.kinds, self.authors, bodies)
+
+    def __len__(self) -> int:
+        return len(self.kinds)
+
+    def __iter__(self) -> Iterator[EventRow]:
+        return zip(self.kinds, self.authors, self.bodies, strict=True)
+
+    @property
+    def last(self) -> int:
+        """Return the sequence number of the last event."""
+        return self.first + len(self) - 1
+
+    @property
+    def size(self) -> int:
+        """Return the total size of the bodies of all events, in bytes."""
+        return sum(map(len, self.bodies))
+
+    def part(self, start: int, end: int) -> "EventColumns":
+        """Return the events from place `start` up to, and without, place `end`."""
+        some = slice(start, end)
+        return EventColumns(
+            self.first + start, self.kinds[some], self.authors[some], self.bodies[some]
+        )
+
+    def by_kind(self) -> Iterator["EventColumns"]:
+        """Yield runs of consecutive events of one kind, in order."""
+        if self.kinds.count(self.kinds[0]) == len(self):  # as nearly always, and at once
+            yield self
+            return
+        start = 0
+        for _, same in itertools.groupby(self.kinds):
+            end = start + sum(1 for _ in same)
+            yield self.part(start, end)
+            start = end
+
+
+def _received(first: int, kinds: list[str], authors: list[str], bodies: bytes) -> EventColumns:
+    return EventColumns(first, kinds, authors, _BODIES.decode(bodies))
+
+
+_BODIES: Final = msgspec.msgpack.Decoder(list[bytes])
+
 
 log: Final = logging.getLogger(__name__)
 

@@ -20,7 +20,7 @@ from action_assistant.editor.history.merge_origins import (
     merged_by,
     originals,
 )
-from action_assistant.editor.log.document_events import when
+from action_assistant.editor.log.graph_events import when
 from action_assistant.editor.people.people import stored_people
 from action_assistant.errors import NotFound
 from action_assistant.web.auth.keys import PersonRef

@@ -24,7 +24,7 @@ from action_assistant.editor.history.change_summaries import (
     stretch_of,
 )
 from action_assistant.editor.history.key_changes import LoggedChange, owner_of
-from action_assistant.editor.log.document_events import when
+from action_assistant.editor.log.graph_events import when
 from action_assistant.editor.people.people import People
 from action_assistant.errors import BadInput
 from action_assistant.umrf.courses.expected import keyed, scripted_by_key, scripted_by_name

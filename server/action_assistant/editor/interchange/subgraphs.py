@@ -19,11 +19,16 @@ from action_assistant.editor.interchange.edited_text import KeyChange, key_chang
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.file_names import graph_file_name
-from action_assistant.umrf.hierarchy.extraction import Extracted, Extraction, extracted
+from action_assistant.umrf.hierarchy.extraction import (
+    Extracted,
+    Extraction,
+    Unpackable,
+    extracted,
+    unpacked,
+)
 from action_assistant.umrf.hierarchy.flattening import FlatOrigin, LeftOut, Unflattenable, flattened
 from action_assistant.umrf.hierarchy.reasons import FlatteningReason
-from action_assistant.umrf.hierarchy.unpacking import Unpackable, unpacked
-from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.umrf.model import Key, Position
 from action_assistant.umrf.signatures import signature_of
 

@@ -8,8 +8,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.editor.documents.contents import GraphAtSeq, first_action, labels_of, read
-from action_assistant.editor.log.document_events import when
-from action_assistant.editor.log.graph_events import DocumentKind
+from action_assistant.editor.log.graph_events import DocumentKind, when
 from action_assistant.umrf.action_updates import is_like
 from action_assistant.umrf.json.text import parse_small
 from action_assistant.umrf.model import Action, Graph, JsonText, Parameter

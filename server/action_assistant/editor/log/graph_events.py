@@ -6,18 +6,24 @@ document. Everything else about a graph is in `about/ID`; names of people are in
 
 import re
 from collections.abc import Sequence
-from datetime import datetime
+from datetime import UTC, datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
 import msgspec
 from sqlalchemy import Executable, delete, insert, update
 
-from action_assistant.editor.log.document_events import DEFERRED as DEFERRED
-from action_assistant.editor.log.document_events import UPDATED as UPDATED
-from action_assistant.editor.log.document_events import when as when
 from action_assistant.journal.events import Draft, Event
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.roles import Role
+
+UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
+DEFERRED: Final = "graph.deferred.v1"  # one that waits for others, which come later in the log
+
+
+def when(at: int) -> datetime:
+    """Return the datetime, in UTC, of a time in microseconds since 1970."""
+    return datetime.fromtimestamp(at / 1_000_000, UTC)
+
 
 T = TypeVar("T")
 

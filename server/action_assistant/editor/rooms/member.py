@@ -1,17 +1,43 @@
 """One socket in a room: its send queue, its back-pressure and its end (rule R5)."""
 
 import asyncio
+import time
 from collections.abc import Callable
 from enum import Enum
 from functools import lru_cache
 from typing import Final
 
 from action_assistant.editor.crdt import messages
-from action_assistant.editor.rooms.colours import NOBODYS
-from action_assistant.editor.rooms.presence import PresenceNews, PresenceOwner
-from action_assistant.kit.token_bucket import TokenBucket
+from action_assistant.editor.rooms.presence import NOBODYS, PresenceNews, PresenceOwner
+from action_assistant.kit.token_bucket import Clock, TokenBucket, TokenBuckets
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.server.direct import framed
+
+PER_MINUTE: Final = 16 << 20  # bytes, of all sockets of a person
+AT_ONCE: Final = 32 << 20  # bytes: a large graph after a day without a network
+#: Bytes that a presence message counts for at least, so that 200 of them a second are allowed without end.
+_PRESENCE: Final = PER_MINUTE // (60 * 200)
+
+
+class ByteRateLimits:
+    """Counts the bytes that each person sends. Without `limits` it never delays anybody."""
+
+    def __init__(self, *, limits: bool, clock: Clock = time.monotonic) -> None:
+        self._limits = limits
+        self._buckets: Final = TokenBuckets(AT_ONCE, PER_MINUTE / 60, clock)
+
+    def spend_on_presence(self, person: str, size: int) -> float:
+        """Count a presence message of `size` bytes; return as `spend` does."""
+        return self.spend(person, max(size, _PRESENCE))
+
+    def spend(self, person: str, size: int) -> float:
+        """Count `size` bytes that a person sent; return the seconds to wait before more of theirs is read."""
+        if not self._limits:
+            return 0.0
+        bucket = self._buckets.of(person)
+        bucket.spend(size)
+        return bucket.debt()
+
 
 WAITING_FRAMES: Final = 256
 WAITING_BYTES: Final = 1 << 20

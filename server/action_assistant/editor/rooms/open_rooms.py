@@ -7,9 +7,8 @@ from typing import Final
 
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.crdt.loading import load
-from action_assistant.editor.rooms.batch_window import LONGEST, BatchWindow
-from action_assistant.editor.rooms.room import Room
-from action_assistant.editor.rooms.room_metrics import RoomMetrics
+from action_assistant.editor.rooms.batch import LONGEST, BatchWindow
+from action_assistant.editor.rooms.room import Room, RoomMetrics
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.web.auth.caller import outlive_connection

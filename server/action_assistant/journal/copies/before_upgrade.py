@@ -20,7 +20,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Damage, Inspector
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
-from action_assistant.journal.program_version import last_writer
+from action_assistant.journal.migrate import last_writer
 from action_assistant.journal.removal import taken_out
 from action_assistant.journal.sqlite import inspected
 from action_assistant.private_files import make_folder, sync

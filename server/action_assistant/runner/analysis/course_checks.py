@@ -28,7 +28,7 @@ from action_assistant.umrf.courses.coverage import (
 )
 from action_assistant.umrf.courses.expected import check_expected
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.json.embedded import JsonObject
+from action_assistant.umrf.json.text import JsonObject
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import script_from
 from action_assistant.umrf.semantics.script import script_json

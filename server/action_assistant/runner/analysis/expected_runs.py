@@ -29,7 +29,7 @@ from action_assistant.runner.runs.visits import ActionRun, Visit
 from action_assistant.safe_text import hold_names
 from action_assistant.schema.runner_tables import expectation
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
+from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import SCRIPT, script_from, steps
 from action_assistant.umrf.semantics.script import script_json

@@ -27,7 +27,7 @@ from action_assistant.runner.review.stored_runs import CauseShown, Format, Store
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.start.admission import decoded
-from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.server.openapi import FileBytes, answer, reads
 

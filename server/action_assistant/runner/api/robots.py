@@ -37,7 +37,7 @@ from action_assistant.runner.start.preflight import Preflight
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import write_action
-from action_assistant.umrf.json.embedded import JsonObject, UmrfGraph
+from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.server.openapi import FileBytes, answer, reads

@@ -35,8 +35,7 @@ from action_assistant.runner.api.review import json_of
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import ModifyRequest, RestRequest
 from action_assistant.runner.links.port import SIMULATOR
-from action_assistant.runner.review import listing
-from action_assistant.runner.review.stored_runs import StoredRuns
+from action_assistant.runner.review.stored_runs import HistoryEvent, StoredRuns
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run, State
@@ -256,7 +255,7 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
             run: views.summary(opened.run, recorded=opened.recorder.recorded)
             for run, opened in services.control.shown.items()
         }
-        found = await services.worker_queries.text(listing.listed, wanted, limit, open_runs)
+        found = await services.worker_queries.text(StoredRuns.listed, wanted, limit, open_runs)
         return json_of(found, list[views.Listed])
 
     @get("/api/labels", summary="Labels of runs, the most used first", operation_id="listLabels")
@@ -290,7 +289,7 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         summary="A run's events as they are stored (SSE)",
         operation_id="followRun",
         responses={
-            200: answer(listing.HistoryEvent, media="text/event-stream", text="An event each time"),
+            200: answer(HistoryEvent, media="text/event-stream", text="An event each time"),
             204: ResponseSpec(None, description="All of them are known, and no more will come"),
         },
     )
@@ -382,7 +381,7 @@ async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator
         opened = services.control.open.get(run)
         revision = opened.revision if opened is not None else 0
         if await services.worker_queries.newest(run) > after:
-            after, page = await services.worker_queries.value(listing.streamed, run, after)
+            after, page = await services.worker_queries.value(StoredRuns.streamed, run, after)
             yield page
             continue
         if opened is None:

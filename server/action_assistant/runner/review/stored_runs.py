@@ -1,6 +1,6 @@
 """Answers questions about stored runs: sums, causes, comparisons, exports, expected courses. For workers."""
 
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import datetime
 from typing import Any, Final, Literal, TypeAlias
 
@@ -24,7 +24,7 @@ from action_assistant.runner.archives.raw_messages import (
     stream_of_raw,
 )
 from action_assistant.runner.robots.recordings import Recording, hours
-from action_assistant.runner.runs import views
+from action_assistant.runner.runs import queries, views, word_index
 from action_assistant.runner.runs.events import Author, Observed, decode, said_in
 from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.recorder import stream_of
@@ -37,7 +37,7 @@ from action_assistant.umrf.model import Graph
 _LAST: Final = 1_000  # runs in one statistics
 _CAUSES: Final = 10  # in one answer
 _ROWS: Final = 400  # parameters of one query
-_PAGE: Final = 500  # events exported at once
+_PAGE: Final = 500  # events read at once
 _SAYING: Final = 2_000  # events of a run whose texts are searched
 
 Format: TypeAlias = Literal["jsonl", "csv", "mcap"]
@@ -56,6 +56,36 @@ class CauseShown(msgspec.Struct, frozen=True, kw_only=True):
     aid: str | None
     quote: str
     author: Author | None
+
+
+class HistoryEvent(msgspec.Struct, frozen=True):
+    """One stored event, for programs that follow a run."""
+
+    seq: int
+    kind: str
+    author: str
+    at: datetime
+    body: msgspec.Raw
+
+
+async def numbers_with(
+    text: str, rows: Callable[[Select[Any]], Awaitable[Sequence[Row[Any]]]]
+) -> set[int] | None:
+    """Return the numbers of all runs that may contain a text; None if there may be very many."""
+    pieces = word_index.pieces(text)
+    late = await rows(word_index.unindexed()) if pieces else []
+    for piece in pieces if len(late) <= word_index.MOST else []:
+        found = await rows(word_index.holding(piece))
+        if len(found) <= word_index.MOST:
+            # a run is also found by its whole number
+            own = {int(text)} if text.isascii() and text.isdecimal() and len(text) < 19 else set()
+            return {row.number for row in (*found, *late)} | own
+    return None
+
+
+def _event_json(event: Event) -> bytes:
+    at, body = views.time(event.at), msgspec.Raw(event.body)
+    return msgspec.json.encode(HistoryEvent(event.seq, event.kind, event.author, at, body))
 
 
 class StoredRuns:
@@ -265,6 +295,42 @@ class StoredRuns:
             raise Conflict("The run is not over yet.")
         sent = await self._history.requested(wanted.run)
         return expected_runs.of_run(found, sent.umrf, name, author, now, sent.subgraphs)
+
+    async def listed(
+        self,
+        wanted: queries.Filter,
+        limit: int,
+        open_runs: Mapping[str, views.RunSummary],
+    ) -> list[views.Listed]:
+        """Return runs, newest first. `open_runs`: summaries of open runs by id, which the tables do not
+        have."""
+        among = None if wanted.text is None else await numbers_with(wanted.text, self.rows)
+        rows = await self.rows(queries.listed(wanted, limit, among))
+        labels = await self._labels(rows)
+        shown = (
+            views.list_entry(
+                open_runs.get(row.id) or views.summary_of_row(row), row, labels.get(row.id, [])
+            )
+            for row in rows
+        )
+        return [each for each in shown if not wanted.states or each.state in wanted.states]
+
+    async def _labels(self, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
+        found: dict[str, list[str]] = {}
+        if rows:
+            for row in await self.rows(queries.labels_of([row.id for row in rows])):
+                found.setdefault(row.run, []).append(row.label)
+        return found
+
+    async def streamed(self, run: str, after: int) -> tuple[int, bytes]:
+        """Return a page of stored events in the format of an event stream, and the seq of the last
+        one."""
+        events = await self.events(run, after, _PAGE)
+        lines = [
+            b"id: %d\nevent: %b\ndata: %b\n\n" % (each.seq, each.kind.encode(), _event_json(each))
+            for each in events
+        ]
+        return events[-1].seq if events else after, b"".join(lines)
 
     async def expectations(self) -> list[expected_runs.Expectation]:
         """Return all expected courses, by name."""

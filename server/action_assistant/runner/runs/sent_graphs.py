@@ -16,7 +16,7 @@ from action_assistant.runner.links.parameter_texts import sent
 from action_assistant.runner.runs.events import Requested, RunSubgraph
 from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.run_size import MOST_BYTES, MOST_INSIDE
 

@@ -15,7 +15,7 @@ from action_assistant.runner.runs.run import Desired, Result, Run, Said, State
 from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgraphs_shown
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.safe_text import hold_names
-from action_assistant.umrf.json.embedded import UmrfGraph
+from action_assistant.umrf.json.text import UmrfGraph
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
 _WHOLE: Final = 20_000

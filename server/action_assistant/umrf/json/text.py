@@ -10,13 +10,23 @@ import re
 from collections.abc import Iterator
 from itertools import accumulate
 from json.encoder import encode_basestring as quote
-from typing import Final, NoReturn, TypeAlias
+from typing import Annotated, Any, Final, NoReturn, TypeAlias
 
 import msgspec
 
 from action_assistant.safe_text import sentence
 from action_assistant.umrf.json.places import doubled_in, path_at, place_at, places_of
 from action_assistant.umrf.json.places import pointer as pointer
+
+_OBJECT: Final[dict[str, Any]] = {"type": "object", "additionalProperties": True}
+
+#: Any JSON object.
+JsonObject: TypeAlias = Annotated[msgspec.Raw, msgspec.Meta(extra_json_schema=_OBJECT)]
+#: A graph in an answer, with its numbers spelled as they were given.
+UmrfGraph: TypeAlias = Annotated[
+    msgspec.Raw, msgspec.Meta(extra_json_schema={**_OBJECT, "description": "A UMRF graph."})
+]
+
 
 MAX_BYTES: Final = 10 * 1024 * 1024
 MAX_DEPTH: Final = 64
