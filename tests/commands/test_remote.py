@@ -17,7 +17,7 @@ from pycrdt.websocket.websocket import HttpxWebsocket
 
 from action_assistant.cli import main
 from action_assistant.commands.client import Server
-from action_assistant.commands.remote import insisting, verdict
+from action_assistant.commands.remote import insisting, stopped_as, verdict
 from action_assistant.runner.runs.views import RunShown
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
@@ -193,6 +193,59 @@ def test_a_run_is_stopped_and_that_is_proven(product: Product, files: dict[str, 
         assert runner.get(f"/api/runs/{run}").json()["state"] == "stopped"
 
 
+def rested(state: str, by: str | None = None, how: str = "", detail: str = "") -> dict[str, Any]:
+    """Return a run that is over, as the runner shows it. `by`: who saw it at rest."""
+    seen = {"by": {"id": "b", "name": by} if by else None, "at": "", "how": how} if how else None
+    known = {"number": 7, "graph_name": "patrol", "unconfirmed": None}
+    return known | {"state": state, "at_rest": seen, "detail": detail}
+
+
+@pytest.mark.parametrize(
+    ("run", "was_over", "said"),
+    [
+        (rested("stopped"), False, "stopped"),
+        (rested("finished"), False, "run 7 of patrol is at rest: it ended as finished, not by the"),
+        (
+            rested("halted"),
+            False,
+            "run 7 of patrol is at rest: it ended as halted, not by the Stop",
+        ),
+        (
+            rested("error", detail="It failed."),
+            False,
+            "it ended as error, not by the Stop: It failed",
+        ),
+        (rested("refused", detail="No turn."), False, "at rest: nothing of it began: No turn"),
+        (rested("error", "Ben", "I stand there."), False, "Ben saw it at rest (I stand there); no"),
+        (rested("lost", None, "its process ended"), False, "lost. the runner saw it at rest (its"),
+        (
+            rested("stopped", "Ben", "I look."),
+            False,
+            "stopped. Ben saw it at rest (I look); no answer",
+        ),
+        (rested("finished"), True, "run 7 of patrol was over already: finished"),
+        (rested("stopped"), True, "run 7 of patrol was over already: stopped"),
+    ],
+)
+def test_a_stop_says_how_the_run_came_to_rest(
+    run: dict[str, Any], was_over: bool, said: str
+) -> None:
+    words = stopped_as(run, was_over=was_over)
+    assert said in words
+    assert (words == "stopped") == (said == "stopped")
+
+
+def test_a_stop_of_a_run_that_is_over_says_how_it_ended(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    run = product.cli("run", graph, "--script", files["endless"], "--no-wait").stdout.strip()
+    product.cli("stop", run)
+    answer = product.cli("stop", run)
+    assert answer.returncode == 0
+    assert answer.stdout.endswith("was over already: stopped\n")
+
+
 def test_an_id_that_begins_with_a_dash_is_no_option(product: Product) -> None:
     """Earlier versions made such ids, one in 64."""
     for words in (["stop", "-8kdhW2_-qNv"], ["stop", "-8kdhW2_-qNv", "--wait", "1"]):
@@ -240,7 +293,7 @@ def run_shown(state: str, result: str | None, visits: list[str | None]) -> RunSh
     known: dict[str, Any] = dict.fromkeys(RunShown.__struct_fields__)
     known |= {"id": "R", "number": 1, "graph_name": "pair", "digest": "", "engine": "David"}
     known |= {"author": {"id": "A", "name": "Ada"}, "desired": "running", "requested_at": at}
-    known |= {"state": state, "result": result, "detail": "", "alarms": [], "log": []}
+    known |= {"state": state, "result": result, "detail": "", "alarms": [], "log": [], "rests": []}
     known |= dict.fromkeys(("simulated", "recorded", "behaviours"), False)
     action = {"aid": None, "state": "", "visits": shown, "older": 0, "messages": []}
     return msgspec.convert(known | {"actions": {"Work_0": action}}, RunShown)

@@ -16,7 +16,7 @@ from action_assistant.commands.client import (
     print_json,
     running,
 )
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line, told
 
 if TYPE_CHECKING:  # slow to load, and Stop needs none of them
@@ -224,9 +224,11 @@ def _stop(options: argparse.Namespace) -> int:
         path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
         asked = insisting(server, "POST", path)
         others = asked.get("graphs", {})
+        is_over = not asked["runs"] and not options.all
+        ids = [options.run] if is_over and _is_run(server, options.run) else asked["runs"]
         deadline = time.monotonic() + options.wait
         while True:
-            runs = [insisting(server, "GET", f"/api/runs/{run}") for run in asked["runs"]]
+            runs = [insisting(server, "GET", f"/api/runs/{run}") for run in ids]
             robots = insisting(server, "GET", "/api/robots") if others else []
             graphs = _unproven(others, robots)
             settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
@@ -240,9 +242,38 @@ def _stop(options: argparse.Namespace) -> int:
     ]
     for said in doubts:
         print(one_line(said), file=sys.stderr)
+    ends = [stopped_as(run, was_over=is_over) for run in runs if _is_at_rest(run)]
     if not doubts:
-        print("stopped" if runs or others else "nothing was running")
+        ends = ends or ["stopped" if others else "nothing was running"]
+    for said in dict.fromkeys(ends):
+        print(one_line(said))
     return 1 if doubts else 0
+
+
+def _is_run(server: Server, run: str) -> bool:
+    """Return False if this is the id of a group. Raise CannotStart if the server does not answer."""
+    try:
+        insisting(server, "GET", f"/api/runs/{run}")
+    except RequestRefused:
+        return False
+    return True
+
+
+def stopped_as(run: Run, *, was_over: bool) -> str:
+    """Return in words how a run is at rest that somebody wanted to stop: only a run that its robot has
+    proven to be stopped is called that. `was_over`: it had ended before."""
+    named, state = f"run {run['number']} of {run['graph_name']}", run["state"]
+    if seen := run["at_rest"]:
+        who = seen["by"]["name"] if seen["by"] else "the runner"
+        said = f"{who} saw it at rest ({seen['how'].rstrip('.')}); no answer of a robot proves that"
+        return f"{named} is over: {state}. {said}"
+    if was_over:
+        return f"{named} was over already: {state}"
+    if state == "stopped":
+        return "stopped"
+    why = f": {run['detail'].rstrip('.')}" if run["detail"] else ""
+    words = "nothing of it began" if state == "refused" else f"it ended as {state}, not by the Stop"
+    return f"{named} is at rest: {words}{why}"
 
 
 def _unconfirmed(run: Run) -> str:
