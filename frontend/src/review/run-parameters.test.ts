@@ -1,7 +1,7 @@
 /** Values as executed stand beside those that were sent, and what nobody saw is not made up. */
 import { expect, test } from "vitest";
 import type { ActionRun, Visit } from "../api/runs";
-import { parametersOfVisits } from "./run-parameters";
+import { outputsOfVisits, parametersOfVisits } from "./run-parameters";
 
 function visit(inputs: Visit["inputs"]): Visit {
   const at = "2026-11-20T09:00:00Z";
@@ -42,4 +42,14 @@ test("a parameter without a value in a visit is told apart from one that was not
     { parameter: "gone", sent: "5", ran: [null] },
   ]);
   expect(found.visits).toEqual(["Ran with"]);
+});
+
+test("what an action gave is shown by visit, and never as something that was sent", () => {
+  const at = visit({ x: "1" });
+  const gave = (y: string): Visit => ({ ...at, outputs: { y } });
+  const found = outputsOfVisits(action(gave("1"), at, gave("2"), gave("2")));
+  expect(found.visits).toEqual(["Visit 1", "Visits 3–4"]);
+  expect(found.rows).toEqual([{ parameter: "y", ran: ["1", "2"] }]);
+  expect(outputsOfVisits(action(gave("3"))).visits).toEqual(["Gave"]);
+  expect(outputsOfVisits(action(at)).rows).toEqual([]);
 });

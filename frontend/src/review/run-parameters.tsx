@@ -1,4 +1,4 @@
-/** Values as they were sent beside those that the engine reported, visit by visit. */
+/** Values as they were sent beside those that the engine reported, visit by visit, and those that it gave. */
 import type { ActionRun, Run } from "../api/runs";
 import { placesOf, wayWords } from "../status/level-places";
 import { counted } from "../words/counted";
@@ -27,10 +27,10 @@ function Rows({ rows }: { rows: readonly ParameterRow[] }) {
       {rows.map((row) => (
         <tr key={row.parameter}>
           <th scope="row">{row.parameter.replaceAll("::", " / ")}</th>
-          <Value text={row.sent} differs={false} />
+          {row.sent !== undefined && <Value text={row.sent} differs={false} />}
           {row.ran.map((text, i) => (
             // biome-ignore lint/suspicious/noArrayIndexKey: visits only ever grow
-            <Value key={i} text={text} differs={text !== row.sent} />
+            <Value key={i} text={text} differs={row.sent !== undefined && text !== row.sent} />
           ))}
         </tr>
       ))}
@@ -38,10 +38,38 @@ function Rows({ rows }: { rows: readonly ParameterRow[] }) {
   );
 }
 
+/** A table of values: a row for each parameter, a column for each group of visits. */
+function Table({
+  title,
+  columns,
+  rows,
+}: {
+  title: string;
+  columns: readonly string[];
+  rows: readonly ParameterRow[];
+}) {
+  return (
+    <div className={style.scroll}>
+      <table>
+        <thead>
+          <tr>
+            <th>{title}</th>
+            {columns.map((words) => (
+              <th key={words}>{words}</th>
+            ))}
+          </tr>
+        </thead>
+        <Rows rows={rows} />
+      </table>
+    </div>
+  );
+}
+
 function Action(props: { name: string; action: ActionRun; run: Run; onPick: () => void }) {
   const { name, action, run, onPick } = props;
   const words = wayWords(placesOf(run).get(name) ?? { levels: [], name });
   const found = parametersOfVisits(run.sent?.[name] ?? {}, action);
+  const gave = outputsOfVisits(action);
   return (
     <section className={style.action} aria-label={`Parameters of ${words}`}>
       <h2>
@@ -52,20 +80,10 @@ function Action(props: { name: string; action: ActionRun; run: Run; onPick: () =
       {found.rows.length === 0 ? (
         <p className={style.none}>No parameter has a value.</p>
       ) : (
-        <div className={style.scroll}>
-          <table>
-            <thead>
-              <tr>
-                <th>Parameter</th>
-                <th>Sent</th>
-                {found.visits.map((words) => (
-                  <th key={words}>{words}</th>
-                ))}
-              </tr>
-            </thead>
-            <Rows rows={found.rows} />
-          </table>
-        </div>
+        <Table title="Parameter" columns={["Sent", ...found.visits]} rows={found.rows} />
+      )}
+      {gave.rows.length > 0 && (
+        <Table title="Output, as observed" columns={gave.visits} rows={gave.rows} />
       )}
       {found.unseen > 0 && (
         <p className={style.none}>Of {counted(found.unseen, "visit")} nobody saw the values.</p>
@@ -81,7 +99,7 @@ export function RunParameters({ run, selected, onPick }: Props) {
     ([name, action]) =>
       selected !== null ||
       run.sent?.[name] !== undefined ||
-      action.visits.some((visit) => Object.keys(visit.inputs ?? {}).length > 0),
+      action.visits.some((visit) => Object.keys({ ...visit.inputs, ...visit.outputs }).length > 0),
   );
   return (
     <div className={style.parameters}>
@@ -100,8 +118,8 @@ export function RunParameters({ run, selected, onPick }: Props) {
 
 interface ParameterRow {
   parameter: string;
-  /** JSON text; null where it had no value. */
-  sent: string | null;
+  /** JSON text; null where it had no value, and left out for an output, which is never sent. */
+  sent?: string | null;
   /** One for each group of visits. */
   ran: readonly (string | null)[];
 }
@@ -127,20 +145,21 @@ function alike(a: ReportedValues, b: ReportedValues): boolean {
   return names.length === Object.keys(b).length && names.every((name) => a[name] === b[name]);
 }
 
-function groupsOf(action: ActionRun): VisitGroup[] {
+function groupsOf(action: ActionRun, side: "inputs" | "outputs"): VisitGroup[] {
   const groups: VisitGroup[] = [];
   action.visits.forEach((visit, i) => {
-    if (visit.inputs == null) return;
+    const values = visit[side];
+    if (values == null) return;
     const number = action.older + i + 1;
     const before = groups.at(-1);
-    if (before?.last === number - 1 && alike(before.values, visit.inputs)) before.last = number;
-    else groups.push({ first: number, last: number, values: visit.inputs });
+    if (before?.last === number - 1 && alike(before.values, values)) before.last = number;
+    else groups.push({ first: number, last: number, values });
   });
   return groups;
 }
 
-function wordsOf(group: VisitGroup, only: boolean): string {
-  if (only) return "Ran with";
+function wordsOf(group: VisitGroup, only: string | null): string {
+  if (only !== null) return only;
   return group.first === group.last
     ? `Visit ${group.first}`
     : `Visits ${group.first}–${group.last}`;
@@ -149,9 +168,9 @@ function wordsOf(group: VisitGroup, only: boolean): string {
 const MOST = 12; // groups of visits side by side; the newest
 
 export function parametersOfVisits(sent: ReportedValues, action: ActionRun): ParametersOfVisits {
-  const groups = groupsOf(action).slice(-MOST);
+  const groups = groupsOf(action, "inputs").slice(-MOST);
   const names = new Set([...Object.keys(sent), ...groups.flatMap((g) => Object.keys(g.values))]);
-  const only = groups.length === 1 && action.older + action.visits.length === 1;
+  const only = groups.length === 1 && action.older + action.visits.length === 1 ? "Ran with" : null;
   return {
     rows: [...names].sort().map((parameter) => ({
       parameter,
@@ -160,5 +179,19 @@ export function parametersOfVisits(sent: ReportedValues, action: ActionRun): Par
     })),
     visits: groups.map((group) => wordsOf(group, only)),
     unseen: action.visits.filter((visit) => visit.inputs == null).length,
+  };
+}
+
+/** Return the outputs that answers showed, by visit; no rows where none were seen. */
+export function outputsOfVisits(action: ActionRun): Pick<ParametersOfVisits, "rows" | "visits"> {
+  const groups = groupsOf(action, "outputs").slice(-MOST);
+  const names = new Set(groups.flatMap((group) => Object.keys(group.values)));
+  const only = groups.length === 1 && action.older + action.visits.length === 1 ? "Gave" : null;
+  return {
+    rows: [...names].sort().map((parameter) => ({
+      parameter,
+      ran: groups.map((group) => group.values[parameter] ?? null),
+    })),
+    visits: groups.map((group) => wordsOf(group, only)),
   };
 }

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from action_assistant.cli import main
+from action_assistant.umrf.kept_values import KEEPER_PACKAGE
 from commands.packages.trees import ONE, everything
 
 GRAPH: dict[str, Any] = {
@@ -182,3 +183,15 @@ def test_text_of_a_description_steers_no_terminal(
     told = capsys.readouterr().err
     assert "\x1b" not in told
     assert len(told.splitlines()) == 1
+
+
+def test_the_package_that_keeps_values_needs_no_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = ["--output", str(tmp_path / "out")]
+    assert main(["package", "--values", *output]) == 0
+    assert f"{KEEPER_PACKAGE}/src/{KEEPER_PACKAGE}.cpp" in everything(tmp_path / "out")
+    capsys.readouterr()
+    for more in (["--name", "Look"], ["--together", "both"], [str(tmp_path / "graph.json")]):
+        assert main(["package", "--values", *more, *output]) == 1
+        assert "a package of its own" in capsys.readouterr().err

@@ -9,8 +9,10 @@ import httpx
 import pytest
 
 from action_assistant.umrf.files import codec
+from action_assistant.umrf.kept_values import KEEPER_PACKAGE, has_keeper, keeper
 from action_assistant.umrf.packages.choosing import distinct_actions
 from action_assistant.umrf.packages.generating import package_files
+from action_assistant.umrf.signatures import signature_of
 from editor.process import Editor
 
 
@@ -109,3 +111,15 @@ def test_earlier_packages_can_be_had_and_a_graph_without_any_says_so(editor: Edi
         assert http.get(f"/api/graphs/{empty['id']}/packages.zip").status_code == 404
         assert http.get(f"/api/graphs/{empty['id']}/packages?at=99").status_code == 409
         assert http.get("/api/graphs/nothing/packages").status_code == 404
+
+
+def test_the_package_that_keeps_values_needs_no_graph(http: httpx.Client) -> None:
+    answer = http.get("/api/values-package.zip")
+    assert answer.status_code == 200
+    assert f'filename="{KEEPER_PACKAGE}.zip"' in answer.headers["content-disposition"]
+    with zipfile.ZipFile(io.BytesIO(answer.content)) as found:
+        files = {name: found.read(name) for name in found.namelist()}
+    wanted = package_files(keeper())
+    assert files == {f"{KEEPER_PACKAGE}/{path}": content for path, content in wanted.items()}
+    read = codec.read_action(files[f"{KEEPER_PACKAGE}/{KEEPER_PACKAGE}.umrf.json"]).action
+    assert has_keeper({read.name: signature_of(read)})

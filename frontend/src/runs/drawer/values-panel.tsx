@@ -56,8 +56,21 @@ export function ValuesPanel({ run, graph, aid }: Props) {
           </div>
         ))}
       </dl>
-      {found.values.length === 0 && <p>No value of it is known.</p>}
+      {found.values.length + found.gave.length === 0 && <p>No value of it is known.</p>}
       {onlySent && <p>These values were sent; the values that it runs with were not seen.</p>}
+      {found.gave.length > 0 && (
+        <>
+          <p>It gave, as observed:</p>
+          <dl>
+            {found.gave.map(({ name, text }) => (
+              <div key={name} data-from="ran">
+                <dt>{name}</dt>
+                <dd title={text}>{text}</dd>
+              </div>
+            ))}
+          </dl>
+        </>
+      )}
       {found.said !== null && <blockquote>“{found.said}”</blockquote>}
       {found.after.length > 0 && (
         <p className={style.after}>
@@ -92,6 +105,8 @@ interface BeganAfter {
 export interface ActionValues {
   readonly name: string;
   readonly values: readonly KnownValue[];
+  /** Outputs that an answer showed after its last visit. */
+  readonly gave: readonly Omit<KnownValue, "from">[];
   readonly said: string | null;
   readonly after: readonly BeganAfter[];
 }
@@ -138,17 +153,18 @@ export function valuesOf(
   const [name, action] = found;
   const last = action.visits.at(-1);
   const ran = last?.inputs ?? null;
-  const values = Object.entries(ran ?? sent?.[name] ?? {}).map(
-    ([parameter, text]): KnownValue => ({
+  const shown = (values: Readonly<Record<string, string>>) =>
+    Object.entries(values).map(([parameter, text]) => ({
       name: parameter.replaceAll("::", " / "),
       text: valueText(text),
-      from: ran === null ? "sent" : "ran",
-    }),
-  );
+    }));
+  const from = ran === null ? "sent" : "ran";
+  const values = shown(ran ?? sent?.[name] ?? {}).map((each): KnownValue => ({ ...each, from }));
   const begun = last ? visitBegin(last) : null;
   return {
     name,
     values,
+    gave: shown(last?.outputs ?? {}),
     said: action.messages.at(-1)?.text ?? null,
     after: beganAfter(run, graph, aid, begun),
   };

@@ -36,6 +36,9 @@ const WAITING: Readonly<Record<string, string>> = {
   courses: "It goes as expected",
 };
 
+/** The package with which a robot shows the outputs of actions. */
+const VALUES_PACKAGE = "/api/values-package.zip";
+
 const SIGNS = { passed: IconCheck, warned: IconAlertTriangle, blocked: IconX } as const;
 const READ = { passed: "Fine", warned: "Note", blocked: "In the way" } as const;
 
@@ -70,6 +73,15 @@ function Line({ item, look, moment }: PreflightLineProps) {
           <IndexWriting item={item} look={look} robot={look.engine} {...moment} />
         )}
         <InsideRemedies item={item} look={look} {...moment} />
+        {item.code === "values" && item.verdict === "blocked" && (
+          <a
+            className={style.remedy}
+            href={serverPath(VALUES_PACKAGE)}
+            download="zz_keep_values.zip"
+          >
+            <IconDownload size={14} aria-hidden /> The package zz_keep_values (ZIP)
+          </a>
+        )}
       </span>
     </li>
   );
