@@ -1,4 +1,4 @@
-"""Runs on several emulated robots are led over real rclpy: outcomes, Stops, and a robot that is frozen.
+"""Runs on several emulated robots are led over real rclpy: courses, outcomes and Stops.
 
 `TEST_LED_GRAPHS` is how many random graphs are led (default 2), from the seed `TEST_LED_FROM` on.
 """
@@ -7,9 +7,11 @@ import os
 import random
 import sys
 import time
+from collections import Counter
 from collections.abc import AsyncIterator
 from contextlib import ExitStack, asynccontextmanager
-from typing import Any
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 import anyio
 import msgspec
@@ -21,13 +23,24 @@ pytest.importorskip(
 
 from action_assistant.errors import Refused
 from action_assistant.runner.emulator.messages import EngineTraits
+from action_assistant.runner.emulator.node import EmulatorNode
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override, PieceEnded
+from action_assistant.umrf.model import Graph
+from action_assistant.umrf.semantics import Behaviour, GraphRefused
 from ros.robots import robot
-from runner.execution.test_conducted_courses import drawn
+from runner.execution.test_conducted_courses import (
+    Seen,
+    as_long_as_seen,
+    as_seen,
+    course_of,
+    drawn,
+    is_near,
+    played,
+)
 from runner.execution.test_conductor import shared
 from runner.harness import ANN, BEN, MemoryJournal, at_once, order, sequence
 
@@ -36,6 +49,7 @@ FROM = int(os.environ.get("TEST_LED_FROM", "1"))
 NAMES = {"A": "Ann", "B": "Bob", "C": "Cy"}
 ACCEPTED = Override(("two-at-once", "stop-across"), "They are far apart.")
 LOSSLESS = EngineTraits(loss=0.0)
+_CLOSE_MS = 3.0  # between two ends whose order only the robots know
 
 pytestmark = pytest.mark.timeout(0 if GRAPHS > 5 else 180)
 
@@ -45,28 +59,39 @@ def clock_us() -> int:
     return time.time_ns() // 1000
 
 
+class Led(NamedTuple):
+    """A runner that may lead some robots. `seen` records the course of the run that is started next."""
+
+    control: ExecutionService
+    journal: MemoryJournal
+    robots: tuple[EmulatorNode, ...]
+    seen: Seen
+
+
 @asynccontextmanager
-async def led(
-    domains: list[int], scripts: dict[str, Any]
-) -> AsyncIterator[tuple[ExecutionService, MemoryJournal]]:
+async def led(domains: list[int], scripts: dict[str, Any]) -> AsyncIterator[Led]:
     """Open a runner that may lead three robots, each on a domain of its own."""
-    with ExitStack() as robots_:
-        for domain, name in zip(domains, NAMES.values(), strict=False):
-            script = scripts.get(name, scripts.get("*"))
-            robots_.enter_context(robot(domain, script, name=name, quirks=LOSSLESS))
+    seen = Seen()
+    with ExitStack() as opened, seen.listening:
+        nodes = tuple(
+            opened.enter_context(
+                robot(domain, scripts.get(name, scripts.get("*")), name=name, quirks=LOSSLESS)
+            )
+            for domain, name in zip(domains, NAMES.values(), strict=False)
+        )
         reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(domains[0])})
         assert not isinstance(reach, str), reach
         robots, journal = Robots(reach=reach), MemoryJournal()
         try:
             async with ExecutionService.opened(
-                journal, robots, clock_us=clock_us, run_in_worker=at_once
+                journal, robots, clock_us=clock_us, run_in_worker=at_once, simulator=seen.made
             ) as control:
                 for domain, name in zip(domains, NAMES.values(), strict=False):
                     await control.register(Registration(name=name, domain=domain, led=True), ANN)
                 with anyio.fail_after(30):
                     while any(robots.robot(each).state != "answering" for each in NAMES.values()):  # noqa: ASYNC110
                         await anyio.sleep(0.05)
-                yield control, journal
+                yield Led(control, journal, nodes, seen)
         finally:
             with anyio.CancelScope(shield=True):
                 await reach.aclose()
@@ -80,48 +105,85 @@ async def over(control: ExecutionService, run: str, seconds: float) -> bool:
     return run not in control.open
 
 
-def test_outcomes_are_those_of_the_robots(domains: list[int]) -> None:
-    counts = {"outcomes": 0, "stopped": 0, "runs": 0}
+async def led_through(scene: Led, seed: int, count: Counter[str]) -> None:
+    """Lead a random graph, compare its course with that of the whole graph on one engine, and count."""
+    graph, drawn_calls = drawn(seed)
+    calls = {
+        name: [Behaviour(after_s=each[0].after_s / 10, result=each[0].result, stop_s=0.05)] * 6
+        for name, each in drawn_calls.items()
+    }
+    try:
+        _, engine = played(graph, calls)
+    except GraphRefused:
+        count["refused"] += 1
+        return
+    if engine.crashed or engine.locked:
+        count["an engine would abort"] += 1
+        return
+    for node in scene.robots:  # what the code of their actions does from now on
+        node.robot._engine.script.behaviours.update((k, tuple(v)) for k, v in calls.items())
+    control, seen = scene.control, scene.seen
+    seen.course.clear()
+    seen.results.clear()
+    robots = {each.actor: NAMES[each.actor] for each in graph.actions}
+    asked = order(graph, engine="conducted", robots=robots, lost="wait", override=ACCEPTED)
+    try:
+        run = (await control.start(asked, ANN)).run.id
+    except Refused as refused:
+        count[f"not offered: {refused.detail}"] += 1
+        return
+    count[f"led on {len(set(robots.values()))} robots"] += 1
+    is_over = await over(control, run, 8)
+    held = scene.journal.history(run).held
+    if not is_over:
+        await control.stop(run, BEN)
+        assert await over(control, run, 20), (seed, scene.journal.history(run))
+    for each in scene.journal.told(run):
+        if isinstance(each, PieceEnded) and each.outcome != "on_stopped":
+            assert each.outcome == calls[each.node][0].result, (seed, each)
+            count["outcomes"] += 1
+    assert held is None, (seed, held)
+    count[compared(seed, graph, calls, seen) if is_over else "stopped, as it had no end"] += 1
 
-    async def lead(seed: int) -> None:
-        graph, calls = drawn(seed)
-        quick = {
-            name: [{"after_s": each[0].after_s / 10, "result": each[0].result, "stop_s": 0.05}]
-            for name, each in calls.items()
-        }
-        async with led(domains, {"*": quick}) as (control, journal):
-            actors = {each.actor for each in graph.actions}
-            request = order(
-                graph,
-                engine="conducted",
-                robots={actor: NAMES[actor] for actor in actors},
-                override=ACCEPTED,
-            )
-            try:
-                run = (await control.start(request, ANN)).run.id
-            except Refused:
-                return
-            counts["runs"] += 1
-            if not await over(control, run, 8):
-                await control.stop(run, BEN)
-                counts["stopped"] += 1
-                assert await over(control, run, 15), journal.history(run)
-            for each in journal.told(run):
-                if isinstance(each, PieceEnded) and each.outcome != "on_stopped":
-                    assert each.outcome == calls[each.node][0].result, (seed, each)
-                    counts["outcomes"] += 1
 
-    for seed in range(FROM, FROM + GRAPHS):
-        anyio.run(lead, seed)
-    sys.stdout.write(f"\n{counts}\n")
-    assert counts["outcomes"]
+def compared(seed: int, graph: Graph, calls: dict[str, list[Behaviour]], seen: Seen) -> str:
+    """Compare a course with that of the whole graph on one engine; return what was found."""
+    course = as_seen(seen.course)
+    again, _ = played(graph, calls | as_long_as_seen(course))
+    whole, results = course_of(again)
+    if any(visit[2] == "on_stopped" for visits in course.values() for visit in visits):
+        return "stopped by an arrow"
+    ends = sorted(end for visits in course.values() for _, end, _ in visits if end is not None)
+    if any(later - end < _CLOSE_MS for end, later in pairwise(ends)):
+        return "two ends at one moment"
+    assert is_near(whole, course), (seed, whole, course)
+    assert results == seen.results, (seed, results, seen.results)
+    return "same course"
+
+
+def test_a_led_graph_takes_the_course_of_the_whole_graph(domains: list[int]) -> None:
+    count: Counter[str] = Counter()
+    failed: list[str] = []
+
+    async def main() -> None:
+        async with led(domains, {}) as scene:
+            for seed in range(FROM, FROM + GRAPHS):
+                try:
+                    await led_through(scene, seed, count)
+                except AssertionError as fault:
+                    failed.append(f"seed {seed}: {fault}")
+
+    anyio.run(main)
+    sys.stdout.write(f"\nseeds {FROM} to {FROM + GRAPHS - 1}: {dict(count)}\n")
+    assert failed == []
+    assert count["outcomes"]
 
 
 def test_a_robot_that_never_obeys_delays_no_other_robots_stop(domains: list[int]) -> None:
     scripts = {"Ann": {"*": [{"never": True, "ignores_stop": True}]}, "*": {"*": [{"never": True}]}}
 
     async def main() -> None:
-        async with led(domains, scripts) as (control, journal):
+        async with led(domains, scripts) as (control, journal, _, _):
             line = shared(sequence("both", 2), "A", "B")
             first, second = (each.key for each in line.actions)
             entry = next(each for each in line.relations if each.parent == "entry")

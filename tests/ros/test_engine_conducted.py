@@ -8,15 +8,11 @@ Figures are printed with `-s`.
 """
 
 import itertools
-import json
 import os
 import random
-import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import AsyncIterator
-from contextlib import asynccontextmanager
 from pathlib import Path
 
 import anyio
@@ -27,118 +23,22 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Registration
-from action_assistant.runner.links.ros2.availability import ros2_reach
-from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import PieceEnded
-from action_assistant.umrf.model import Conditions, Graph, Parameter, Relation
-from runner.harness import ANN, BEN, MemoryJournal, at_once, order, sequence
-from support.real_engine import PROGRAM, needs_engine
+from action_assistant.umrf.model import Relation
+from ros.led_engines import ALWAYS, Engines, as_led, over, relay
+from runner.harness import ANN, BEN
+from support.real_engine import needs_engine
 
 OUTCOMES = int(os.environ.get("TEST_LED_OUTCOMES", "24"))
 LAPS = int(os.environ.get("TEST_LED_LAPS", "10"))
 STOPS = int(os.environ.get("TEST_LED_STOPS", "3"))
 DOMAIN = int(os.environ.get("TEST_LED_DOMAIN", "180"))
-ALWAYS = Conditions(on_true="run", on_false="run", on_error="run")
 
 pytestmark = [needs_engine, pytest.mark.timeout(0)]
 
 
-def clock_us() -> int:
-    """Microseconds UTC."""
-    return time.time_ns() // 1000
-
-
-class Engines:
-    """Two real engines, and what the code of their actions wrote down."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self.names = {"Ann": DOMAIN, "Bob": DOMAIN + 1}
-
-    def lines(self) -> list[tuple[float, str, str]]:
-        """Return when which code did what: (seconds UTC, begin or end …, action), oldest first."""
-        found: list[tuple[float, str, str]] = []
-        for name in self.names:
-            path = self.folder / f"truth-{name}"
-            for line in path.read_text().splitlines() if path.exists() else ():
-                second, _, what, action, _ = line.split()
-                found.append((float(second), what, action))
-        return sorted(found)
-
-    @asynccontextmanager
-    async def led(self) -> AsyncIterator[tuple[ExecutionService, MemoryJournal]]:
-        """Open a runner that may lead both."""
-        engines = []
-        for name, domain in self.names.items():
-            command = [sys.executable, str(PROGRAM), name, str(domain), "--indexing-rate", "0"]
-            command += ["--truth", str(self.folder / f"truth-{name}")]
-            with (self.folder / f"engine-{name}.log").open("w") as log:
-                engines.append(subprocess.Popen(command, stdout=log, stderr=log))  # noqa: ASYNC220
-        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(DOMAIN)})
-        assert not isinstance(reach, str), reach
-        robots, journal = Robots(reach=reach), MemoryJournal()
-        try:
-            async with ExecutionService.opened(
-                journal, robots, clock_us=clock_us, run_in_worker=at_once
-            ) as control:
-                for name, domain in self.names.items():
-                    await control.register(Registration(name=name, domain=domain, led=True), ANN)
-                with anyio.fail_after(60):
-                    while any(robots.robot(name).state != "answering" for name in self.names):  # noqa: ASYNC110
-                        await anyio.sleep(0.05)
-                yield control, journal
-        finally:
-            with anyio.CancelScope(shield=True):
-                await reach.aclose()
-            for engine in engines:
-                engine.kill()
-                engine.wait()
-
-
-def relay(name: str, works: list[tuple[float, str]]) -> Graph:
-    """`OxWork` on Scout and Carrier in turn, each with its delay in seconds and its result."""
-    line = sequence(name, len(works))
-    actions = tuple(
-        msgspec.structs.replace(
-            each,
-            name="OxWork",
-            actor=("Scout", "Carrier")[number % 2],
-            inputs=(
-                Parameter("delay", json.dumps({"pvf_type": "number", "pvf_value": delay})),
-                Parameter("result", json.dumps({"pvf_type": "string", "pvf_value": result})),
-            ),
-        )
-        for number, (each, (delay, result)) in enumerate(zip(line.actions, works, strict=True))
-    )
-    relations = tuple(
-        each if each.parent == "entry" else msgspec.structs.replace(each, conditions=ALWAYS)
-        for each in line.relations
-    )
-    return msgspec.structs.replace(line, actions=actions, relations=relations)
-
-
-def led(graph: Graph, **more: object) -> object:
-    """A start in which Scout is Ann and Carrier is Bob."""
-    robots = {"Scout": "Ann", "Carrier": "Bob"}
-    return order(graph, engine="conducted", graph=None, robots=robots, **more)
-
-
-async def over(control: ExecutionService, run: str, seconds: float) -> str:
-    """Wait for the end of a run."""
-    with anyio.move_on_after(seconds):
-        while run in control.open:  # noqa: ASYNC110
-            await anyio.sleep(0.02)
-    assert run not in control.open, "\n".join(
-        f"{o.run.id} {o.run.state} {o.run.graph_state} {o.watch.trouble} {o.run.alarms} {[(a.state, a.visits) for a in o.run.actions.values()]}"
-        for o in control.open.values()
-    )
-    return (await control.find(run)).state
-
-
 def test_each_outcome_is_that_of_the_code(tmp_path: Path) -> None:
-    engines = Engines(tmp_path)
+    engines = Engines(tmp_path, DOMAIN)
     kinds = list(itertools.product((0.0, 0.004, 0.03, 0.25), ("on_true", "on_false", "on_error")))
     wrong: list[str] = []
     handed: list[float] = []
@@ -148,7 +48,7 @@ def test_each_outcome_is_that_of_the_code(tmp_path: Path) -> None:
         async with engines.led() as (control, journal):
             for n in range(-(-OUTCOMES // len(kinds))):
                 works = random.Random(n).sample(kinds, len(kinds))
-                run = (await control.start(led(relay(f"relay{n}", works)), ANN)).run.id
+                run = (await control.start(as_led(relay(f"relay{n}", works)), ANN)).run.id
                 state = await over(control, run, 25)
                 ends = [e for e in journal.told(run) if isinstance(e, PieceEnded)]
                 count[state] += 1
@@ -161,9 +61,9 @@ def test_each_outcome_is_that_of_the_code(tmp_path: Path) -> None:
 
     anyio.run(main)
     lines = engines.lines()
-    ends = [line for line in lines if line[1] == "end"]
-    for second, _, _ in ends:
-        begun = next((line[0] for line in lines if line[1] == "begin" and line[0] > second), None)
+    begins = [line.second for line in lines if line.what == "begin"]
+    for second in [line.second for line in lines if line.what == "end"]:
+        begun = next((each for each in begins if each > second), None)
         if begun is not None and begun - second < 1.5:  # else the next run
             handed.append(1000 * (begun - second))
     handed.sort()
@@ -177,7 +77,7 @@ def test_each_outcome_is_that_of_the_code(tmp_path: Path) -> None:
 
 
 def test_one_name_is_started_again_and_again(tmp_path: Path) -> None:
-    engines = Engines(tmp_path)
+    engines = Engines(tmp_path, DOMAIN)
     graph = relay("carousel", [(0.02, "on_true"), (0.02, "on_false")])
     first, second = (each.key for each in graph.actions)
     back = Relation(parent=second, child=first, conditions=ALWAYS, required=False)
@@ -186,7 +86,7 @@ def test_one_name_is_started_again_and_again(tmp_path: Path) -> None:
 
     async def main() -> None:
         async with engines.led() as (control, journal):
-            run = (await control.start(led(loop), ANN)).run.id
+            run = (await control.start(as_led(loop), ANN)).run.id
             with anyio.fail_after(10 + 3 * LAPS):
                 while sum(isinstance(e, PieceEnded) for e in journal.told(run)) < 2 * LAPS:
                     assert run in control.open, journal.history(run)
@@ -195,7 +95,7 @@ def test_one_name_is_started_again_and_again(tmp_path: Path) -> None:
             assert await over(control, run, 20) == "stopped"
             ended = time.time()
             await anyio.sleep(1)
-            assert [line for line in engines.lines() if line[0] > ended] == []
+            assert [line for line in engines.lines() if line.second > ended] == []
             outcomes = Counter(
                 (e.node, e.outcome) for e in journal.told(run) if isinstance(e, PieceEnded)
             )
@@ -211,7 +111,7 @@ def test_one_name_is_started_again_and_again(tmp_path: Path) -> None:
 
 
 def test_no_code_runs_after_a_stop_was_proven(tmp_path: Path) -> None:
-    engines = Engines(tmp_path)
+    engines = Engines(tmp_path, DOMAIN)
     took: list[float] = []
     late: list[str] = []
 
@@ -220,7 +120,7 @@ def test_no_code_runs_after_a_stop_was_proven(tmp_path: Path) -> None:
             for n in range(STOPS):
                 chance = random.Random(n)
                 works = [(chance.uniform(0.1, 0.6), "on_true") for _ in range(6)]
-                run = (await control.start(led(relay(f"halt{n}", works)), ANN)).run.id
+                run = (await control.start(as_led(relay(f"halt{n}", works)), ANN)).run.id
                 await anyio.sleep(chance.uniform(0.0, 1.5))
                 pressed = time.time()
                 await control.stop(run, BEN)
@@ -230,7 +130,7 @@ def test_no_code_runs_after_a_stop_was_proven(tmp_path: Path) -> None:
                 await anyio.sleep(0.8)
                 late.extend(
                     f"{run} {state}: {what} of {action} {second - ended:.3f} s later"
-                    for second, what, action in engines.lines()
+                    for second, what, action, _ in engines.lines()
                     if second > ended
                 )
 

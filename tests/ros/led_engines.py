@@ -1,0 +1,163 @@
+"""Real engines that one runner of this process leads, and what the code of their actions wrote down.
+
+Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the program that starts it.
+"""
+
+import json
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import NamedTuple
+
+import anyio
+import msgspec
+
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.start.admission import StartRequest
+from action_assistant.umrf.model import Action, Conditions, Graph, Parameter
+from runner.harness import ANN, MemoryJournal, at_once, order, sequence
+from support.real_engine import PROGRAM
+
+ALWAYS = Conditions(on_true="run", on_false="run", on_error="run")
+#: The robot of each actor.
+PLAYERS = {"Scout": "Ann", "Carrier": "Bob", "Guard": "Cy"}
+
+
+def clock_us() -> int:
+    """Microseconds UTC."""
+    return time.time_ns() // 1000
+
+
+class Line(NamedTuple):
+    """What the code of an action did: at `second` UTC, `what` (begin, end, stop …), in this process."""
+
+    second: float
+    what: str
+    action: str
+    pid: int
+
+
+class Engines:
+    """Real engines by robot, each on a domain of its own, and what the code of their actions did."""
+
+    def __init__(self, folder: Path, domain: int, count: int = 2) -> None:
+        self.folder = folder
+        self.domain = domain
+        self.names = {name: domain + n for n, name in enumerate([*PLAYERS.values()][:count])}
+        self.processes: dict[str, subprocess.Popen[bytes]] = {}
+
+    def lines(self) -> list[Line]:
+        """Return what the code of all actions did, oldest first."""
+        found: list[Line] = []
+        for name in self.names:
+            path = self.folder / f"truth-{name}"
+            for line in path.read_text().splitlines() if path.exists() else ():
+                second, pid, what, action, _ = line.split()
+                found.append(Line(float(second), what, action, int(pid)))
+        return sorted(found)
+
+    def start(self, name: str) -> None:
+        """Start the engine of a robot."""
+        command = [sys.executable, str(PROGRAM), name, str(self.names[name])]
+        command += ["--indexing-rate", "0", "--truth", str(self.folder / f"truth-{name}")]
+        with (self.folder / f"engine-{name}.log").open("a") as log:
+            self.processes[name] = subprocess.Popen(command, stdout=log, stderr=log)
+
+    def kill(self, name: str) -> None:
+        """Kill the engine of a robot (SIGKILL)."""
+        self.processes[name].kill()
+        self.processes[name].wait()
+
+    def freeze(self, name: str) -> None:
+        """Freeze the engine of a robot (SIGSTOP)."""
+        self.processes[name].send_signal(signal.SIGSTOP)
+
+    def thaw(self, name: str) -> None:
+        """Let a frozen engine go on (SIGCONT)."""
+        self.processes[name].send_signal(signal.SIGCONT)
+
+    def dead(self) -> list[str]:
+        """Return the robots whose engine has ended."""
+        return [name for name, each in self.processes.items() if each.poll() is not None]
+
+    def end(self) -> None:
+        """Kill all engines."""
+        for name in self.processes:
+            self.kill(name)
+
+    @asynccontextmanager
+    async def led(self) -> AsyncIterator[tuple[ExecutionService, MemoryJournal]]:
+        """Open a runner that may lead them."""
+        for name in self.names:
+            self.start(name)
+        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(self.domain)})
+        assert not isinstance(reach, str), reach
+        robots, journal = Robots(reach=reach), MemoryJournal()
+        try:
+            async with ExecutionService.opened(
+                journal, robots, clock_us=clock_us, run_in_worker=at_once
+            ) as control:
+                for name, domain in self.names.items():
+                    await control.register(Registration(name=name, domain=domain, led=True), ANN)
+                with anyio.fail_after(60):
+                    while any(robots.robot(name).state != "answering" for name in self.names):  # noqa: ASYNC110
+                        await anyio.sleep(0.05)
+                yield control, journal
+        finally:
+            with anyio.CancelScope(shield=True):
+                await reach.aclose()
+            self.end()
+
+
+def working(like: Action, actor: str, delay: float, result: str = "on_true") -> Action:
+    """Return `OxWork` that takes `delay` seconds and ends in this outcome."""
+    return msgspec.structs.replace(
+        like,
+        name="OxWork",
+        actor=actor,
+        inputs=(
+            Parameter("delay", json.dumps({"pvf_type": "number", "pvf_value": delay})),
+            Parameter("result", json.dumps({"pvf_type": "string", "pvf_value": result})),
+        ),
+    )
+
+
+def relay(name: str, works: list[tuple[float, str]], count: int = 2) -> Graph:
+    """`OxWork` on the robots in turn, each with its delay in seconds and its result."""
+    line = sequence(name, len(works))
+    actors = [*PLAYERS]
+    actions = tuple(
+        working(each, actors[number % count], *work)
+        for number, (each, work) in enumerate(zip(line.actions, works, strict=True))
+    )
+    relations = tuple(
+        each if each.parent == "entry" else msgspec.structs.replace(each, conditions=ALWAYS)
+        for each in line.relations
+    )
+    return msgspec.structs.replace(line, actions=actions, relations=relations)
+
+
+def as_led(graph: Graph, **more: object) -> StartRequest:
+    """A start in which the runner leads the robots of the graph's actors."""
+    robots = {actor: PLAYERS[actor] for actor in sorted({each.actor for each in graph.actions})}
+    return order(graph, engine="conducted", graph=None, robots=robots, **more)
+
+
+async def over(control: ExecutionService, run: str, seconds: float) -> str:
+    """Wait for the end of a run, and return its state."""
+    with anyio.move_on_after(seconds):
+        while run in control.open:  # noqa: ASYNC110
+            await anyio.sleep(0.02)
+    assert run not in control.open, "\n".join(
+        f"{each.run.id} {each.run.state} {each.run.graph_state} {each.watch.trouble} "
+        f"{each.run.alarms} {[(a.state, a.visits) for a in each.run.actions.values()]}"
+        for each in control.open.values()
+    )
+    return (await control.find(run)).state
