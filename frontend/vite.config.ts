@@ -102,6 +102,35 @@ function pageVersion(): Plugin {
   };
 }
 
+/** Properties by the first part of a utility that the scale of `ui/utilities.css` makes. */
+const SCALED: Readonly<Record<string, string>> = {
+  ...{ gap: "gap", w: "width", h: "height", z: "z-index", rounded: "border-radius" },
+  ...{ m: "margin", mt: "margin-top", mb: "margin-bottom", ml: "margin-left", mr: "margin-right" },
+  ...{ p: "padding", pt: "padding-top", pb: "padding-bottom", pl: "padding-left" },
+  pr: "padding-right",
+  ...{ "min-w": "min-width", "min-h": "min-height", "max-w": "max-width", "max-h": "max-height" },
+  ...{ top: "top", bottom: "bottom", left: "left", right: "right" },
+};
+
+/** Return the declaration of a utility such as `p-50-75` or `min-h-44px`; null for other names. */
+function scaled(name: string): string | null {
+  const [, start = "", sizes = ""] =
+    /^([a-z]+(?:-[wh])?)((?:-(?:[\d_]+(?:px)?|auto|full))+)$/.exec(name) ?? [];
+  const property = SCALED[start];
+  if (property === undefined) return null;
+  const lengths = sizes
+    .slice(1)
+    .split("-")
+    .map((size) => {
+      const number = size.replace("_", ".");
+      if (size === "auto" || size.endsWith("px") || size === "0") return number;
+      if (size === "full") return "100%";
+      if (start === "z") return number;
+      return start === "rounded" ? `${number}px` : `${Number(number) / 100}rem`;
+    });
+  return `${property}: ${lengths.join(" ")};`;
+}
+
 /**
  * Replaces `@apply row gap-50;` in stylesheets by the declarations of these classes of `ui/utilities.css`:
  * rules stay short, and neither the cascade nor the size of the code changes.
@@ -117,8 +146,8 @@ function applyUtilities(): Plugin {
       if (!id.endsWith(".css")) return null;
       return code.replace(/@apply ([^;]+);/g, (_, names: string) =>
         names.replace(/\S+/g, (name) => {
-          const body = utilities.get(name);
-          if (body === undefined) throw new Error(`${id} applies ${name}, which is no utility.`);
+          const body = utilities.get(name) ?? scaled(name);
+          if (body === null) throw new Error(`${id} applies ${name}, which is no utility.`);
           return body;
         }),
       );
