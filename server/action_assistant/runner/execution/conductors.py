@@ -1,8 +1,11 @@
 """Opens conducted runs: new ones, and those that an earlier process left."""
 
-from collections.abc import Mapping
+import logging
+from collections.abc import Iterable, Mapping
 from typing import Final, Literal
 from weakref import WeakValueDictionary
+
+import msgspec
 
 from action_assistant.errors import Conflict
 from action_assistant.runner.execution.conducted_steps import (
@@ -17,6 +20,7 @@ from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.piece_values import returned_of
 from action_assistant.runner.execution.run_loop import OpenRun
+from action_assistant.runner.execution.unread_runs import UNREAD, UnreadRun
 from action_assistant.runner.links.led_calls import LedCourse
 from action_assistant.runner.links.simulator import LeadableLink, Simulator
 from action_assistant.runner.robots.registry import Robots
@@ -26,15 +30,18 @@ from action_assistant.runner.runs.events import (
     PieceEnded,
     Published,
     Requested,
+    Silent,
     StopRequested,
     decode,
 )
-from action_assistant.runner.runs.history import RunHistory
+from action_assistant.runner.runs.history import LeftRun, RunHistory, piece_id
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.start.piece_texts import PieceText, piece_texts
 from action_assistant.umrf.semantics import Returned
+
+log: Final = logging.getLogger(__name__)
 
 _PAGE: Final = 500  # events read at once
 
@@ -87,20 +94,14 @@ class Conductors:
             left=left,
         )
         opened = self._runs.open(run, conductor, owns_link=True, seq=seq, pressed=conductor.close)
-        conductor.leads(
-            Leading(
-                tell=opened.tell,
-                stored=opened.recorder.flushed,
-                stop=lambda author: opened.stop(author, ""),
-                rests=opened.rests_as,
-            )
-        )
+        conductor.leads(_leading(opened))
         self._open[run.id] = conductor
         return opened
 
     async def take_up(self, run: Run, seq: int) -> None:
         """Lead a run further that an earlier process left. Nothing begins until a person lets it go
-        on; what the robots still do is followed. Raise Unavailable if the journal cannot be read."""
+        on; what the robots still do is followed. Raise Unavailable if the journal cannot be read,
+        msgspec.DecodeError or another Refused if what it has of the run cannot be."""
         first = await self._history.requested(run.id)
         left = await _left_open(self._history, first, run)
         texts = await self._runtime.run_in_worker(piece_texts, first.umrf, first.subgraphs)
@@ -109,6 +110,34 @@ class Conductors:
             self._open[run.id].hold("The runner was restarted while it led this run.")
         self._runs.drive(opened)
 
+    async def follow_unread(self, run: Run, seq: int) -> None:
+        """Follow the pieces of a run that an earlier process left and that cannot be led further, since
+        some of its events cannot be read. Raise Unavailable if the journal cannot be read."""
+        log.error("run %s: some of its events cannot be read; its pieces are followed", run.id)
+        pieces, lacking = await self._history.pieces(run.id)
+        link = UnreadRun(run, lacking, runs=self._runs, clock_us=self._runtime.clock_us)
+        opened = self._runs.open(run, link, owns_link=True, seq=seq, pressed=link.close)
+        link.leads(_leading(opened))
+        at = self._runtime.clock_us()
+        opened.alarm("led_unread", link.why)
+        if run.unknown_since is None:
+            opened.tell(Silent(at, at, link.why))
+        for piece in pieces:
+            link.follow(piece.run, piece.seq, self._robots, is_whole=piece.is_whole)
+        self._runs.drive(opened)
+
+    def follow_pieces(self, run: str, pieces: Iterable[LeftRun]) -> None:
+        """Follow the pieces of a run of which nothing can be read, each as a run of its own."""
+        log.error("run %s: nothing of it can be read; its pieces are followed", run)
+        for piece in pieces:
+            if piece.run.end is None:
+                link = self._robots.link(piece.run.engine)
+                opened = self._runs.open(piece.run, link, owns_link=False, seq=piece.seq)
+                opened.alarm("led_unread", f"{UNREAD}, of which this is an action. Stop it.")
+                if not piece.is_whole:
+                    opened.lose("Some of what was recorded of this action cannot be read.")
+                self._runs.drive(opened)
+
     def _engine_for(self, first: Requested) -> LeadableLink:
         led = frozenset(first.led.players if first.led is not None else ())
         return self._simulator(CONDUCTED_FACTS, first.script, self._runtime.clock_us, led=led)
@@ -116,13 +145,16 @@ class Conductors:
     async def go_on(self, run: str, author: Author) -> None:
         """Let a held run go on. Raise Conflict if nothing can lead it any more, or one of its robots
         may begin no piece."""
-        await self._open[run].go_on(author)
+        conductor = self._open.get(run)
+        if conductor is None:
+            raise Conflict(f"{UNREAD}: only Stop is left.")
+        await conductor.go_on(author)
 
     def give_word(self, run: str, node: str, word: Word) -> None:
         """Take the outcome of an action from a person. Raise Conflict if it is not asked for."""
         conductor = self._open.get(run)
         if conductor is None:
-            raise Conflict("Only the outcome of an action in a conducted run can be given.")
+            raise Conflict("Only the outcome of an action in a run that is led can be given.")
         conductor.give_word(node, word)
 
     def _see(self, opened: OpenRun) -> None:
@@ -132,6 +164,15 @@ class Conductors:
             conductor = self._open.get(piece.run)
             if conductor is not None:
                 conductor.moves_again(opened)
+
+
+def _leading(opened: OpenRun) -> Leading:
+    return Leading(
+        tell=opened.tell,
+        stored=opened.recorder.flushed,
+        stop=lambda author: opened.stop(author, ""),
+        rests=opened.rests_as,
+    )
 
 
 async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpen:
@@ -152,18 +193,18 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
                     calls[call] = sent
                 case PieceEnded(at=at, call=call, how=how, piece=piece) as ended:
                     if how == "word":
-                        unproven = (await history.left(piece))[0]
+                        unproven = (await history.left(piece))[0] or unproven
                     calls.pop(call, None)
                     ends.append((at, returned_of(ended)))
                 case StopRequested(at=at):
                     ends.append((at, "stop"))
     pieces: dict[int, tuple[Run, int]] = {}
     for call, number in calls.items():
-        run, seq, _ = await history.left(f"{first.run}.{number}")
+        run, seq = await _left_piece(history, first.run, number)
         if run is not None:
             pieces[call] = run, seq
     while True:  # those that were sent, and not noted any more
-        run, seq, _ = await history.left(f"{first.run}.{sent + 1}")
+        run, seq = await _left_piece(history, first.run, sent + 1)
         if run is None or run.piece is None:
             break
         sent += 1
@@ -177,3 +218,12 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
         states={name: each.state for name, each in now.actions.items() if each.robot},
         unproven=unproven,
     )
+
+
+async def _left_piece(history: RunHistory, run: str, number: int) -> tuple[Run | None, int]:
+    """Return a piece that an earlier process left and the seq of its last event; None if none was
+    stored. Raise msgspec.DecodeError if some of its events cannot be read."""
+    piece, seq, is_whole = await history.left(piece_id(run, number))
+    if seq and (piece is None or not is_whole):
+        raise msgspec.DecodeError(f"Some events of {piece_id(run, number)} cannot be read.")
+    return piece, seq

@@ -48,6 +48,7 @@ from action_assistant.runner.start.idempotency import StopOrder
 from action_assistant.runner.start.indexing import IndexingWords
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
+from action_assistant.umrf.files.codec import Unreadable
 from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.workers.lanes import RunInWorker
@@ -396,6 +397,9 @@ class ExecutionService:
             self.robots.add(registration_of(row))
         for row in await self._runtime.journal.query(queries.open_runs()):
             run, seq, is_whole = await self.history.left(row.id)
+            if run is None:
+                pieces, _ = await self.history.pieces(row.id)
+                self._conductors.follow_pieces(row.id, pieces)
             if run is None or run.end is not None:
                 log.error("run %s: table and events differ; `rebuild` mends the table", row.id)
                 continue
@@ -406,8 +410,14 @@ class ExecutionService:
         """Follow a run that an earlier process left open; nothing of the run is started. `seq` is
         the number of its last stored event; `is_whole` says that all of its events could be
         read."""
-        if run.led is not None and not run.simulated and is_whole:
-            await self._conductors.take_up(run, seq)
+        if run.led is not None and not run.simulated:
+            try:
+                if is_whole:
+                    await self._conductors.take_up(run, seq)
+                    return
+            except (Unreadable, msgspec.DecodeError):
+                log.exception("run %s: what leads it cannot be read", run.id)
+            await self._conductors.follow_unread(run, seq)
             return
         link = self.robots.link(run.engine)
         opened = self._runs.open(run, link, owns_link=False, seq=seq)

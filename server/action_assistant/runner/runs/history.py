@@ -1,6 +1,7 @@
 """Reads runs from the journal: those that are over, and those that an earlier process left open."""
 
 from collections.abc import Awaitable, Callable, Sequence
+from itertools import count
 from typing import Any, Protocol, TypeAlias
 
 import msgspec
@@ -26,6 +27,14 @@ class RunnerJournal(Store, Protocol):
 #: Reads a run that is over, and the seq of its last event. The flag asks for the run with all visits; without
 #: it, only with those that people are shown. Raises NotFound.
 Past: TypeAlias = Callable[[str, bool], Awaitable[tuple[Run, int]]]
+
+
+class LeftRun(msgspec.Struct, frozen=True):
+    """A stored run, the seq of its last event, and whether all of its events could be read."""
+
+    run: Run
+    seq: int
+    is_whole: bool
 
 
 class RunHistory:
@@ -58,6 +67,22 @@ class RunHistory:
         events_read = [event for event in read if event is not None]
         return replay(events_read), events[-1].seq if events else 0, len(events_read) == len(read)
 
+    async def pieces(self, run: str) -> tuple[list[LeftRun], list[str]]:
+        """Return the pieces of a conducted run in the order in which they began, and the ids of those
+        of which nothing can be read. Raise Unavailable while the journal cannot be read."""
+        found: list[LeftRun] = []
+        lacking: list[str] = []
+        for number in count(1):
+            id_ = piece_id(run, number)
+            piece, seq, is_whole = await self.left(id_)
+            if not seq:
+                break
+            if piece is None or piece.piece is None:
+                lacking.append(id_)
+            else:
+                found.append(LeftRun(piece, seq, is_whole))
+        return found, lacking
+
     async def run(self, run: str) -> Run:
         """Return a run as people are shown it. Raise NotFound if there is no such run."""
         if self._past is not None:
@@ -88,6 +113,11 @@ class RunHistory:
         """Return the rows that a query of the tables selects. Raise Unavailable if the journal
         cannot be read."""
         return await self._journal.query(statement)
+
+
+def piece_id(run: str, number: int) -> str:
+    """Return the id of the piece of this number in a conducted run, the first being 1."""
+    return f"{run}.{number}"
 
 
 def _decoded(event: Event) -> RunEvent | None:
