@@ -32,7 +32,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended
-from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal
+from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal, whole_of
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.views import time
@@ -201,9 +201,9 @@ class ExecutionService:
         """Begin to stop a run, or all runs of a group, and return the ids of the runs that are
         being stopped. The list is empty if the run is over already. The call waits only to look
         up an id that is not open. Raise NotFound if there is no such run or group."""
-        piece = self.open[run].run.piece if run in self.open else None
-        if piece is not None and piece.run in self.open:  # nothing of its run shall go on
-            run = piece.run
+        whole = whole_of(run)
+        if whole in self.open:  # nothing of the run of this piece shall go on
+            run = whole
         if run in self.open:
             return [run] if self._stop(run, author, stop_id) else []
         group = [each for each, opened in tuple(self.open.items()) if opened.run.group == run]
@@ -223,17 +223,17 @@ class ExecutionService:
     async def pause(self, run: str, author: Author) -> Run:
         """Pause a run. Raise NotFound if there is no such run, Conflict if it cannot be paused now,
         Unavailable if the message could not be sent."""
-        return await interventions.pause(await self._movable(run), author)
+        return await interventions.pause(_no_piece(await self._movable(run)), author)
 
     async def resume(self, run: str, author: Author) -> Run:
         """Resume a paused run. Raise NotFound if there is no such run, Conflict if it is not
         paused, Unavailable if the message could not be sent."""
-        return await interventions.resume(await self._movable(run), author)
+        return await interventions.resume(_no_piece(await self._movable(run)), author)
 
     async def modify(self, run: str, body: bytes, author: Author) -> Run:
         """Give a run another version of its graph; `body` is an encoded ModifyRequest. Raise
         NotFound if there is no such run, and what `interventions.modify` raises."""
-        opened = await self._movable(run)
+        opened = _no_piece(await self._movable(run))
         engine = self.robots.link(opened.run.engine)
         return await interventions.modify(
             opened,
@@ -287,8 +287,9 @@ class ExecutionService:
     async def _movable(self, run: str) -> OpenRun:
         opened = self.open.get(run)
         if opened is None or opened.run.end is not None:
-            state = opened.run.state if opened is not None else (await self._over(run)).state
-            raise Conflict(f"The run is over: {state}.")
+            over = opened.run if opened is not None else await self._over(run)
+            what = "run" if not whole_of(run) else f"part of run {whole_of(run)} that this names"
+            raise Conflict(f"The {what} is over: {over.state}.")
         return opened
 
     # --- what there is ------------------------------------------------------------------------
@@ -314,13 +315,16 @@ class ExecutionService:
             opened.run.simulated if opened is not None else (await self._over(run)).simulated
         )
 
-    async def _over(self, run: str) -> Row[Any]:
-        """Return `state` and `simulated` of a run from the table. Raise NotFound if there is no
-        such run, Unavailable if the journal cannot be read."""
+    async def _over(self, run: str) -> "Row[Any] | Run":
+        """Return a run that is over, at least with its `state` and `simulated`; a piece has no row in
+        the table. Raise NotFound if there is no such run, Unavailable if the journal cannot be
+        read."""
         rows = await self._runtime.journal.query(queries.of_run(run))
-        if not rows:
-            raise NotFound("There is no such run.")
-        return rows[0]
+        if rows:
+            return rows[0]
+        if whole_of(run):
+            return await self.history.run(run)
+        raise NotFound("There is no such run.")
 
     def robot_views(self) -> list[Robot]:
         """Return all engines as people see them, the simulator first."""
@@ -427,3 +431,15 @@ class ExecutionService:
             log.error("run %s: some of its events cannot be read", run.id)
             opened.lose("Some of what was recorded of this run cannot be read.")
         self._runs.drive(opened)
+
+
+def _no_piece(opened: OpenRun) -> OpenRun:
+    """Return the run unless it is a piece: whoever leads that alone gives it orders."""
+    piece = opened.run.piece
+    if piece is not None:
+        raise Conflict(
+            f"This is {piece.node} in run {piece.run}, which is led: it can be stopped, not paused or "
+            "changed.",
+            where={"path": "/run", "run": piece.run},
+        )
+    return opened

@@ -120,6 +120,13 @@ def piece_id(run: str, number: int) -> str:
     return f"{run}.{number}"
 
 
+def whole_of(run: str) -> str:
+    """Return the id of the conducted run of which this run is a piece, going by its id; "" if it is
+    none."""
+    whole, _, number = run.rpartition(".")
+    return whole if number.isascii() and number.isdecimal() else ""
+
+
 def _decoded(event: Event) -> RunEvent | None:
     try:
         return decode(event.kind, event.body)
