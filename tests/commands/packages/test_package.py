@@ -193,5 +193,5 @@ def test_the_package_that_keeps_values_needs_no_file(
     assert f"{KEEPER_PACKAGE}/src/{KEEPER_PACKAGE}.cpp" in everything(tmp_path / "out")
     capsys.readouterr()
     for more in (["--name", "Look"], ["--together", "both"], [str(tmp_path / "graph.json")]):
-        assert main(["package", "--values", *more, *output]) == 1
+        assert main(["package", "--values", *more, *output]) == 2
         assert "a package of its own" in capsys.readouterr().err
