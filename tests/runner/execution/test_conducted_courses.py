@@ -1,12 +1,14 @@
 """A conducted run takes the course of its whole graph: random graphs, on robots that lose messages."""
 
+import json
 import random
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import ExitStack, suppress
 from typing import Any
 
 import anyio
+import msgspec
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -16,11 +18,13 @@ from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.observations import GraphResult, NodeResult, NodeState
-from action_assistant.runner.links.port import Order, Registration, Report, Transitions
+from action_assistant.runner.links.port import Answer, Order, Registration, Report, Transitions
 from action_assistant.runner.links.simulator import SimulatorLink, in_this_process
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs.events import Override, PieceEnded
+from action_assistant.runner.runs.events import Override, PieceEnded, RunEvent
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.kept_values import handing, keeper
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -29,7 +33,9 @@ from action_assistant.umrf.model import (
     Action,
     Conditions,
     Graph,
+    Parameter,
     Relation,
+    Remap,
 )
 from action_assistant.umrf.semantics import (
     Behaviour,
@@ -41,6 +47,8 @@ from action_assistant.umrf.semantics import (
     Script,
     Trace,
 )
+from action_assistant.umrf.semantics.parts import Node, Running
+from action_assistant.umrf.semantics.values import MISSING, slots_of
 from runner.harness import (
     ANN,
     BEN,
@@ -55,6 +63,8 @@ from support.doses import examples
 
 #: By action: its visits in order, each with its begin and end in ms, and its outcome.
 Course = dict[str, list[tuple[float, float | None, str | None]]]
+#: By action: the values that it had at the begin of each visit.
+Taken = dict[str, list[dict[str, Any]]]
 ACCEPTED = Override(("two-at-once", "stop-across"), "They are far apart.")
 _MOST = 600  # events of a course that is compared
 _ACTORS = {"A": "Ann", "B": "Bob", "C": "Cy"}
@@ -128,8 +138,100 @@ def drawn(seed: int) -> tuple[Graph, dict[str, list[Behaviour]]]:
     return Graph(name="g", actions=actions, relations=tuple(relations)), calls
 
 
+_KINDS = {
+    "string": "text",
+    "number": "count",
+    "bool": "flag",
+    "strings": "texts",
+    "numbers": "counts",
+}
+
+
+def with_values(
+    graph: Graph, calls: dict[str, list[Behaviour]], seed: int
+) -> tuple[Graph, dict[str, list[Behaviour]]]:
+    """The graph with values that its actions hand on: each visit gives others, and some give none."""
+    chance = random.Random(f"values of {seed}")
+    names = [(kind, f"{name}{n}") for kind, name in _KINDS.items() for n in range(2)]
+    outputs = {each.key: chance.sample(names, chance.randint(0, 6)) for each in graph.actions}
+    inputs = {each.key: chance.sample(names, chance.randint(0, 6)) for each in graph.actions}
+
+    def leaf(kind: str, *, own: bool) -> str:
+        wants: dict[str, Any] = {"pvf_type": kind}
+        if own and chance.random() < 0.5:
+            wants["pvf_value"] = _value(chance, kind)
+        elif own and chance.random() < 0.97:
+            wants["pvf_required"] = False
+        return json.dumps(wants)
+
+    actions = tuple(
+        msgspec.structs.replace(
+            each,
+            inputs=tuple(Parameter(name, leaf(kind, own=True)) for kind, name in inputs[each.key]),
+            outputs=tuple(
+                Parameter(name, leaf(kind, own=False)) for kind, name in outputs[each.key]
+            ),
+        )
+        for each in graph.actions
+    )
+    relations: list[Relation] = []
+    for each in graph.relations:
+        given, taken = outputs.get(each.parent, []), inputs.get(each.child, [])
+        pairs = [(a, b) for kind, a in given for other, b in taken if kind == other and a != b]
+        if pairs and chance.random() < 0.3:
+            source, target = chance.choice(pairs)
+            each = msgspec.structs.replace(each, remap=(Remap(source, target),))
+        relations.append(each)
+    graph = msgspec.structs.replace(graph, actions=actions, relations=tuple(relations))
+    handed = {
+        each.parent for each, _ in handing(graph)
+    }  # else only the exit takes it, unread on false
+    told = {
+        f"{each.name}_0": [
+            msgspec.structs.replace(
+                call,
+                outputs={
+                    name: MISSING
+                    if each.key in handed and chance.random() < 0.1
+                    else _value(chance, kind)
+                    for kind, name in outputs[each.key]
+                },
+            )
+            for call in calls[f"{each.name}_0"]
+        ]
+        for each in graph.actions
+    }
+    return graph, told
+
+
+def _value(chance: random.Random, kind: str) -> Any:
+    match kind:
+        case "string":
+            return f'{chance.random()} "ä'
+        case "number":
+            return chance.choice([0.1, -3.0, 2e300]) * chance.randint(1, 9)
+        case "bool":
+            return chance.random() < 0.5
+        case _:
+            return [_value(chance, kind[:-1]) for _ in range(chance.randint(0, 3))]
+
+
+class Noting(Engine):
+    """Writes down with which values its actions begin."""
+
+    def __init__(self, **more: Any) -> None:
+        super().__init__(**more)
+        self.taken: Taken = defaultdict(list)
+
+    def _begin(self, graph: Running, node: Node) -> None:
+        self.taken[node.full_name].append(
+            {name: slot.value for name, slot in node.inputs.items() if slot.has_value()}
+        )
+        super()._begin(graph, node)
+
+
 class LedRobot(Robot):
-    """A robot whose actions do something else at each visit."""
+    """A robot whose actions do something else at each visit, and that has the values package."""
 
     def __init__(
         self, calls: Mapping[str, list[Behaviour]], counted: dict[str, int], seed: int
@@ -139,6 +241,12 @@ class LedRobot(Robot):
         self.calls = calls
         self.counted = counted
         self.meant: dict[str, str] = {}  # by piece
+        self.taken: Taken = defaultdict(list)
+        self.known: tuple[str, ...] = ()
+
+    async def get(self) -> Answer:
+        """The answer, with what is indexed."""
+        return msgspec.structs.replace(await super().get(), known_actions=self.known)
 
     async def _begin(self, order: Order) -> None:
         (node,) = order.graph.actions
@@ -146,6 +254,10 @@ class LedRobot(Robot):
         self.counted[node] += 1
         behaviour = self.calls[node][min(visit, 5)]
         self.meant[order.run] = behaviour.result
+        slots = slots_of(codec.read(order.umrf).graph.actions[0].inputs)
+        self.taken[node].append(
+            {name: slot.value for name, slot in slots.items() if slot.has_value()}
+        )
         self.engine._engine.script.behaviours[f"{order.graph.name}/{node}"] = (behaviour,)
         await super()._begin(order)
 
@@ -168,9 +280,9 @@ def course_of(traces: list[Trace]) -> tuple[Course, list[str]]:
     return {name: visits for name, visits in found.items() if visits}, ends
 
 
-def played(graph: Graph, calls: Mapping[str, Any]) -> tuple[list[Trace], Engine]:
+def played(graph: Graph, calls: Mapping[str, Any]) -> tuple[list[Trace], Noting]:
     """The whole graph on one engine that has all actors."""
-    engine = Engine(facts=CONDUCTED_FACTS, script=Script({k: tuple(v) for k, v in calls.items()}))
+    engine = Noting(facts=CONDUCTED_FACTS, script=Script({k: tuple(v) for k, v in calls.items()}))
     traces = engine.start(graph, 0.0)
     while len(traces) < _MOST and not engine.crashed:
         due = engine.due
@@ -238,22 +350,41 @@ def is_near(one: Course, other: Course) -> bool:
     )
 
 
-def as_long_as_seen(course: Course) -> dict[str, list[Behaviour]]:
-    """Actions that take as long, and end as, they were seen to in a course."""
+def as_long_as_seen(
+    course: Course, calls: Mapping[str, list[Behaviour]]
+) -> dict[str, list[Behaviour]]:
+    """Actions that take as long, and end as, they were seen to in a course. `calls`: what they give."""
     durations: dict[str, list[Behaviour]] = {}
     for name, visits in course.items():
         durations[name] = [
-            Behaviour(after_s=(b - a) / 1000, result=result)  # type: ignore[arg-type]
+            Behaviour(after_s=(b - a) / 1000, result=result, outputs=calls[name][min(n, 5)].outputs)  # type: ignore[arg-type]
             if b is not None and result != "on_stopped"
             else Behaviour(never=True, stop_s=((b or a) - a) / 1000)
-            for a, b, result in visits
+            for n, (a, b, result) in enumerate(visits)
         ] + [Behaviour(never=True)]
     return durations
 
 
-async def led_through(seed: int) -> str:
-    """Lead a random graph on three robots; return what was compared."""
-    graph, calls = drawn(seed)
+def check_outcomes(seed: int, told: list[RunEvent], robots: Iterable[LedRobot]) -> None:
+    """The outcomes are those of the code."""
+    for each in told:
+        if isinstance(each, PieceEnded) and each.outcome != "on_stopped":
+            meant = [robot.meant[each.piece] for robot in robots if each.piece in robot.meant]
+            assert meant == [each.outcome], (seed, each)
+
+
+def check_values(seed: int, sent: list[Taken], whole: Taken) -> None:
+    """Each piece was sent the values with which its action begins in the whole graph. `sent`: by robot."""
+    for name, visits in whole.items():  # the last one may be over before it was sent
+        taken = next((each[name] for each in sent if name in each), [])
+        assert taken == visits[: len(taken)], (seed, name, taken, visits)
+        assert len(visits) - len(taken) <= 1, (seed, name, taken, visits)
+
+
+async def led_through(seed: int, *, values: bool = False) -> str:
+    """Lead a random graph on three robots; return what was compared. `values`: its actions hand some
+    on."""
+    graph, calls = with_values(*drawn(seed), seed) if values else drawn(seed)
     try:
         _, engine = played(graph, calls)
     except GraphRefused:
@@ -264,6 +395,7 @@ async def led_through(seed: int) -> str:
     robots = {name: LedRobot(calls, counted, seed) for name in _ACTORS.values()}
     for robot in robots.values():
         robot.blind = 0.03
+        robot.known = tuple(map(codec.write_action, (*graph.actions, keeper()))) if values else ()
     seen, journal = Seen(), MemoryJournal()
     async with (
         ExecutionService.opened(
@@ -293,14 +425,7 @@ async def led_through(seed: int) -> str:
                 await anyio.sleep(0.5)
         course = as_seen(seen.course)
         over = run not in control.open
-        for each in journal.told(run):  # outcomes are those of the code
-            if isinstance(each, PieceEnded) and each.outcome != "on_stopped":
-                meant = [
-                    robot.meant[each.piece]
-                    for robot in robots.values()
-                    if each.piece in robot.meant
-                ]
-                assert meant == [each.outcome], (seed, each)
+        check_outcomes(seed, journal.told(run), robots.values())
         if not over:
             control.stop_all(BEN)
             await anyio.sleep(20)
@@ -317,7 +442,7 @@ async def led_through(seed: int) -> str:
         engines.cancel_scope.cancel()
     if not over:
         return "goes on for ever"
-    again, _ = played(graph, calls | as_long_as_seen(course))
+    again, alone = played(graph, calls | as_long_as_seen(course, calls))
     whole, results = course_of(again)
     if any(visit[2] == "on_stopped" for visits in course.values() for visit in visits):
         return "stopped by an arrow"
@@ -326,6 +451,7 @@ async def led_through(seed: int) -> str:
         return "two ends at one moment"
     assert is_near(whole, course), (seed, whole, course)
     assert results == seen.results, (seed, results, seen.results)
+    check_values(seed, [robot.taken for robot in robots.values()], alone.taken)
     return "same"
 
 
@@ -338,3 +464,10 @@ def test_a_run_whose_graph_ends_every_engine_can_be_stopped() -> None:
 @given(seed=st.integers(0, 2**32))
 def test_a_led_graph_takes_its_own_course(seed: int) -> None:
     run_in_virtual_time(lambda: led_through(seed))
+
+
+@pytest.mark.timeout(0)
+@settings(max_examples=examples(25), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(seed=st.integers(0, 2**32))
+def test_values_arrive_as_in_the_whole_graph(seed: int) -> None:
+    run_in_virtual_time(lambda: led_through(seed, values=True))

@@ -2,8 +2,10 @@
 
 from typing import Any
 
+import msgspec
+
 from action_assistant.umrf.facts import PINNED, SIMULATED, EngineFacts
-from action_assistant.umrf.model import Action
+from action_assistant.umrf.model import Action, Parameter
 from action_assistant.umrf.semantics import (
     Call,
     Engine,
@@ -189,3 +191,27 @@ def test_outputs_of_a_call_reach_its_children() -> None:
     traces: list[Trace] = engine.returned(returned(1, outputs={"count": 7.5}), 100)
     assert traces
     assert performer.calls[1].inputs == {"count": 7.5}
+
+
+def test_an_action_that_fails_hands_on_nothing_that_it_gave_before() -> None:
+    from runner.links.behaviours.written import action, parameter
+
+    optional = '{"pvf_type": "number", "pvf_required": false}'
+    loop = carousel()
+    first, second = loop.actions
+    gives = msgspec.structs.replace(
+        action("Gives", [], [parameter("count", "number")]), key=first.key
+    )
+    takes = msgspec.structs.replace(action("Takes", [Parameter("count", optional)]), key=second.key)
+    performer = Performing("Gives", "Takes")
+    engine = made(performer)
+    engine.start(msgspec.structs.replace(loop, actions=(gives, takes)), 0)
+    engine.returned(returned(1, outputs={"count": 7.5}), 100)
+    engine.returned(returned(2), 200)
+    engine.returned(returned(3, "on_error"), 300)
+    assert [(each.name, each.inputs) for each in performer.calls] == [
+        ("Gives", {}),
+        ("Takes", {"count": 7.5}),
+        ("Gives", {}),
+        ("Takes", {}),
+    ]

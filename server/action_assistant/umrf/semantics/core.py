@@ -369,6 +369,8 @@ class Core(Clock):
         node.returning = False
         for slot in node.inputs.values():
             slot.end_of_run()
+        for slot in node.outputs.values():
+            slot.clear()
         if again:
             self._run(graph, node)
 

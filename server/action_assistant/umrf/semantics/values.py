@@ -40,14 +40,15 @@ MISSING: Final = Missing()
 class Slot:
     """One input or output of an action while its graph runs, with its current value."""
 
-    __slots__ = ("allowed", "name", "received", "required", "type", "updatable", "value")
+    __slots__ = ("allowed", "name", "own", "received", "required", "type", "updatable", "value")
 
     def __init__(self, name: str, leaf: dict[str, Json]) -> None:
         kind = leaf.get("pvf_type")
         allowed = leaf.get("pvf_allowed_values")
         self.name = name
         self.type = kind if isinstance(kind, str) else ""
-        self.value: Any = plain(leaf["pvf_value"]) if "pvf_value" in leaf else MISSING
+        self.own: Any = plain(leaf["pvf_value"]) if "pvf_value" in leaf else MISSING
+        self.value: Any = self.own
         self.required = leaf.get("pvf_required") is not False
         self.updatable = leaf.get("pvf_updatable") is not False
         listed = allowed if isinstance(allowed, list) else [] if allowed is None else [allowed]
@@ -64,8 +65,8 @@ class Slot:
 
         Generated packages begin with the same value.
         """
-        if self.has_value():
-            return self.value
+        if self.own is not MISSING:
+            return self.own
         return self.allowed[0] if self.allowed else NEUTRAL.get(self.type, Opaque(self.type))
 
     def receive(self, kind: str, value: Any) -> None:
@@ -77,6 +78,10 @@ class Slot:
             return
         self.value = value
         self.received = True
+
+    def clear(self) -> None:
+        """Drop the value, as the engine does with the outputs of an action that has ended."""
+        self.value = MISSING
 
     def end_of_run(self) -> None:
         """Clear the value if it came from a parent. The value of the file does not return."""
