@@ -6,7 +6,7 @@ from typing import Final, NamedTuple
 
 from action_assistant.errors import CannotStart
 from action_assistant.private_files import opener
-from action_assistant.system import file_locks, users
+from action_assistant.system import posix
 
 _LOCKS: Final = Path("/proc/locks")
 
@@ -18,7 +18,7 @@ class Holder(NamedTuple):
     uid: int
 
     def __str__(self) -> str:
-        return f"{self.pid} of {users.name_of(self.uid)}"
+        return f"{self.pid} of {posix.user_name(self.uid)}"
 
 
 def own(path: Path) -> int:
@@ -62,7 +62,7 @@ def _taken(lock: Path) -> int | None:
     """Return the descriptor of the lock; None if another process holds it."""
     while True:
         descriptor = opener(str(lock), os.O_RDWR | os.O_CREAT)
-        if not file_locks.take(descriptor):
+        if not posix.lock_file(descriptor):
             os.close(descriptor)
             return None
         try:
@@ -77,7 +77,7 @@ def _taken_from_a_stranger(lock: Path, path: Path) -> int | None:
     """Replace the lock file of another user; one of our processes at a time does so."""
     guard = opener(str(lock.with_name(f"{lock.name}.new")), os.O_RDWR | os.O_CREAT)
     try:
-        file_locks.wait_for(guard)
+        posix.wait_for_lock(guard)
         if _is_a_strangers(_holder(lock), path):
             lock.unlink()
         return _taken(lock)
@@ -86,9 +86,9 @@ def _taken_from_a_stranger(lock: Path, path: Path) -> int | None:
 
 
 def _is_a_strangers(holder: Holder | None, path: Path) -> bool:
-    if holder is None or holder.uid in {0, users.me()}:
+    if holder is None or holder.uid in {0, posix.user_id()}:
         return False
-    return not path.exists() or path.stat().st_uid == users.me()
+    return not path.exists() or path.stat().st_uid == posix.user_id()
 
 
 def _user_of(pid: int) -> int:

@@ -13,7 +13,7 @@ from action_assistant.commands.backups import data_folder
 from action_assistant.commands.backups.data_folder import sweep, workshop
 from action_assistant.errors import CannotStart
 from action_assistant.journal.databases import database_of, migrate
-from action_assistant.system import file_locks
+from action_assistant.system import posix
 from support.product import COMMAND
 from support.rows import write_events
 
@@ -103,7 +103,7 @@ def test_a_command_whose_folder_is_just_being_removed_is_refused(
 
     def meanwhile(path: str, flags: int) -> int:
         held = opened(path, flags)
-        file_locks.take(held)
+        posix.lock_file(held)
         return opened(path, flags)
 
     monkeypatch.setattr(data_folder, "opener", meanwhile)

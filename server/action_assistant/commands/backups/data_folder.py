@@ -29,7 +29,7 @@ from action_assistant.private_files import opener
 from action_assistant.runner.archives.raw_messages import RawArchived
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
-from action_assistant.system import file_locks
+from action_assistant.system import posix
 from action_assistant.web.auth import keys, revocations
 from action_assistant.web.network import certificate
 
@@ -209,7 +209,7 @@ def workshop(parent: Path, prefix: str) -> Iterator[Path]:
         with tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as folder:
             held = opener(str(Path(folder) / _AT_WORK), os.O_RDWR | os.O_CREAT)
             try:
-                if not file_locks.take(held):
+                if not posix.lock_file(held):
                     raise CannotStart(f"{parent} is just being tidied up. Try it again.")
                 yield Path(folder)
             finally:
@@ -229,7 +229,7 @@ def sweep(parent: Path, prefix: str) -> None:
         except OSError:
             continue  # it has just gone, or is another user's
         try:
-            if file_locks.take(held):  # kept until all is gone, for whoever is just beginning there
+            if posix.lock_file(held):  # kept until all is gone, for whoever is just beginning there
                 shutil.rmtree(left, ignore_errors=True)
         finally:
             os.close(held)

@@ -31,7 +31,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state
 from action_assistant.journal.copies.backup_state import BackupSchedule, OffSite
 from action_assistant.private_files import make_folder, opener
-from action_assistant.system import file_locks
+from action_assistant.system import posix
 from action_assistant.web.auth.keys import TOKEN_FILE
 
 _LOCK: Final = ".action-assistant.lock"
@@ -123,7 +123,7 @@ def _alone(into: Path) -> Iterator[None]:
     make_folder(into)
     lock = opener(str(into / _LOCK), os.O_RDWR | os.O_CREAT)
     try:
-        if not file_locks.take(lock):
+        if not posix.lock_file(lock):
             raise CannotStart(f"Another backup is just being made into {into}.")
         sweep(into, WORK)
         yield

@@ -29,7 +29,7 @@ from action_assistant.journal.copies.backup_state import BackupState, backup_sta
 from action_assistant.journal.databases import database_of
 from action_assistant.logs.setup import log_settings
 from action_assistant.private_files import holds_nothing_else, of_others, open_to_others
-from action_assistant.system import limits, users
+from action_assistant.system import posix
 from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.version import described
 from action_assistant.web.auth.keys import TOKEN_FILE, Keys
@@ -216,7 +216,7 @@ def _newer_source(built: float) -> Path | None:
 def descriptors_suffice(place: Installation) -> Iterator[Diagnostic]:
     """Check how many files and connections a process may have open."""
     del place
-    most = limits.descriptors_allowed()
+    most = posix.descriptors_allowed()
     if most < _DESCRIPTORS:
         yield found(
             "descriptors-few",
@@ -348,8 +348,8 @@ def folder_is_ours(place: Installation) -> Iterator[Diagnostic]:
         return
     strangers = of_others(data)
     if strangers:
-        whose = users.name_of(strangers[0].lstat().st_uid)
-        owner = users.name_of(data.stat().st_uid)
+        whose = posix.user_name(strangers[0].lstat().st_uid)
+        owner = posix.user_name(data.stat().st_uid)
         yield found(
             "folder-of-others",
             data,
@@ -370,11 +370,11 @@ def _unusable(data: Path, why: Path) -> Diagnostic:
             f"{why} is no folder.",
             "Choose another data folder with --data, or move that file away.",
         )
-    owner = users.name_of(why.stat().st_uid) if why.exists() else "nobody"
+    owner = posix.user_name(why.stat().st_uid) if why.exists() else "nobody"
     return found(
         "folder-unusable",
         data,
-        f"{users.mine()} cannot read and write in {why}, which is {owner}'s.",
+        f"{posix.own_name()} cannot read and write in {why}, which is {owner}'s.",
         f"Run this program as {owner}, mend the rights of the folder, or choose another with --data.",
     )
 
@@ -478,7 +478,7 @@ def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
         if not folder.is_dir():
             problem = f"{folder} is no folder"
         elif not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
-            problem = f"{users.mine()} cannot read and write in it"
+            problem = f"{posix.own_name()} cannot read and write in it"
     elif blocked := _blocked(folder):
         problem = f"it is not there, and cannot be made in {blocked}"
     if problem and folder != place.data / settings.ARCHIVE:

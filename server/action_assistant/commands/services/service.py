@@ -20,7 +20,7 @@ from action_assistant.commands.services.unit import (
     text_of,
 )
 from action_assistant.errors import CannotStart
-from action_assistant.system import users
+from action_assistant.system import posix
 
 #: Options of `serve` that a unit passes on.
 _VALUES: Final = (
@@ -256,7 +256,7 @@ def _user(options: argparse.Namespace) -> str:
         raise CannotStart(
             "As root this program could do anything to the computer: name another user."
         )
-    if options.root is None and not users.exists(user):
+    if options.root is None and not posix.user_exists(user):
         raise CannotStart(f"This computer has no user {user}.")
     return user
 

@@ -14,7 +14,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.private_files import opener, replace_file
-from action_assistant.system import file_locks
+from action_assistant.system import posix
 
 log: Final = logging.getLogger(__name__)
 
@@ -113,7 +113,7 @@ def note(data: Path, change: Callable[[BackupState], BackupState]) -> None:
     try:
         guard = opener(str(path.with_name(f"{FILE}.lock")), os.O_RDWR | os.O_CREAT)
         try:
-            file_locks.wait_for(guard)
+            posix.wait_for_lock(guard)
             state = change(backup_state(data) or BackupState())
             content = msgspec.json.format(msgspec.json.encode(state))
             replace_file(path, content, part=path.with_name(f".{FILE}.part"))

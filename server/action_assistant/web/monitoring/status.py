@@ -11,7 +11,7 @@ import msgspec
 
 from action_assistant.journal.journal import Journal
 from action_assistant.safe_text import hold_names
-from action_assistant.system import limits
+from action_assistant.system import posix
 from action_assistant.system.posix import resource
 from action_assistant.version import VERSION
 from action_assistant.web.monitoring.readiness import Readiness
@@ -125,7 +125,7 @@ def load_now(loop_lag_s: float) -> Load:
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return Load(
         cpu_s=used.ru_utime + used.ru_stime,
-        memory=limits.memory_in_use() or None,
+        memory=posix.memory_in_use() or None,
         open_files=_open_files(),
         most_files=soft,
         loop_lag_s=loop_lag_s,

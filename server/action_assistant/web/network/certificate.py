@@ -21,7 +21,7 @@ from cryptography.x509.oid import ExtendedKeyUsageOID, NameOID
 
 from action_assistant.errors import CannotStart
 from action_assistant.private_files import opener, replace_file
-from action_assistant.system import file_locks
+from action_assistant.system import posix
 
 FOLDER: Final = "tls"
 _AUTHORITY_DAYS: Final = 3650
@@ -83,7 +83,7 @@ class Certificate:
     def _alone(self) -> Iterator[None]:
         self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         with open(self._folder / "lock", "w", opener=opener) as lock:
-            file_locks.wait_for(lock.fileno())
+            posix.wait_for_lock(lock.fileno())
             yield
 
     def _serves(self, names: Sequence[str], now: datetime) -> bool:

@@ -20,7 +20,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public_url import Network
-from action_assistant.system import limits
+from action_assistant.system import posix
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.connections import Connections
 from action_assistant.web.server.direct import DirectSocket, WebSocketProtocol, end_connection
@@ -75,7 +75,7 @@ def serve(
             listener.close()
         raise
     forwarded = Forwarded(endings, proxies)
-    connections = Connections(limits.raise_descriptors(), forwarded.is_proxy)
+    connections = Connections(posix.raise_descriptors(), forwarded.is_proxy)
     app = ActivityTracker(forwarded, connections)
     config = _configured(app, identity, direct=direct)
     logging.getLogger("uvicorn.error").addFilter(_in_one_line)

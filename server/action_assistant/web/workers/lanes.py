@@ -28,7 +28,7 @@ from anyio import CapacityLimiter, to_thread
 from action_assistant.errors import TooLarge, TooMany, Unavailable
 from action_assistant.logs.setup import set_up_worker
 from action_assistant.safe_text import make_streams_printable
-from action_assistant.system import limits
+from action_assistant.system import posix
 from action_assistant.web.auth.caller import Caller, caller
 
 if TYPE_CHECKING:  # not on Windows
@@ -76,7 +76,7 @@ def _humbly(name: str, work: Callable[..., None], args: tuple[Any, ...], nice: i
     with contextlib.suppress(OSError):
         Path("/proc/self/oom_score_adj").write_text("1000")
     with contextlib.suppress(OSError, ValueError):
-        limits.bound_memory(_MEMORY)
+        posix.bound_memory(_MEMORY)
     gc.freeze()
     work(*args)
 
@@ -108,7 +108,7 @@ def _reply(request: bytes) -> bytes:
         return LAST + pickle.dumps(("raised", large))
     except Exception as error:  # noqa: BLE001 - it is raised where it was asked for
         reply = _raised(error)
-    return (LAST if limits.memory_in_use() > _TIRED else _MORE) + reply
+    return (LAST if posix.memory_in_use() > _TIRED else _MORE) + reply
 
 
 def _raised(error: Exception) -> bytes:

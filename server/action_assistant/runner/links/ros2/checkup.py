@@ -24,7 +24,7 @@ from action_assistant.runner.links.port import (
     Standing,
 )
 from action_assistant.runner.links.ros2.availability import ros2_reach
-from action_assistant.system import users
+from action_assistant.system import posix
 from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.umrf.facts import BadProfile, facts_of
 
@@ -156,7 +156,7 @@ def shared_memory(environ: Mapping[str, str]) -> list[Diagnostic]:
                 "sides.",
             )
         )
-    strangers = sorted(users.name_of(uid) for uid in _owners() - {users.me()})
+    strangers = sorted(posix.user_name(uid) for uid in _owners() - {posix.user_id()})
     if strangers:
         runs = "runs" if len(strangers) == 1 else "run"
         seen.append(
