@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
 from action_assistant.errors import CannotStart, RequestRefused
-from action_assistant.logs.setup import say
+from action_assistant.logs import say
 from action_assistant.safe_text import make_streams_printable
 from action_assistant.settings import (
     check_environment,

@@ -15,7 +15,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.interpreter import Interpreter, for_runner
-from action_assistant.logs.setup import say, writes_json
+from action_assistant.logs import say, writes_json
 from action_assistant.private_files import opener
 from action_assistant.settings import (
     EVERYWHERE,

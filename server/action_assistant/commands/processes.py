@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 from action_assistant import paths, settings
 from action_assistant.commands.backups.options import add_rules, span
 from action_assistant.errors import CannotStart
-from action_assistant.logs.setup import FORMS, LEVELS, hand_on, log_settings, set_up
+from action_assistant.logs import FORMS, LEVELS, hand_on, log_settings, set_up
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
     from action_assistant.supervisor import BackupPlan

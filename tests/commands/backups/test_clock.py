@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.commands.backups import regular
+from action_assistant.commands.backups import backup
 from commands.backups.test_restore import filled, here
 
 
@@ -31,7 +31,7 @@ def test_a_backup_is_made_wherever_the_clock_stands(
     with monkeypatch.context() as there:
         for name, function in given.items():
             there.setattr(time, name, function)
-        there.setattr(regular, "datetime", Clock)
+        there.setattr(backup, "datetime", Clock)
         assert here("backup", file, "--data", data) == 0
         assert here("backup", "--into", tmp_path / "into", "--data", data, "--keep", "7d") == 0
         assert here("restore", "--rehearse", file, "--data", data) == 0

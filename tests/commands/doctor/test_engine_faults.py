@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from action_assistant.commands.doctor.doctor import engines_index_once
 from action_assistant.commands.doctor.installation import Installation
-from action_assistant.commands.doctor.ros_checks import engines_index_once
 
 
 @contextmanager

@@ -5,7 +5,7 @@ from typing import Any
 import anyio
 import pytest
 
-from action_assistant.logs.context import begin, subjects
+from action_assistant.logs import begin, subjects
 from action_assistant.public_url import proxies
 from action_assistant.web.http.requests import RequestCounts, Requests
 from action_assistant.web.server.proxy import Forwarded

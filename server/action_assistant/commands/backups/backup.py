@@ -1,21 +1,42 @@
-"""Commands that keep a copy of everything and bring it back: backup; restore is beside it."""
+"""The commands `backup` and `restore`. Backups are made once, as cron calls it, or again and again beside the
+processes; old ones go by a rule, and a command may take each finished one elsewhere."""
 
 import argparse
+import contextlib
+import os
+import select
+import shlex
+import signal
+import subprocess
 import sys
+import time
+import zipfile
+from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Final
 
+import msgspec
+
 from action_assistant import paths, settings
 from action_assistant.commands.backups import restore
-from action_assistant.commands.backups.backup_file import ARCHIVE, FILES
-from action_assistant.commands.backups.data_folder import left_out
-from action_assistant.commands.backups.making import FinishedBackup, make_backup
-from action_assistant.commands.backups.options import add_rules, span
+from action_assistant.commands.backups.backup_file import ARCHIVE, FILES, Package
+from action_assistant.commands.backups.data_folder import left_out, sweep
+from action_assistant.commands.backups.making import WORK, FinishedBackup, make_backup
+from action_assistant.commands.backups.options import (
+    add_rules,
+    moment_of,
+    name_at,
+    parse_retention,
+    span,
+    superfluous,
+)
 from action_assistant.commands.backups.progress import Progress
-from action_assistant.commands.backups.regular import RegularBackups, back_up, keep_making
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state
-from action_assistant.journal.copies.backup_state import OffSite
+from action_assistant.journal.copies.backup_state import BackupSchedule, OffSite
+from action_assistant.private_files import make_folder, opener
+from action_assistant.system import posix
 from action_assistant.web.auth.keys import TOKEN_FILE
 
 
@@ -144,3 +165,182 @@ def _tell(done: FinishedBackup, data: Path, off_site: OffSite | None) -> int:
         print(f"NOT taken elsewhere: {off_site.why}", file=sys.stderr)
         return 1
     return 1 if made.missing else 0
+
+
+_LOCK: Final = ".action-assistant.lock"
+_PATIENCE: Final = 6 * 3600.0  # seconds that a command may take
+_SOON: Final = 15 * 60.0  # seconds after which a backup that failed is tried again
+_NEW: Final = 10.0  # seconds after which a folder without journals is looked at again
+_JOURNALS: Final = ("editor.db", "editor.database", "runner.db")
+_LINE: Final = 500  # characters of what a command said
+_NICE: Final = 19  # the least of a processor
+
+
+class RegularBackups(msgspec.Struct, frozen=True):
+    """The settings of regular backups: source, target folder, retention rule, and the command that
+    is called with each finished backup."""
+
+    data: Path
+    database: str | None
+    into: Path
+    keep: str
+    after: str | None
+
+
+def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, OffSite | None]:
+    """Make a backup, record its outcome, and delete superfluous older backups. Raise CannotStart if
+    the backup fails."""
+    try:
+        with _alone(plan.into):
+            target = _free(plan.into)
+            done = make_backup(plan.data, plan.database, target, progress)
+            progress.end()
+            off_site = _taken_away(plan.after, target)
+            backup_state.made(plan.data, msgspec.structs.replace(done.made, off_site=off_site))
+            if not done.made.missing:  # else an older one may have what this one lacks
+                ours = (path for path in plan.into.iterdir() if not _is_anothers(path, done))
+                for path in superfluous(ours, parse_retention(plan.keep), datetime.now(UTC)):
+                    path.unlink(missing_ok=True)
+    except (CannotStart, OSError) as error:
+        why = str(error) if isinstance(error, CannotStart) else f"{plan.into}: {error.strerror}."
+        backup_state.failed(plan.data, why)
+        raise CannotStart(why) from error
+    return done, off_site
+
+
+def keep_making(plan: RegularBackups, every: float) -> int:
+    """Make a backup every `every` seconds, until SIGTERM or the end of the parent process. It runs
+    at low priority."""
+    os.nice(_NICE)
+    signal.signal(signal.SIGTERM, _end)
+    parent = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
+    due = _first(plan, every)
+    try:
+        while True:
+            backup_state.scheduled(
+                plan.data,
+                BackupSchedule(into=str(plan.into), every=every, keep=plan.keep, next=due),
+            )
+            if not _wait_until(due, parent):
+                return 0
+            begun = time.time()
+            if not any((plan.data / name).exists() for name in _JOURNALS):
+                due = begun + min(every, _NEW)  # the processes are only just starting
+                continue
+            try:
+                done, off_site = back_up(plan, Progress())
+            except CannotStart as error:
+                due = time.time() + min(every, _SOON)
+                _say(f"no backup was made: {error} It is tried again in {due - time.time():.0f} s.")
+                continue
+            due = max(begun + every, time.time())
+            _say(told(done, off_site))
+    except KeyboardInterrupt:
+        return 0
+
+
+def told(done: FinishedBackup, off_site: OffSite | None) -> str:
+    """Return one line about a finished backup."""
+    made = done.made
+    text = f"backup {made.file}: {made.bytes / 2**20:.1f} MiB in {made.seconds:.1f} s, proven"
+    if made.missing:
+        text += f"; {len(made.missing)} missing: {' '.join(made.missing)}"
+    if off_site is not None:
+        text += f"; NOT taken elsewhere: {off_site.why}" if off_site.why else "; taken elsewhere"
+    return text
+
+
+@contextlib.contextmanager
+def _alone(into: Path) -> Iterator[None]:
+    """Allow one backup into a folder at a time, and remove what a killed one has left."""
+    make_folder(into)
+    lock = opener(str(into / _LOCK), os.O_RDWR | os.O_CREAT)
+    try:
+        if not posix.lock_file(lock):
+            raise CannotStart(f"Another backup is just being made into {into}.")
+        sweep(into, WORK)
+        yield
+    finally:
+        os.close(lock)
+
+
+def _free(into: Path) -> Path:
+    """Return a file name that no backup in the folder has yet."""
+    while (target := into / name_at(datetime.now(UTC))).exists():
+        time.sleep(0.1)  # names tell the second
+    return target
+
+
+def _is_anothers(path: Path, done: FinishedBackup) -> bool:
+    """Return whether a backup comes from another server, which has another token. Servers may share
+    a folder."""
+    if moment_of(path) is None or not zipfile.is_zipfile(path):
+        return False
+    try:
+        package = Package(path)
+    except CannotStart:
+        return True  # of a newer version, for one
+    package.close()
+    token = f"{FILES}/{TOKEN_FILE}"
+    held, ours = package.about.files.get(token), done.files.get(token)
+    return held is not None and held != ours
+
+
+def _taken_away(command: str | None, path: Path) -> OffSite | None:
+    """Run the command with the path of the backup as its last argument; its output goes to our log.
+    Return how that ended; None without a command."""
+    if not command:
+        return None
+    begun = time.monotonic()
+    why: str | None = None
+    try:
+        process = subprocess.Popen(
+            [*shlex.split(command), str(path)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
+        )
+        try:
+            said, _ = process.communicate(timeout=_PATIENCE)
+        except BaseException:
+            os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+            raise
+        if process.returncode:
+            lines = said.decode(errors="replace").strip().splitlines()
+            last = f": {lines[-1][:_LINE]}" if lines else " and said nothing"
+            why = f"`{command}` ended with {process.returncode}{last}"
+    except subprocess.TimeoutExpired:
+        why = f"`{command}` did not end within {_PATIENCE / 3600:.0f} hours"
+    except (OSError, ValueError) as error:
+        why = f"`{command}` cannot be run: {error}"
+    return OffSite(round(time.monotonic() - begun, 3), why)
+
+
+def _first(plan: RegularBackups, every: float) -> float:
+    """Return when the first backup is due: now, unless a recent one exists."""
+    state = backup_state.backup_state(plan.data)
+    last = state.last if state is not None else None
+    if last is None or Path(last.file).parent != plan.into or not Path(last.file).exists():
+        return time.time()
+    return max(time.time(), min(last.at, time.time()) + every)
+
+
+def _wait_until(due: float, parent: str | None) -> bool:
+    """Wait until `due` (seconds since 1970). Return False if the parent process, which holds the
+    other end of the pipe `parent`, ends first. It waits in slices, since clocks are set."""
+    while (left := due - time.time()) > 0:
+        ends = [] if parent is None else [int(parent)]
+        if select.select(ends, [], [], min(left, 60.0))[0]:
+            return False
+    return True
+
+
+def _end(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def _say(text: str) -> None:
+    sys.stderr.write(f"action-assistant: {text}\n")
+    sys.stderr.flush()

@@ -5,6 +5,9 @@ The page of administrators takes the same checks from `diagnose`, in a worker; i
 """
 
 import argparse
+import os
+import sqlite3
+import subprocess
 import sys
 import threading
 import time
@@ -13,7 +16,10 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Final, TypeAlias
 
+import anyio
 import msgspec
+from sqlalchemy import create_engine
+from sqlalchemy.exc import DBAPIError
 
 from action_assistant import paths as places
 from action_assistant import settings
@@ -23,14 +29,20 @@ from action_assistant.commands.doctor import (
     process_checks,
 )
 from action_assistant.commands.doctor.installation import Installation
-from action_assistant.commands.doctor.ros_checks import (
-    ROBOTS_S,
-    engines_index_once,
-    look_here,
-    robots_answer,
-)
 from action_assistant.commands.processes import port_number
 from action_assistant.errors import CannotStart
+from action_assistant.interpreter import Interpreter, for_runner
+from action_assistant.journal.sqlite import unchanged
+from action_assistant.kit.clock import utc_us
+from action_assistant.runner.links.engine_process import (
+    argument,
+    command_line,
+    indexing_rate,
+    is_engine_node,
+)
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.links.ros2.checkup import look
+from action_assistant.runner.runs import queries
 from action_assistant.safe_text import one_line
 from action_assistant.system.diagnostics import Diagnostic, Severity, found
 
@@ -194,3 +206,123 @@ def _tell(each: Diagnostic) -> None:
     print(one_line(f"{_SIGNS[each.severity]} {each.where}: {each.message}{code}"), flush=True)
     if each.remedy:
         print(one_line(f"    {each.remedy}"), flush=True)
+
+
+_PATIENCE_S: Final = 45.0
+#: Seconds that it takes at most.
+ROBOTS_S: Final = _PATIENCE_S + 5
+
+
+def robots_answer(place: Installation) -> Iterator[Diagnostic]:
+    """Check ROS 2, and whether each registered robot answers, with the Python that the runner would
+    use. Yield what was found.
+
+    With registered robots this takes some seconds. Nothing is yielded if there is no such Python,
+    since the check of the settings reports that.
+    """
+    try:
+        interpreter = for_runner()
+    except CannotStart:  # told with the settings
+        return
+    if interpreter.remark:
+        yield found(
+            "python-unusable",
+            interpreter.path,
+            interpreter.remark,
+            "Do as the sentence says; until then robots are reached as far as it says.",
+        )
+    yield from _asked(interpreter, place)
+
+
+def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
+    """Warn of engines of registered robots on this computer that index while they run: such an
+    engine may crash at a get or start (H15)."""
+    robots = {each.name: each for each in _registered(place.data)}
+    for pid, words in _engines() if robots else ():
+        name = argument(words, "--actor-name")
+        if name in robots and indexing_rate(words) != "0":
+            refused = " The start of a led run on it is refused." if robots[name].led else ""
+            yield found(
+                "engine-indexing",
+                name,
+                f"Its engine (process {pid}) reads its folder again and again while it runs. It may die of "
+                f"being asked meanwhile, with every running graph (H15).{refused}",
+                "Start it with --indexing-rate 0, and again after a change of its folder. Only where graphs "
+                "are written into its index while it runs (--index-folder) does it need another rate.",
+            )
+
+
+def _engines() -> Iterator[tuple[int, list[str]]]:
+    """Yield the process id and command line of each engine node on this computer."""
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            words = command_line(int(folder.name))
+        except OSError:
+            continue  # it has ended
+        if is_engine_node(words):
+            yield int(folder.name), words
+
+
+def look_here(place: Installation) -> list[Diagnostic]:
+    """Return the findings about ROS 2 and the robots, with the Python that runs this."""
+    return anyio.run(look, _registered(place.data), utc_us)
+
+
+def _asked(interpreter: Interpreter, place: Installation) -> list[Diagnostic]:
+    command = [
+        str(interpreter.path),
+        *("-m", "action_assistant", "doctor", "--only", "ros", "--here", "--json"),
+        *("--data", str(place.data)),
+    ]
+
+    try:
+        answer = subprocess.run(
+            command,
+            env=interpreter.environment(os.environ),
+            capture_output=True,
+            timeout=_PATIENCE_S,
+            check=False,
+        )
+        return msgspec.json.decode(answer.stdout, type=list[Diagnostic])
+    except subprocess.TimeoutExpired:
+        why = f"did not answer in {_PATIENCE_S:g} s"
+    except OSError as error:
+        why = f"cannot be started: {error.strerror}"
+    except msgspec.DecodeError:
+        said = answer.stderr.decode(errors="replace").strip().splitlines()
+        why = f"cannot run this program: {said[-1] if said else f'exit code {answer.returncode}'}"
+    return [
+        found(
+            "python-unusable",
+            interpreter.path,
+            f"The Python of the runner {why}.",
+            "Name another one in ACTION_ASSISTANT_RUNNER_PYTHON, or renew it (`make ros`).",
+        )
+    ]
+
+
+def _registered(data: Path) -> list[Registration]:
+    """Return the registered robots, read from the database without the runner; empty if it cannot
+    be read."""
+    path = data / "runner.db"
+    if not path.exists():
+        return []
+    engine = create_engine(unchanged(path))
+    try:
+        with engine.connect() as connection:
+            rows = connection.execute(queries.all_robots()).all()
+    except (sqlite3.Error, DBAPIError):
+        return []  # what is wrong with the file is said elsewhere
+    finally:
+        engine.dispose()
+    return [
+        Registration(
+            name=row.name,
+            domain=row.domain,
+            rmw=row.rmw,
+            get_service=row.get_service,
+            profile=row.profile,
+            led=row.led,
+        )
+        for row in rows
+    ]

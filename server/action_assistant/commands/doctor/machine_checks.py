@@ -27,7 +27,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state as backups
 from action_assistant.journal.copies.backup_state import BackupState, backup_state
 from action_assistant.journal.databases import database_of
-from action_assistant.logs.setup import log_settings
+from action_assistant.logs import log_settings
 from action_assistant.private_files import holds_nothing_else, of_others, open_to_others
 from action_assistant.system import posix
 from action_assistant.system.diagnostics import Diagnostic, fine, found

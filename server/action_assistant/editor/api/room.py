@@ -18,7 +18,7 @@ from action_assistant.editor.rooms.member import ByteRateLimits, Member
 from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
-from action_assistant.logs.context import about
+from action_assistant.logs import about
 from action_assistant.web.auth.access import person_of, plain, refuse
 from action_assistant.web.auth.roles import allowed
 from action_assistant.web.server.direct import DirectSocket, direct_socket

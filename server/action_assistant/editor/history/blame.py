@@ -11,8 +11,12 @@ from sqlalchemy import Connection
 from action_assistant.editor.documents.values import Root
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.document_places import field_of
-from action_assistant.editor.history.key_changes import LoggedChange, OverwrittenValue, unpacked
+from action_assistant.editor.history.key_changes import (
+    LoggedChange,
+    OverwrittenValue,
+    field_of,
+    unpacked,
+)
 from action_assistant.editor.history.merge_origins import (
     MergedBy,
     bring_up,

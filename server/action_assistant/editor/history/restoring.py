@@ -14,18 +14,16 @@ from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.values import ends_of
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.document_places import (
-    arrows_of,
-    by_owner,
-    is_place_of_card,
-    places_of,
-    proves,
-)
 from action_assistant.editor.history.key_changes import (
     LoggedChange,
     Packed,
     Place,
+    arrows_of,
+    by_owner,
+    is_place_of_card,
     owner_of,
+    places_of,
+    proves,
     unpacked,
 )
 from action_assistant.editor.interchange.document_edits import setting

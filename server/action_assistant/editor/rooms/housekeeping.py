@@ -18,7 +18,7 @@ from action_assistant.editor.log.graph_events import graph_of
 from action_assistant.editor.rooms.batch import ComparisonRequest
 from action_assistant.errors import Refused
 from action_assistant.journal.journal import Journal
-from action_assistant.logs.context import begin
+from action_assistant.logs import begin
 from action_assistant.web.auth.caller import detach_from_request
 from action_assistant.web.workers.lanes import RunInWorker
 

@@ -55,7 +55,7 @@ from action_assistant.editor.rooms.presence import PresenceNews, RoomPresence
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
-from action_assistant.logs.context import about
+from action_assistant.logs import about
 from action_assistant.web.server.direct import framed
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 

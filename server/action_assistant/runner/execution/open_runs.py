@@ -6,7 +6,7 @@ from typing import Final
 import anyio
 
 from action_assistant.kit.lru_cache import LruCache
-from action_assistant.logs.context import begin
+from action_assistant.logs import begin
 from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
 from action_assistant.runner.links.port import ForeignCommand, Link, Order
 from action_assistant.runner.links.unreachable import UnreachableLink

@@ -8,7 +8,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound
-from action_assistant.logs.context import begin
+from action_assistant.logs import begin
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
     SIMULATOR,

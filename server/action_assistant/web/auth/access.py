@@ -24,7 +24,7 @@ from action_assistant.errors import (
     WrongHost,
     WrongOrigin,
 )
-from action_assistant.logs.context import request_id
+from action_assistant.logs import request_id
 from action_assistant.web.auth.caller import Caller, set_caller
 from action_assistant.web.auth.keys import Keys, Person, ScrapeToken, Session
 from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards

@@ -11,7 +11,7 @@ from litestar.handlers import HTTPRouteHandler
 from litestar.types import ExceptionHandlersMap
 
 from action_assistant.errors import Refused
-from action_assistant.logs.context import request_id
+from action_assistant.logs import request_id
 from action_assistant.safe_text import hold_names
 
 log: Final = logging.getLogger(__name__)

@@ -10,7 +10,7 @@ from typing import Any, Final
 from litestar.enums import ScopeType
 from litestar.types import ASGIApp, Message, Receive, Scope, Send
 
-from action_assistant.logs.context import begin
+from action_assistant.logs import begin
 
 log: Final = logging.getLogger(__name__)
 

@@ -26,7 +26,7 @@ import anyio
 from anyio import CapacityLimiter, to_thread
 
 from action_assistant.errors import TooLarge, TooMany, Unavailable
-from action_assistant.logs.setup import set_up_worker
+from action_assistant.logs import set_up_worker
 from action_assistant.safe_text import make_streams_printable
 from action_assistant.system import posix
 from action_assistant.web.auth.caller import Caller, caller

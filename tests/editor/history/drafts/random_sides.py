@@ -6,8 +6,7 @@ from typing import Any, Final, NamedTuple
 import msgspec
 
 from action_assistant.editor.documents.values import ends_of
-from action_assistant.editor.history.document_places import exist, places_of
-from action_assistant.editor.history.key_changes import Place
+from action_assistant.editor.history.key_changes import Place, exist, places_of
 from editor.history.random_edits import Person
 
 _ENDS: Final = {"entry", "exit"}

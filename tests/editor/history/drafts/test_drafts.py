@@ -15,7 +15,6 @@ from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.document import Maps, maps_of
 from action_assistant.editor.history.blame import Blame, FieldBlame, keys_of
 from action_assistant.editor.history.change_index import ChangeIndex
-from action_assistant.editor.history.document_places import exist
 from action_assistant.editor.history.drafts.draft_merges import (
     AskedMerge,
     DraftMerges,
@@ -26,7 +25,7 @@ from action_assistant.editor.history.drafts.draft_merges import (
 from action_assistant.editor.history.drafts.drafts import Drafts, DraftView, NewDraft
 from action_assistant.editor.history.drafts.merge_previews import DraftSide
 from action_assistant.editor.history.graph_history import GraphHistory, HistoryEntry
-from action_assistant.editor.history.key_changes import owner_of
+from action_assistant.editor.history.key_changes import exist, owner_of
 from action_assistant.editor.history.restoring import EditsOfOne, Restoring
 from action_assistant.editor.interchange.document_edits import difference
 from action_assistant.editor.log import graph_events as h

@@ -7,9 +7,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from msgspec import UNSET
 
-from action_assistant.editor.history.document_places import exist
 from action_assistant.editor.history.drafts.merging import Choices, KeyMerge, Places, merged
-from action_assistant.editor.history.key_changes import Place, owner_of
+from action_assistant.editor.history.key_changes import Place, exist, owner_of
 from editor.history.drafts.random_sides import loose, sides
 from support.doses import examples
 

@@ -16,9 +16,8 @@ from action_assistant.editor.documents.document import Maps, is_same, read_maps
 from action_assistant.editor.documents.values import ROOTS, ends_of, is_aid
 from action_assistant.editor.history import index_queries
 from action_assistant.editor.history.change_summaries import Changes, maps_of, shortened, state_of
-from action_assistant.editor.history.document_places import by_owner, field_of
 from action_assistant.editor.history.drafts.merging import Choices, FoundConflict, merged
-from action_assistant.editor.history.key_changes import Place, owner_of
+from action_assistant.editor.history.key_changes import Place, by_owner, field_of, owner_of
 from action_assistant.editor.history.merge_origins import originals
 from action_assistant.editor.interchange.document_edits import Side, setting
 from action_assistant.umrf.check import check_written

@@ -14,13 +14,13 @@ from msgspec import UNSET
 
 from action_assistant.editor.documents.document import is_same
 from action_assistant.editor.documents.values import ends_of, is_aid, text_list
-from action_assistant.editor.history.document_places import (
+from action_assistant.editor.history.key_changes import (
+    Place,
     arrows_of,
     by_owner,
     exist,
     is_place_of_card,
 )
-from action_assistant.editor.history.key_changes import Place
 from action_assistant.editor.interchange.document_edits import Side, chosen
 from action_assistant.umrf.model import ENTRY, EXIT
 

@@ -10,8 +10,17 @@ from contextlib import contextmanager
 import pytest
 
 from action_assistant.errors import CannotStart
-from action_assistant.logs.context import about, begin, is_about, request_id, subjects
-from action_assistant.logs.setup import ConsoleLog, JsonLog, LogSettings, log_settings
+from action_assistant.logs import (
+    ConsoleLog,
+    JsonLog,
+    LogSettings,
+    about,
+    begin,
+    is_about,
+    log_settings,
+    request_id,
+    subjects,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.keys import Keys
 
@@ -96,7 +105,7 @@ def test_the_command_line_counts_before_the_environment() -> None:
 
 def test_uncaught_errors_are_logged_as_json_too() -> None:
     code = (
-        "import warnings, threading; from action_assistant.logs.setup import *;"
+        "import warnings, threading; from action_assistant.logs import *;"
         "set_up('editor', LogSettings('json')); warnings.warn('old');"
         "t = threading.Thread(target=lambda: 1 / 0); t.start(); t.join(); say('bye'); {}['x']"
     )
@@ -109,7 +118,7 @@ def test_uncaught_errors_are_logged_as_json_too() -> None:
 
 def test_a_worker_writes_as_its_parent_does() -> None:
     code = (
-        "import logging; from action_assistant.logs.setup import *;"
+        "import logging; from action_assistant.logs import *;"
         "from action_assistant.web.workers.lanes import child;"
         "hand_on(LogSettings('json', 'warning'));"
         "work = logging.getLogger('action_assistant.x').warning;"

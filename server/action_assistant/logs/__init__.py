@@ -1,1 +1,0 @@
-"""What the processes write about what they do: as lines for people, or as JSON for programs."""
