@@ -136,6 +136,7 @@ PARTS: Final[dict[str, Part]] = {
         {"TEST_EXAMPLES": "250"},
         (
             "tests/runner/execution/test_conducted_courses.py",
+            "tests/runner/execution/test_conducted_nested_courses.py",
             "tests/runner/execution/test_conducted_faults.py",
         ),
     ),

@@ -455,6 +455,10 @@ async def led_through(seed: int, *, values: bool = False) -> str:
     return "same"
 
 
+def test_a_run_is_over_only_when_the_outcome_of_its_last_piece_is_told() -> None:
+    run_in_virtual_time(lambda: led_through(218111301))
+
+
 def test_a_run_whose_graph_ends_every_engine_can_be_stopped() -> None:
     run_in_virtual_time(lambda: led_through(10075))
 

@@ -91,6 +91,7 @@ class Step:
         self.shown: ActionRun | None = None  # as it was passed on last
         self.shown_inside: dict[str, ActionRun] = {}  # the actions inside, as they were passed on
         self.is_stopped = False  # the graph or a person wants it to end
+        self.is_led = True  # its task goes on
         self.has_not_left = False  # its piece was refused before it left, or by its robot
         self.lacks_output = False
         self.troubles: set[str] = set()  # those that were told
@@ -110,6 +111,11 @@ class Step:
     def is_open(self) -> bool:
         """True while its piece may move: it was handed over and is not proven at rest."""
         return self.run is not None and self.run.end is None
+
+    @property
+    def is_going(self) -> bool:
+        """True while its piece may move, or has ended and its outcome is not told yet."""
+        return self.is_open or (self.run is not None and self.is_led)
 
     def waiting(self) -> anyio.CancelScope:
         """Return a scope that is cancelled when the step is to end."""

@@ -375,7 +375,7 @@ class Conductor:
     @property
     def _is_going(self) -> bool:
         moving = any(piece.run.end is None for piece in self._again.values())
-        return moving or any(step.is_open for step in self._steps.values())
+        return moving or any(step.is_going for step in self._steps.values())
 
     # --- one step -----------------------------------------------------------------------------
 
@@ -388,6 +388,8 @@ class Conductor:
         except Exception as error:  # the other steps go on; nothing further begins
             log.exception("run %s: %s cannot be led", self._first.run, step.node)
             self.hold(f"The runner has a fault at {step.node}: {error!r}")
+        step.is_led = False
+        self._show_what_may_be(self._first.run)
 
     async def _lead_in_turn(self, step: Step) -> None:
         while True:
