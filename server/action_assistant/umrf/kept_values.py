@@ -2,7 +2,7 @@
 
 An engine clears the outputs of an action at its end, but shows the inputs of actions that wait. So the
 action of a piece gets children, the keepers: they take its outputs as inputs, and never run, since
-nobody gives one of their required inputs (docs/umrf-and-the-engine.md 5). Pure.
+nobody gives one of their required inputs (docs/decisions/114-values-by-a-package.md). Pure.
 """
 
 from collections.abc import Collection, Iterator, Mapping
