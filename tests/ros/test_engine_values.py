@@ -27,11 +27,12 @@ from action_assistant.runner.runs.events import PieceEnded
 from action_assistant.umrf.kept_values import KEEPER_PACKAGE
 from action_assistant.umrf.model import Graph, Parameter, Relation
 from ros.generated_packages import Workspace, graph_of
-from ros.test_engine_conducted import ALWAYS, Engines, led, over
-from runner.harness import ANN, BEN, sequence
+from ros.led_engines import ALWAYS, Engines, as_led, over
+from runner.harness import ANN, BEN, MemoryJournal, sequence
 from support.real_engine import needs_engine
 from umrf.packages.sources import NATIVE
 
+DOMAIN = int(os.environ.get("TEST_LED_DOMAIN", "180"))
 LAPS = int(os.environ.get("TEST_VALUE_LAPS", "6"))
 SOURCE = Path(__file__).with_name("value_actions") / "ox_pass.cpp"
 GIVEN = {
@@ -71,7 +72,7 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
 def engines(tmp_path: Path, workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Engines:
     """Two engines that know the actions of the workspace only."""
     monkeypatch.setenv("ENGINE_LAB", str(workspace.lab))
-    return Engines(tmp_path)
+    return Engines(tmp_path, DOMAIN)
 
 
 def passing(name: str, *plain: dict[str, Any]) -> Graph:
@@ -110,6 +111,12 @@ def passing(name: str, *plain: dict[str, Any]) -> Graph:
     return msgspec.structs.replace(line, actions=actions, relations=relations)
 
 
+def alarms(journal: MemoryJournal) -> set[str]:
+    """The codes of the alarms of all runs and of their pieces."""
+    runs = [each.removeprefix("run/") for each in journal.streams if each.startswith("run/")]
+    return {alarm.code for run in runs for alarm in journal.history(run).alarms}
+
+
 def truth(engines: Engines) -> list[dict[str, Any]]:
     """What the code of the actions got and gave, oldest first."""
     found: list[dict[str, Any]] = []
@@ -142,7 +149,7 @@ def test_values_of_every_type_go_round_in_a_loop(engines: Engines) -> None:
 
     async def main() -> None:
         async with engines.led() as (control, journal):
-            run = (await control.start(led(loop), ANN)).run.id
+            run = (await control.start(as_led(loop), ANN)).run.id
             with anyio.fail_after(20 + 4 * LAPS):
                 while sum(isinstance(e, PieceEnded) for e in journal.told(run)) < 2 * LAPS:
                     assert run in control.open, journal.history(run)
@@ -150,6 +157,7 @@ def test_values_of_every_type_go_round_in_a_loop(engines: Engines) -> None:
             await control.stop(run, BEN)
             assert await over(control, run, 20) == "stopped"
             ends.extend(e for e in journal.told(run) if isinstance(e, PieceEnded))
+            assert alarms(journal) == set()
 
     anyio.run(main)
     assert {(e.node, e.outcome) for e in ends[:-1]} == {
@@ -185,7 +193,7 @@ def test_outcomes_stay_right_with_values_kept(engines: Engines) -> None:
 
     async def main() -> list[PieceEnded]:
         async with engines.led() as (control, journal):
-            run = (await control.start(led(graph), ANN)).run.id
+            run = (await control.start(as_led(graph), ANN)).run.id
             assert await over(control, run, 60) == "finished"
             return [e for e in journal.told(run) if isinstance(e, PieceEnded)]
 
@@ -202,17 +210,17 @@ def test_outcomes_stay_right_with_values_kept(engines: Engines) -> None:
 def test_an_output_that_is_not_set_is_told_and_hands_nothing_on(engines: Engines) -> None:
     graph = passing("silent", {"silent": True}, {}, {"silent": True, "result": "on_false"}, {})
 
-    async def main() -> tuple[list[PieceEnded], list[str]]:
+    async def main() -> tuple[list[PieceEnded], set[str]]:
         async with engines.led() as (control, journal):
-            run = (await control.start(led(graph), ANN)).run.id
+            run = (await control.start(as_led(graph), ANN)).run.id
             assert await over(control, run, 60) == "finished"
             ends = [e for e in journal.told(run) if isinstance(e, PieceEnded)]
-            return ends, [each.code for each in journal.history(run).alarms]
+            return ends, alarms(journal)
 
-    ends, alarms = anyio.run(main)
+    ends, told = anyio.run(main)
     assert [each.outcome for each in ends] == ["on_true", "on_true", "on_false", "on_true"]
     assert [set(each.unset) for each in ends] == [set(GIVEN), set(), set(GIVEN), set()]
-    assert "led_unset" in alarms
+    assert told == {"led_unset"}
     got = [each["values"] for each in truth(engines) if each["event"] == "got"]
     own = {name: value for name, (_, value) in GIVEN.items()}
     assert got[1] == own
@@ -227,9 +235,9 @@ def test_a_robot_without_the_package_is_refused_with_the_arrow(
     monkeypatch.setenv("ENGINE_LAB", str(bare.lab))
 
     async def main() -> None:
-        async with Engines(tmp_path).led() as (control, _):
+        async with Engines(tmp_path, DOMAIN).led() as (control, _):
             with pytest.raises(Conflict) as refused:
-                await control.start(led(passing("refused", {}, {})), ANN)
+                await control.start(as_led(passing("refused", {}, {})), ANN)
             assert "OxPass_0 hands" in refused.value.detail
             assert KEEPER_PACKAGE in refused.value.detail
 

@@ -241,6 +241,7 @@ class LedRobot(Robot):
         self.calls = calls
         self.counted = counted
         self.meant: dict[str, str] = {}  # by piece
+        self.gives: dict[str, dict[str, Any]] = {}  # likewise
         self.taken: Taken = defaultdict(list)
         self.known: tuple[str, ...] = ()
 
@@ -254,6 +255,7 @@ class LedRobot(Robot):
         self.counted[node] += 1
         behaviour = self.calls[node][min(visit, 5)]
         self.meant[order.run] = behaviour.result
+        self.gives[order.run] = dict(behaviour.outputs or {})
         slots = slots_of(codec.read(order.umrf).graph.actions[0].inputs)
         self.taken[node].append(
             {name: slot.value for name, slot in slots.items() if slot.has_value()}

@@ -1,6 +1,7 @@
 """Random histories of a conducted run with faults of all kinds: no piece is sent twice, none after the
 gate has closed, no outcome is made up, and nothing is called stopped that moves."""
 
+import json
 import random
 from collections import defaultdict
 from contextlib import suppress
@@ -12,22 +13,36 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from action_assistant.errors import Refused
+from action_assistant.runner.execution.conducted_steps import CONDUCTED_FACTS
 from action_assistant.runner.execution.interventions import RestRequest, confirm_rest
+from action_assistant.runner.execution.piece_values import returned_of
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.led_calls import LedCalls
 from action_assistant.runner.links.observations import Snapshot
-from action_assistant.runner.links.port import Order, Registration
+from action_assistant.runner.links.port import CallBegan, Order, Registration
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs.events import Observed, PieceEnded
+from action_assistant.runner.runs.events import (
+    Observed,
+    PieceBegan,
+    PieceEnded,
+    Published,
+    Requested,
+    RunEvent,
+    StopRequested,
+)
 from action_assistant.runner.runs.run import ENDED
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest, StartRequest
 from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.files import codec
+from action_assistant.umrf.kept_values import keeper
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.pieces import outcome_of
-from action_assistant.umrf.semantics import Behaviour, Engine, GraphRefused, Script
-from runner.execution.test_conducted_courses import ACCEPTED, LedRobot, drawn, played
+from action_assistant.umrf.semantics import Behaviour, Call, Engine, GraphRefused, Script
+from action_assistant.umrf.semantics.values import MISSING, slots_of
+from runner.execution.test_conducted_courses import ACCEPTED, LedRobot, drawn, played, with_values
 from runner.harness import ANN, BEN, MemoryJournal, at_once, clock_us, order, run_in_virtual_time
 from support.doses import examples
 
@@ -41,15 +56,18 @@ STEPS = [
 class Story:
     """One conducted run, what happens to it, and what must hold all the while."""
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, *, values: bool = False) -> None:
         self.chance = random.Random(seed)
         self.seed = seed
-        self.graph, self.calls = drawn(seed)
+        self.graph, self.calls = with_values(*drawn(seed), seed) if values else drawn(seed)
         self.counted: dict[str, int] = defaultdict(int)
         self.robots = {
             name: WatchedRobot(self, name, self.calls, self.counted, seed)
             for name in ROBOTS.values()
         }
+        if values:
+            for robot in self.robots.values():
+                robot.known = tuple(map(codec.write_action, (*self.graph.actions, keeper())))
         self.journal = MemoryJournal()
         self.control: ExecutionService | None = None
         self.run = ""
@@ -229,7 +247,58 @@ class Story:
                 assert each.outcome in shown or "on_stopped" in shown, (self.seed, each)
                 if each.piece in self.meant:
                     assert self.meant[each.piece] == each.outcome, (self.seed, each)
+        self._hold_values()
         assert self.journal.history(self.run).state in ENDED
+
+    def _hold_values(self) -> None:
+        """Check that each piece has given what its code gave, and was sent what the whole graph has."""
+        gives: dict[str, dict[str, Any]] = {}
+        for robot in self.robots.values():
+            gives |= robot.gives
+        told = self.journal.told(self.run)
+        for each in told:
+            if isinstance(each, PieceEnded) and each.outputs:
+                assert each.how == "shape", (self.seed, each)
+                gave = {
+                    name: value for name, value in gives[each.piece].items() if value is not MISSING
+                }
+                assert {k: json.loads(v) for k, v in each.outputs.items()} == gave, (
+                    self.seed,
+                    each,
+                )
+                assert set(each.unset) == gives[each.piece].keys() - gave.keys(), (self.seed, each)
+        calls = self._calls(told)
+        for each in told:
+            if isinstance(each, PieceBegan) and f"run/{each.piece}" in self.journal.streams:
+                first = self.journal.told(each.piece)[0]
+                assert isinstance(first, Requested)
+                slots = slots_of(codec.read(first.umrf).graph.actions[0].inputs)
+                sent = {name: slot.value for name, slot in slots.items() if slot.has_value()}
+                assert sent == calls[each.call].inputs, (self.seed, each, sent, calls[each.call])
+
+    def _calls(self, told: list[RunEvent]) -> dict[int, Call]:
+        """Return the calls of the whole graph by number, as its stored events bring them about."""
+        led = LedCalls({each.full_name for each in self.graph.actions})
+        engine = Engine(facts=CONDUCTED_FACTS, performer=led)
+        calls: dict[int, Call] = {}
+        began = next((each.at for each in told if isinstance(each, Published)), None)
+        if began is None:
+            return calls
+        engine.start(self.graph, 0.0)
+        newest = 0.0
+        for each in told:
+            newest = (
+                max(newest, (each.at - began) / 1000) if isinstance(each, PieceEnded) else newest
+            )
+            if isinstance(each, PieceEnded):
+                engine.returned(returned_of(each), newest)
+            elif isinstance(each, StopRequested):
+                newest = max(newest, (each.at - began) / 1000)
+                engine.stop(self.graph.name, newest)
+            calls |= {
+                each.call.number: each.call for each in led.news() if isinstance(each, CallBegan)
+            }
+        return calls
 
     @property
     def meant(self) -> dict[str, str]:
@@ -284,18 +353,25 @@ def foreign() -> Graph:
     return Graph(name="theirs", actions=graph.actions[:1], relations=graph.relations[:1])
 
 
-def lived(seed: int) -> str:
+def lived(seed: int, *, values: bool = False) -> str:
     """Live through one story in virtual time."""
     found = ""
 
     async def main() -> None:
         nonlocal found
-        story = Story(seed)
+        story = Story(seed, values=values)
         found = await story.live()
         story.hold()
 
     run_in_virtual_time(main)
     return found
+
+
+@pytest.mark.timeout(0)
+@settings(max_examples=examples(8), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(seed=st.integers(0, 2**32))
+def test_values_are_those_of_the_code_whatever_happens(seed: int) -> None:
+    lived(seed, values=True)
 
 
 @pytest.mark.timeout(0)
