@@ -288,17 +288,26 @@ class Journal(JournalReader):
         Raise Unavailable if the journal cannot be written."""
         return await self._write(lambda transaction: work(transaction.connection))
 
-    async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
+    async def take_out(
+        self,
+        removed: StreamRemoved,
+        also: Callable[[int], Addition],
+        *,
+        parts: Sequence[StreamRemoved] = (),
+    ) -> int:
         """Record that a stream is kept elsewhere from now on; return the number of that event, by
-        which `delete_some` may delete the stream. `also` returns another addition for the same
-        transaction, given that number. Raise Conflict if the stream has another end, Unavailable
-        if the journal cannot be written."""
-        body = msgspec.json.encode(removed)
+        which `delete_some` may delete the stream. `parts`: other streams that go with it, whose
+        numbers follow in their order. `also` returns another addition for the same transaction,
+        given that number. Raise Conflict if a stream has another end, Unavailable if the journal
+        cannot be written."""
+        streams = (removed, *parts)
+        drafts = tuple(Draft(each.kind, "", msgspec.json.encode(each)) for each in streams)
 
         def say(transaction: Transaction) -> int:
-            if transaction.end(removed.stream) != removed.end:
-                raise Conflict(f"{removed.stream} does not end at {removed.seq}.")
-            by = transaction.add(Addition(STREAM, (Draft(removed.kind, "", body),)))
+            for each in streams:
+                if transaction.end(each.stream) != each.end:
+                    raise Conflict(f"{each.stream} does not end at {each.seq}.")
+            by = transaction.add(Addition(STREAM, drafts)) - len(parts)
             transaction.add(also(by))
             return by
 

@@ -12,6 +12,8 @@ from sqlalchemy import text
 
 from action_assistant.journal.databases import ask_once, database_of
 from journal.servers import Server
+from runner.archives.test_retention import led
+from runner.review.old_runs import opened, retention
 from support.product import COMMAND, TOKEN, running
 from support.used_server import live
 
@@ -129,3 +131,21 @@ def test_a_target_that_runs_cannot_be_copied_to_is_refused_with_the_reason(data:
     ):
         refused = command("runs", "copy", "--to", to, "--data", data)
         assert (refused.returncode, told in refused.stderr) == (2, True), refused.stderr
+
+
+def test_an_archived_conducted_run_is_copied_with_its_pieces(
+    tmp_path: Path, postgres: Server
+) -> None:
+    async def archived() -> tuple[Path, dict[str, int]]:
+        data, known = await led(tmp_path)
+        journal = await opened(data)
+        assert (await retention(journal, data).sweep(30, None)).runs == 1
+        await journal.close()
+        return data, {each: len(events) for each, events in known.items()}
+
+    data, known = asyncio.run(archived())
+    url = postgres.new_database()
+    done = command("runs", "copy", "--to", url, "--data", data)
+    assert done.returncode == 0, done.stderr
+    counted = rows(url, "SELECT run, count(*) FROM action_assistant_runs.run_event GROUP BY run")
+    assert dict(counted) == known

@@ -8,21 +8,42 @@ import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import pytest
-from sqlalchemy import select
+from sqlalchemy import func, select
 
+from action_assistant.commands.backups.data_folder import archived
+from action_assistant.errors import Unavailable
 from action_assistant.journal.events import Event
+from action_assistant.journal.journal import Journal
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.analysis.keyframes import KeyframeStore
 from action_assistant.runner.analysis.replay import run_replay
+from action_assistant.runner.api.review import _lines
 from action_assistant.runner.archives import archive_file
-from action_assistant.runner.archives.archive_store import Archived
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.archives.archive_store import Archived, streams_of_pieces
+from action_assistant.runner.archives.raw_messages import RawArchived, raw_of
+from action_assistant.runner.links.observations import NodeState
+from action_assistant.runner.review.stored_runs import StoredRuns
+from action_assistant.runner.robots.recordings import Recording
+from action_assistant.runner.runs.events import (
+    Author,
+    Ended,
+    Led,
+    Observed,
+    PieceOf,
+    Published,
+    draft_of,
+)
+from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import stream_of
-from action_assistant.schema.runner_tables import run
+from action_assistant.schema.runner_tables import run, runner_event
 from runner.review.old_runs import (
+    DAY_US,
     LENGTHS,
+    add_run,
     archive_store,
     copies,
     everything,
@@ -33,6 +54,7 @@ from runner.review.old_runs import (
     retention,
     waited,
 )
+from runner.runs.test_runs import REQUESTED
 
 #: A process is killed at each such step of a sweep.
 EVERY = int(os.environ.get("SOAK_ARCHIVE_EVERY", "13"))
@@ -194,3 +216,151 @@ async def told_and_finished(data: Path) -> tuple[dict[str, list[Event]], dict[st
         return now, await everything(journal, data)
     finally:
         await journal.close()
+
+
+# --- conducted runs -----------------------------------------------------------------------------
+
+PIECES = [f"r4.{number}" for number in range(1, 12)]
+
+
+async def led(tmp_path: Path) -> tuple[Path, dict[str, list[Event]]]:
+    """Return a data folder with an old conducted run of eleven pieces, and its events by run."""
+    data = tmp_path / "led"
+    data.mkdir()
+    journal = await opened(data)
+    await add_run(journal, "r4", 4, 12, ended_at=3 * DAY_US)
+    for number, piece in enumerate(PIECES):
+        asked = msgspec.structs.replace(
+            REQUESTED,
+            run=piece,
+            engine="David",
+            simulated=False,
+            piece=PieceOf(run="r4", call=number, node="Go_0"),
+        )
+        seen = Observed(2_000, (NodeState(2_000, "patrol--Go_0", "Go_0", "RUNNING"),))
+        events = (asked, Published(1_100, "life"), seen, Ended(3 * DAY_US, "finished", "on_true"))
+        await journal.append(stream_of(piece), [draft_of(each) for each in events])
+    known = {each: await journal.read(stream_of(each)) for each in ("r4", *PIECES)}
+    await journal.close()
+    return data, known
+
+
+async def test_the_pieces_of_a_conducted_run_are_archived_and_read_back_with_it(
+    tmp_path: Path,
+) -> None:
+    data, known = await led(tmp_path)
+    journal = await opened(data)
+    shelved = archive_store(journal, data)
+    assert await shelved.pieces("r4") == PIECES
+    questions = StoredRuns(shelved)
+    exported = await questions.export("r4", "mcap")
+    assert b"/actions/patrol--Go_0/Go_0" in exported
+    assert (await retention(journal, data).sweep(30, None)).runs == 1
+    (left,) = await journal.query(
+        select(func.count().label("n")).where(runner_event.c.stream.startswith("run/"))
+    )
+    assert left.n == 0
+    for _ in range(2):
+        assert await journal.verify() == []
+        assert {each: await shelved.read(stream_of(each)) for each in known} == known
+        assert await shelved.pieces("r4") == PIECES
+        assert await questions.export("r4", "mcap") == exported
+        assert (await questions.followed("r4.2", False))[0].end == "finished"
+        await journal.rebuild()  # without the events
+    files = archived(data / "runner.db")
+    assert len(files) == 12
+    for place, sha256 in files.items():
+        assert archive_file.sha256_of(data / "archive" / place) == sha256
+    (data / "archive" / "runs" / "1970-01" / "run-000004-r4.3.jsonl.gz").unlink()
+    with pytest.raises(Archived, match=r"run-000004-r4\.3"):
+        await archive_store(journal, data).read("run/r4.3")
+    await journal.close()
+
+
+async def test_a_conducted_run_is_archived_with_all_of_its_pieces_or_not_at_all(
+    tmp_path: Path,
+) -> None:
+    data, known = await led(tmp_path)
+    with closing(sqlite3.connect(data / "runner.db", isolation_level=None)) as file:
+        body = "UPDATE event SET body = x'7b' WHERE stream = 'run/r4.3' AND seq = 3"
+        assert file.execute(body).rowcount == 1
+    journal = await opened(data)
+    open_piece = retention(journal, data, is_open="r4.11".__eq__)
+    assert (await open_piece.sweep(30, None)).problems == [
+        "Run 4 stays here: One of its actions moves again."
+    ]
+    (problem,) = (await retention(journal, data).sweep(30, None)).problems
+    assert problem.startswith("Run 4 stays here")
+    shelved = archive_store(journal, data)
+    lengths = {each: len(await journal.read(stream_of(each))) for each in known}
+    assert lengths == {each: len(events) for each, events in known.items()}
+    assert await shelved.read("run/r4.1") == known["r4.1"]
+    await journal.close()
+
+
+@pytest.mark.parametrize("cleared", [0, 1, 5])
+async def test_a_sweep_that_was_interrupted_clears_the_pieces_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cleared: int
+) -> None:
+    data, known = await led(tmp_path)
+    journal = await opened(data)
+    delete_some, calls = Journal.delete_some, iter(range(100))
+
+    async def dies(self: Journal, stream: str, by: int) -> bool:
+        if next(calls) >= cleared:
+            raise Unavailable("the process ends here")
+        return await delete_some(self, stream, by)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Journal, "delete_some", dies)
+        await retention(journal, data).sweep(30, None)
+    shelved = archive_store(journal, data)
+    assert {each: await shelved.read(stream_of(each)) for each in known} == known
+    assert (await retention(journal, data).sweep(30, None)).problems == []
+    assert await journal.query(select(runner_event).where(streams_of_pieces("r4").exists())) == []
+    assert await journal.verify() == []
+    assert {each: await shelved.read(stream_of(each)) for each in known} == known
+    await journal.close()
+
+
+async def test_the_export_of_a_conducted_run_has_the_events_of_its_pieces(tmp_path: Path) -> None:
+    data, known = await led(tmp_path)
+    journal = await opened(data)
+    questions = StoredRuns(archive_store(journal, data))
+
+    class Here:
+        """Answers questions in this process."""
+
+        async def value(self, question: Any, *args: Any) -> Any:
+            """Return the answer."""
+            return await question(questions, *args)
+
+    async def exported() -> list[Any]:
+        seq, page = await questions.lines("r4", 0)
+        pages = [each async for each in _lines(Here(), "r4", seq, page)]  # type: ignore[arg-type]
+        return [msgspec.json.decode(each) for each in b"".join(pages).splitlines()]
+
+    before = await exported()
+    assert [(each["run"], each["seq"]) for each in before] == [
+        (run_id, event.seq) for run_id, events in known.items() for event in events
+    ]
+    await retention(journal, data).sweep(30, None)
+    assert await exported() == before
+    await journal.close()
+
+
+def test_the_raw_messages_of_a_conducted_run_are_those_of_all_its_robots() -> None:
+    players = {"Go_0": "David", "Wait_0": "Carol"}
+    asked = msgspec.structs.replace(
+        REQUESTED, engine="conducted", simulated=False, led=Led(robots={}, players=players)
+    )
+    found = replay([asked, Ended(2_000, "finished", "on_true")])
+    assert found is not None
+    here = {each: [Recording("1970-01-01T00", 10)] for each in found.robots}
+    gone = [RawArchived(3_000, "Carol", "1970-01-01T00", "raw/Carol/x", 10, "")]
+    raw = raw_of(found, {"David": here["David"]}, gone, 2_000)
+    assert [(each.robot, each.file) for each in raw.hours] == [
+        ("Carol", "raw/Carol/x"),
+        ("David", None),
+    ]
+    assert [each.robot for each in raw_of(found, here, [], 2_000).hours] == ["Carol", "David"]

@@ -990,19 +990,21 @@ export interface RunnerApi {
     };
     /**
      * RawHour
-     * @description An hour of raw messages: its name, its size in bytes (gzipped), and, once it is archived,
-     *     since when and in which file of the folder of archives.
+     * @description An hour of raw messages of `robot`: its name, its size in bytes (gzipped), and, once it is
+     *     archived, since when and in which file of the folder of archives.
      */
     RawHour: {
         name: string;
         bytes: number;
         archived_at: string | null;
         file: string | null;
+        robot: string;
     };
     /**
      * RawMessages
-     * @description The raw messages of `robot` from the hours of a run, oldest first. `text`: a note for people
-     *     about missing ones, "" if all are on this computer.
+     * @description The raw messages from the hours of a run, of all robots of a conducted one, oldest first.
+     *     `robot`: the engine of the run; `text`: a note for people about missing ones, "" if all are on
+     *     this computer.
      */
     RawMessages: {
         robot: string;

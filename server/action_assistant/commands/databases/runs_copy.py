@@ -199,7 +199,12 @@ class RunsCopier:
             if stream in there:
                 continue
             try:
-                events = await self._archives.read(stream)
+                pieces = await self._archives.pieces(row.id)
+                events = [
+                    event
+                    for each in (row.id, *pieces)
+                    for event in await self._archives.read(f"run/{each}")
+                ]
             except Refused as error:
                 self.missing.append(error.detail)
                 continue

@@ -87,9 +87,20 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
         hold_names(self, "words", "cause")
 
 
+class ArchivedPiece(msgspec.Struct, frozen=True, kw_only=True):
+    """The archive of a piece of a conducted run. `run`: the id of the piece; `file`: its path in the
+    folder of archives; `by`: the number of the removal event."""
+
+    run: str
+    file: str
+    sha256: str
+    by: int
+
+
 class RunArchived(msgspec.Struct, frozen=True):
     """The events of a run were moved from the journal to an archive. `file`: its path in the folder
-    of archives; `by`: the number of the removal event; `row`: the run's row at that time."""
+    of archives; `by`: the number of the removal event; `row`: the run's row at that time; `pieces`:
+    the archives of its pieces, if it was conducted."""
 
     kind: ClassVar[str] = "run.archived.v1"
 
@@ -98,6 +109,7 @@ class RunArchived(msgspec.Struct, frozen=True):
     sha256: str
     by: int
     row: dict[str, Any]
+    pieces: tuple[ArchivedPiece, ...] = ()
 
 
 def stream_about(run: str) -> str:

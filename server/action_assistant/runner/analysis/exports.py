@@ -14,7 +14,7 @@ from action_assistant.runner.links.observations import NodeResult, NodeState, Sn
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import of_visit
-from action_assistant.runner.runs.events import Observed
+from action_assistant.runner.runs.events import Observed, PieceSeen
 from action_assistant.runner.runs.run import Run
 from action_assistant.version import VERSION
 
@@ -110,15 +110,18 @@ def _cell(text: str) -> str:
     return f"'{text}" if text.startswith(_FORMULA) else text
 
 
-def mcap(events: Iterable[Event]) -> bytes:
+def mcap(events: Iterable[Event], pieces: Iterable[Iterable[Event]] = ()) -> bytes:
     """Return MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, at the
     time they were shown), `/visits/NAME` (an ended visit, at the time its end was known; with
-    `at_least`, visits may have been missed and `visit` is a lower bound), `/log`."""
+    `at_least`, visits may have been missed and `visit` is a lower bound), `/log`. `pieces`: the events
+    of each piece of a conducted run, whose robots showed them under the names of their own graphs."""
     out = io.BytesIO()
     writer = Writer(out, compression=CompressionType.NONE)
     writer.start(profile="", library=f"temoto-action-assistant {VERSION}")
     track = _Track(writer)
     fold(None, list(events), track.see)
+    for piece in pieces:
+        fold(None, list(piece), track.see_piece)
     finish: Callable[[], None] = writer.finish
     finish()
     return out.getvalue()
@@ -147,8 +150,18 @@ class _Track:
         if isinstance(decoded, Observed):
             for item in decoded.seen:
                 self._seen(item)
+        if isinstance(decoded, PieceSeen):
+            topic = f"/actions/{after.graph_name}/{decoded.node}"
+            shown = {"state": decoded.state, "how": "observed"}
+            self._write("action", topic, decoded.at, shown)
         self._ended(at, before, after)
         self._said(before, after)
+
+    def see_piece(self, event: Event, decoded: Any, before: Run | None, after: Run) -> None:
+        """Write what one event of a piece showed; its run tells the rest."""
+        if isinstance(decoded, Observed):
+            for item in decoded.seen:
+                self._seen(item)
 
     def _ended(self, at: int, before: Run | None, after: Run) -> None:
         counts: dict[str, VisitCount] = {}

@@ -178,9 +178,8 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def raw(run: str) -> Response[RawMessages]:
         found = await services.control.find(run)
         recordings = services.control.robots.recordings
-        here = (
-            [] if found.simulated or recordings is None else await recordings.listed(found.engine)
-        )
+        robots = () if recordings is None else found.robots
+        here = {each: await recordings.listed(each) for each in robots if recordings is not None}
         text = await services.worker_queries.text(StoredRuns.raw, run, here, utc_us())
         return json_of(text, RawMessages)
 
@@ -188,9 +187,13 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 async def _lines(queries: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
-    while page:
-        yield page
-        seq, page = await queries.value(StoredRuns.lines, run, seq)
+    """Yield the lines of a run from its first page on, then those of its pieces, if it was led."""
+    for each in (run, *await queries.value(StoredRuns.pieces, run)):
+        if each != run:
+            seq, page = await queries.value(StoredRuns.lines, each, 0)
+        while page:
+            yield page
+            seq, page = await queries.value(StoredRuns.lines, each, seq)
 
 
 def _many_runs(services: RunnerServices) -> list[ControllerRouterHandler]:

@@ -5,7 +5,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Final, Protocol
 
-from sqlalchemy import Row, Select, select
+import msgspec
+from sqlalchemy import ColumnElement, Row, Select, literal, select
 
 from action_assistant.errors import Refused
 from action_assistant.journal.chain import Head
@@ -19,10 +20,12 @@ from action_assistant.journal.events import (
 )
 from action_assistant.journal.removal import StreamRemoved
 from action_assistant.kit.lru_cache import LruCache
+from action_assistant.runner.analysis import annotations
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives import archive_file
 from action_assistant.runner.runs import views
-from action_assistant.schema.runner_tables import run
+from action_assistant.runner.runs.history import whole_of
+from action_assistant.schema.runner_tables import run, runner_event
 from action_assistant.web.workers.lanes import RunInWorker
 
 _PREFIX: Final = "run/"
@@ -44,10 +47,17 @@ class Journaled(SnapshotJournal, Protocol):
         """Return the end of a stream: the seq of its last event, and its chain of hashes."""
         ...
 
-    async def take_out(self, removed: StreamRemoved, also: Callable[[int], Addition]) -> int:
-        """Record that a stream is kept elsewhere from now on, and return the position of that
-        record. `also` makes events to store with it, given that position. Raise Conflict if the
-        stream has another end, Unavailable if the journal cannot be written."""
+    async def take_out(
+        self,
+        removed: StreamRemoved,
+        also: Callable[[int], Addition],
+        *,
+        parts: Sequence[StreamRemoved] = (),
+    ) -> int:
+        """Record that a stream is kept elsewhere from now on, and return the number of that record.
+        `parts`: streams that go with it, whose numbers follow. `also` makes events to store with
+        it, given that number. Raise Conflict if a stream has another end, Unavailable if the
+        journal cannot be written."""
         ...
 
     async def delete_some(self, stream: str, by: int) -> bool:
@@ -108,18 +118,44 @@ class ArchiveStore:
             return await self._journal.bare(stream, usual, after=after, upto=upto)
         return bare(await self.read(stream, after=after, upto=upto), usual)
 
-    async def place(self, stream: str) -> Row[Any] | None:
-        """Return number, archiving time and file of an archived run; None if its events are in the
+    async def place(self, stream: str) -> views.ArchivePlace | None:
+        """Return the archive of an archived run, or of a piece of one; None if its events are in the
         journal."""
         if not stream.startswith(_PREFIX):
             return None
+        id_ = stream.removeprefix(_PREFIX)
+        whole = whole_of(id_)
         wanted = select(run.c.number, run.c.archived_at, run.c.archived_as).where(
-            run.c.id == stream.removeprefix(_PREFIX), run.c.archived_at.is_not(None)
+            run.c.id == (whole or id_), run.c.archived_at.is_not(None)
         )
         rows = await self._journal.query(wanted)
-        return rows[0] if rows else None
+        if not rows:
+            return None
+        place = views.ArchivePlace(rows[0].number, rows[0].archived_at, rows[0].archived_as)
+        if not whole:
+            return place
+        pieces = await self._archived_pieces(whole)  # an older version left them in the journal
+        return msgspec.structs.replace(place, archived_as=pieces[id_]) if id_ in pieces else None
 
-    async def _events(self, stream: str, place: Row[Any]) -> list[Event]:
+    async def pieces(self, run_id: str) -> list[str]:
+        """Return the ids of the pieces of a conducted run, also of an archived one, in the order in
+        which they were sent. Raise Unavailable if the journal cannot be read."""
+        rows = await self._journal.query(streams_of_pieces(run_id))
+        here = (row.stream.removeprefix(_PREFIX) for row in rows)
+        gone = await self._archived_pieces(run_id)
+        found = {each for each in (*here, *gone) if whole_of(each) == run_id}
+        return sorted(found, key=lambda piece: int(piece.rpartition(".")[2]))
+
+    async def _archived_pieces(self, run_id: str) -> dict[str, str]:
+        """Return the archives of the pieces of a run: their files by id."""
+        about = await self._journal.read(annotations.stream_about(run_id))
+        put = [each.body for each in about if each.kind == annotations.RunArchived.kind]
+        if not put:
+            return {}
+        archived = msgspec.json.decode(put[-1], type=annotations.RunArchived)
+        return {each.run: each.file for each in archived.pieces}
+
+    async def _events(self, stream: str, place: views.ArchivePlace) -> list[Event]:
         if (known := self._cache.get(stream)) is not None:
             return known
         path = self.folder / place.archived_as
@@ -134,3 +170,9 @@ class ArchiveStore:
         if not events or events[0].stream != stream:
             raise archive_file.Damaged(f"{place.archived_as} holds another run.")
         return self._cache.put(stream, events, sum(len(each.body) + 200 for each in events))
+
+
+def streams_of_pieces(run_id: "str | ColumnElement[str]") -> Select[Any]:
+    """Select the streams in the journal whose names begin as those of the pieces of a run do."""
+    stream, own = runner_event.c.stream, literal(_PREFIX) + run_id
+    return select(stream).distinct().where(stream > own + ".", stream < own + "/")

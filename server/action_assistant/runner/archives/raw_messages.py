@@ -1,6 +1,6 @@
 """The raw messages of a robot from the time of a run: in the recordings, in an archive, or gone."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime
 from typing import ClassVar
 
@@ -30,18 +30,20 @@ def stream_of_raw(robot: str) -> str:
 
 
 class RawHour(msgspec.Struct, frozen=True):
-    """An hour of raw messages: its name, its size in bytes (gzipped), and, once it is archived,
-    since when and in which file of the folder of archives."""
+    """An hour of raw messages of `robot`: its name, its size in bytes (gzipped), and, once it is
+    archived, since when and in which file of the folder of archives."""
 
     name: str
     bytes: int
     archived_at: datetime | None = None
     file: str | None = None
+    robot: str = ""
 
 
 class RawMessages(msgspec.Struct, frozen=True):
-    """The raw messages of `robot` from the hours of a run, oldest first. `text`: a note for people
-    about missing ones, "" if all are on this computer."""
+    """The raw messages from the hours of a run, of all robots of a conducted one, oldest first.
+    `robot`: the engine of the run; `text`: a note for people about missing ones, "" if all are on
+    this computer."""
 
     robot: str
     hours: list[RawHour]
@@ -49,20 +51,27 @@ class RawMessages(msgspec.Struct, frozen=True):
 
 
 def raw_of(
-    run: Run, here: Sequence[Recording], gone: Iterable[RawArchived], until: int
+    run: Run,
+    here: Mapping[str, Sequence[Recording]],
+    gone: Iterable[RawArchived],
+    until: int,
 ) -> RawMessages:
-    """Return the raw messages of a run. `here`: recordings of its robot from the run's time;
-    `gone`: archived hours of its robot, from any time; `until`: the end of the run, or now, in
+    """Return the raw messages of a run. `here`: recordings from the run's time, by robot; `gone`:
+    archived hours of its robots, from any time; `until`: the end of the run, or now, in
     microseconds UTC."""
     if run.simulated:
         return RawMessages(run.engine, [], "A simulated engine sends no messages.")
     first, last = hours(run.started_at or run.requested_at, until)
     found = {
-        put.name: RawHour(put.name, put.bytes, views.time(put.at), put.file)
+        (put.name, put.robot): RawHour(put.name, put.bytes, views.time(put.at), put.file, put.robot)
         for put in gone
         if first <= put.name[: len(first)] <= last
     }
-    found |= {each.name: RawHour(each.name, each.bytes) for each in here}
+    found |= {
+        (each.name, robot): RawHour(each.name, each.bytes, robot=robot)
+        for robot, recorded in here.items()
+        for each in recorded
+    }
     listed = [found[name] for name in sorted(found)]
     return RawMessages(run.engine, listed, _text(listed))
 

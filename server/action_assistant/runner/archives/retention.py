@@ -23,7 +23,7 @@ from action_assistant.journal.removal import StreamRemoved
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.archives import archive_file
-from action_assistant.runner.archives.archive_store import Journaled
+from action_assistant.runner.archives.archive_store import Journaled, streams_of_pieces
 from action_assistant.runner.archives.raw_messages import RawArchived, stream_of_raw
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.runs import views
@@ -116,11 +116,48 @@ class Retention:
             return SweepResult(runs=done, raw=found.raw, more=more, problems=problems)
 
     async def _archive_run(self, row: Row[Any]) -> None:
-        """Archive one run. Raise Refused or OSError if that fails; its events then stay in the
-        journal."""
-        stream = stream_of(row.id)
+        """Archive one run, with its pieces if it was conducted. Raise Refused or OSError if that
+        fails; its events then stay in the journal."""
+        pieces = [
+            each.stream.removeprefix("run/")
+            for each in await self._journal.query(streams_of_pieces(row.id))
+        ]
+        for each in pieces:
+            if self._is_open(each):
+                raise Conflict("One of its actions moves again.")
+        removed, *parts = [
+            await self._written(each, _place(row, each)) for each in (row.id, *pieces)
+        ]
+        at = self._clock_us()
+
+        def recorded(by: int) -> Addition:
+            archived = annotations.RunArchived(
+                at,
+                removed.kept,
+                removed.sha256,
+                by,
+                _fields(row),
+                tuple(
+                    annotations.ArchivedPiece(
+                        run=run, file=each.kept, sha256=each.sha256, by=number
+                    )
+                    for number, (run, each) in enumerate(zip(pieces, parts, strict=True), by + 1)
+                ),
+            )
+            return Addition(annotations.stream_about(row.id), (annotations.draft(archived),))
+
+        if await self._journal.query(_pinned(row.id)):
+            raise Conflict("Somebody has pinned it meanwhile.")
+        self._may_be_unfinished = True
+        by = await self._journal.take_out(removed, recorded, parts=parts)
+        for number, each in enumerate((removed, *parts), by):
+            await self._clear(each.stream, number)
+        self._may_be_unfinished = False
+
+    async def _written(self, run_id: str, place: str) -> StreamRemoved:
+        """Write the archive of a stream, and return what is to be recorded of it."""
+        stream = stream_of(run_id)
         end = await self._journal.end(stream)
-        place = _place(row)
         path = self.keep.folder / place
         written = await self._run_in_worker(
             lambda: archive_file.ArchiveFile(path, stream, place, end)
@@ -134,19 +171,7 @@ class Retention:
             digest = await self._run_in_worker(written.close)
         finally:
             written.abandon()
-        at = self._clock_us()
-        removed = StreamRemoved(stream, end.seq, end.chain.hex(), place, digest)
-
-        def recorded(by: int) -> Addition:
-            archived = annotations.RunArchived(at, place, digest, by, _fields(row))
-            return Addition(annotations.stream_about(row.id), (annotations.draft(archived),))
-
-        if await self._journal.query(_pinned(row.id)):
-            raise Conflict("Somebody has pinned it meanwhile.")
-        self._may_be_unfinished = True
-        by = await self._journal.take_out(removed, recorded)
-        await self._clear(stream, by)
-        self._may_be_unfinished = False
+        return StreamRemoved(stream, end.seq, end.chain.hex(), place, digest)
 
     async def _clear(self, stream: str, by: int) -> None:
         left = True
@@ -163,8 +188,10 @@ class Retention:
             archived = next(
                 event for event in reversed(events) if event.kind == annotations.RunArchived.kind
             )
-            by = msgspec.json.decode(archived.body, type=annotations.RunArchived).by
-            await self._clear(stream_of(row.id), by)
+            gone = msgspec.json.decode(archived.body, type=annotations.RunArchived)
+            await self._clear(stream_of(row.id), gone.by)
+            for piece in gone.pieces:
+                await self._clear(stream_of(piece.run), piece.by)
         self._may_be_unfinished = False
 
     # --- raw messages -------------------------------------------------------------------------
@@ -219,12 +246,14 @@ def _pinned(run_id: str) -> Select[Any]:
 
 def _unfinished() -> Select[Any]:
     here = exists().where(runner_event.c.stream == literal("run/") + run.c.id)
-    return select(run.c.id).where(run.c.archived_at.is_not(None), here)
+    pieces = streams_of_pieces(run.c.id).exists()
+    return select(run.c.id).where(run.c.archived_at.is_not(None), or_(here, pieces))
 
 
-def _place(row: Row[Any]) -> str:
+def _place(row: Row[Any], run_id: str) -> str:
+    """Return the file for the events of a run, or of a piece of it."""
     ended: datetime = views.time(row.ended_at)
-    return f"runs/{ended:%Y-%m}/run-{row.number:06d}-{row.id}.jsonl.gz"
+    return f"runs/{ended:%Y-%m}/run-{row.number:06d}-{run_id}.jsonl.gz"
 
 
 def _fields(row: Row[Any]) -> dict[str, Any]:

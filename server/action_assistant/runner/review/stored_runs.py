@@ -182,24 +182,30 @@ class StoredRuns:
         is no such run."""
         return sent_of(await self._history.requested(run_id))
 
-    async def place(self, run_id: str) -> Row[Any] | None:
+    async def place(self, run_id: str) -> views.ArchivePlace | None:
         """Return number, time and file of an archived run; None when its events are in the
         journal."""
         return await self._journal.place(stream_of(run_id))
 
-    async def raw(self, run_id: str, recordings: Sequence[Recording], now: int) -> RawMessages:
-        """Return the raw messages of the run's robot from the time of the run. `recordings`: all
-        recordings of that robot on this computer; `now`: microseconds UTC. Raise NotFound if
+    async def raw(
+        self, run_id: str, recordings: Mapping[str, Sequence[Recording]], now: int
+    ) -> RawMessages:
+        """Return the raw messages of the run's robots from the time of the run. `recordings`: all
+        recordings of each of them on this computer; `now`: microseconds UTC. Raise NotFound if
         there is no such run."""
         run_ = await self.known(run_id)
         until = run_.ended_at or now
         first, last = hours(run_.started_at or run_.requested_at, until)
-        here = [
-            each
-            for each in recordings
-            if not run_.simulated and first <= each.name[: len(first)] <= last
+        here = {
+            robot: [each for each in listed if first <= each.name[: len(first)] <= last]
+            for robot, listed in recordings.items()
+            if robot in run_.robots
+        }
+        archived = [
+            event
+            for robot in run_.robots
+            for event in await self._journal.read(stream_of_raw(robot))
         ]
-        archived = await self._journal.read(stream_of_raw(run_.engine))
         gone = (msgspec.json.decode(event.body, type=RawArchived) for event in archived)
         return raw_of(run_, here, gone, until)
 
@@ -231,16 +237,25 @@ class StoredRuns:
             return exports.intervals(found)
         events = await self._journal.read(stream_of(run_id))
         if form == "mcap":
-            return exports.mcap(events)
+            pieces = [
+                await self._journal.read(stream_of(each))
+                for each in await self._journal.pieces(run_id)
+            ]
+            return exports.mcap(events, pieces)
         return b"".join(exports.lines(run_id, events))
 
     async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
-        """Return a page of JSON lines, and the seq of its last event: a long run need not be in
-        memory as a whole. Raises NotFound when the run has no events."""
+        """Return a page of JSON lines of one stream, and the seq of its last event: a long run need
+        not be in memory as a whole. Raises NotFound when the run has no events."""
         events = await self._journal.read(stream_of(run_id), after=after, limit=_PAGE)
         if not events and not after:
             raise NotFound("There is no such run.")
         return events[-1].seq if events else after, b"".join(exports.lines(run_id, events))
+
+    async def pieces(self, run_id: str) -> list[str]:
+        """Return the ids of the pieces of a conducted run, in the order in which they were sent.
+        Raise Unavailable if the journal cannot be read."""
+        return await self._journal.pieces(run_id)
 
     async def script(
         self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None

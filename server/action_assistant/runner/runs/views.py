@@ -194,6 +194,15 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
         hold_names(self, "unconfirmed", "detail")
 
 
+class ArchivePlace(msgspec.Struct, frozen=True):
+    """The archive of a run: the run's number, when it was archived (microseconds UTC), and the path
+    of the file in the folder of archives."""
+
+    number: int
+    archived_at: int
+    archived_as: str
+
+
 class ArchivedShown(msgspec.Struct, frozen=True):
     """The time at which the events of a run were moved to an archive, and its file in the folder of
     archives."""
@@ -304,11 +313,11 @@ def whole_view(
     graph: Sent,
     *,
     recorded: bool = True,
-    place: Row[Any] | None = None,
+    place: ArchivePlace | Row[Any] | None = None,
     cache: ActionViewCache | None = None,
 ) -> RunWhole:
     """Return a run with all visits and its graph; with a `cache` with as many visits as `run_view`.
-    `place`: the row of the run's archive; None if its events are in the journal."""
+    `place`: the run's archive, or a row with it; None if its events are in the journal."""
     actions = _actions(run, _WHOLE if cache is None else _LIVE, cache)
     return RunWhole(
         **_fields(run, recorded),
@@ -380,8 +389,9 @@ def list_entry(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
     )
 
 
-def archived(row: Row[Any] | None) -> ArchivedShown | None:
-    """Return when and where the events of a run were archived, from its row; None if they were not."""
+def archived(row: ArchivePlace | Row[Any] | None) -> ArchivedShown | None:
+    """Return when and where the events of a run were archived, from its row or its archive; None if
+    they were not."""
     if row is None or row.archived_at is None:
         return None
     return ArchivedShown(time(row.archived_at), row.archived_as)
