@@ -170,6 +170,7 @@ CODES: Final[dict[str, Code]] = {
     "loaded-anew": Code("hazard", _WARNING, "an action that may run more than once", "on a robot that is led, it is loaded anew each time and forgets what it remembers"),
     "spontaneous-across": Code("hazard", _WARNING, "a spontaneous action that leads to an action of another actor", "a runner that leads the robots cannot stop what comes after it at each of its ends"),
     "stop-across": Code("hazard", _WARNING, "an arrow that stops an action of another actor", "the stop is a message of the runner that leads the robots, and does not come without it"),
+    "subgraph-across": Code("hazard", _WARNING, "a sub-graph whose actions several actors perform", "a runner that leads the robots sends a sub-graph to one robot and refuses this one; one graph without graphs inside can be led"),
     # The rest
     "instance-id-cut": Code("other", _WARNING, "a number with decimals", "the engine cuts them"),
     "name-class": Code("other", _WARNING, "a name that no C++ class can have", "no action package can have it; a sub-graph may"),

@@ -24,7 +24,7 @@ from umrf.semantics.traces import graph_of, optional
 
 KINDS = {
     "actors", "synchroniser", "values-across-robots", "two-at-once", "loaded-anew",
-    "spontaneous-across", "stop-across",
+    "spontaneous-across", "stop-across", "subgraph-across",
 }  # fmt: skip
 TEXT = leaf("string")
 STOPS = Conditions("stop", "stop", "ignore", "ignore")
@@ -178,7 +178,7 @@ def test_actors_count_at_any_depth_and_the_action_around_lends_its_own() -> None
     found = told(owned(outer, A="Carrier", S="Scout"), middle, shared)
     assert found == [("actors", "")]
     found = told(owned(outer, A="Carrier"), owned(middle, T="Carrier"), shared)
-    assert found == [("actors", ""), ("values-across-robots", "S")]
+    assert found == [("actors", ""), ("subgraph-across", "S"), ("values-across-robots", "S")]
     problem = of_kind(owned(outer, S="Carrier"), "values-across-robots", middle, shared)
     place = problem.inside
     assert place is not None
@@ -192,9 +192,19 @@ def test_an_arrow_to_a_sub_graph_leads_to_the_actor_of_its_first_action() -> Non
     outer = with_values(outer, A=({}, {"p": TEXT}), S=({"p": TEXT}, {}))
     sub = with_values(inner("entry>X", "X>Y", "Y>exit"), X=({"p": TEXT}, {}))
     sub = owned(sub, X="Carrier", Y="Scout")
-    assert told(owned(outer, A="Carrier"), sub) == [("actors", "")]
+    assert told(owned(outer, A="Carrier"), sub) == [("actors", ""), ("subgraph-across", "S")]
     found = told(owned(outer, A="Scout"), sub)
-    assert found == [("actors", ""), ("values-across-robots", "A>S")]
+    assert found == [("actors", ""), ("subgraph-across", "S"), ("values-across-robots", "A>S")]
+
+
+def test_a_sub_graph_of_several_actors_is_named_once_and_one_of_one_actor_is_not() -> None:
+    middle, deepest = inner("entry>T", "T>exit"), inner("entry>X", "X>Y", "Y>exit", name="T")
+    outer = owned(graph_of("entry>A", "A>S", "S>exit"), A="Carrier")
+    alone = owned(deepest, X="Scout", Y="Scout")
+    assert "subgraph-across" not in {code for code, _ in told(outer, middle, alone)}
+    problem = of_kind(outer, "subgraph-across", middle, owned(deepest, X="Scout"))
+    assert problem.where.aid == "S"
+    assert "S_0 stands for a graph of several actors (Scout; some name none)" in problem.message
 
 
 def test_levels_that_double_are_looked_at_for_a_moment_only() -> None:

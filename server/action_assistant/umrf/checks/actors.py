@@ -117,7 +117,10 @@ class _LedGraph:
         _check_repeated(subject, flow.runs, self._actors)
         _check_spontaneous(subject, actors_of, flow.runs)
         for action in subject.real:
-            if len(actors_of[action.key].every) > 1 and depth < _DEEPEST:
+            every = actors_of[action.key].every
+            if len(every) > 1 and depth == 0:
+                _report_shared(subject, action, every)
+            if len(every) > 1 and depth < _DEEPEST:
                 self._check_inside(subject, action, action.actor or around, depth)
 
     def _check_inside(self, subject: Subject, action: Action, actor: str, depth: int) -> None:
@@ -151,6 +154,17 @@ class _LedGraph:
             none.union(*(each.first for each in children)),
             none.union(*(each.last for each in parents)),
         )
+
+
+def _report_shared(subject: Subject, action: Action, every: frozenset[str]) -> None:
+    """Report a sub-graph of several actors, which goes to no robot as one step of a led run."""
+    whose = joined(set(every) - {""}) + ("; some name none" if "" in every else "")
+    message = (
+        f"{action.full_name} stands for a graph of several actors ({whose}). A runner that leads the "
+        "robots sends a sub-graph to one robot as it is, so it refuses this one: make one graph without "
+        "graphs inside, or give all of it to one robot."
+    )
+    subject.report("subgraph-across", "warning", message, action=action, member="/name")
 
 
 def _check_arrow(
