@@ -73,12 +73,12 @@ def _rows(folder: Path, data: Path, postgres: Any) -> Iterator[list[str]]:
 def _downgraded(url: str, branch: Any, revision: str) -> None:
     from alembic import command
 
-    from action_assistant.journal.alembic_scripts import config_for
     from action_assistant.journal.databases import database_of
+    from action_assistant.journal.migrate import alembic_config
 
     migrate(url, branch)
     database_of(url).migrate(
-        lambda c: command.downgrade(config_for(c, branch), f"{branch}@{revision}")
+        lambda c: command.downgrade(alembic_config(c, branch), f"{branch}@{revision}")
     )
 
 

@@ -15,10 +15,9 @@ from sqlalchemy import Connection, MetaData, inspect, select, text
 
 from action_assistant import paths
 from action_assistant.errors import CannotStart
-from action_assistant.journal.alembic_scripts import config_for
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import database_of, migrate
-from action_assistant.journal.migrate import revisions_of
+from action_assistant.journal.migrate import alembic_config, revisions_of
 from action_assistant.schema.branches import BRANCHES, VERSIONS
 from support.rows import contents, fill
 
@@ -80,7 +79,7 @@ def schema(connection: Connection) -> dict[str, Any]:
 
 def steps(empty: Empty) -> list[str]:
     """Return all revisions, the oldest first."""
-    script = empty.do(lambda c: ScriptDirectory.from_config(config_for(c, empty.branch)))
+    script = empty.do(lambda c: ScriptDirectory.from_config(alembic_config(c, empty.branch)))
     found = script.iterate_revisions(f"{empty.branch}@head", "base")
     return [step.revision for step in found][::-1]
 
@@ -158,7 +157,7 @@ def test_alembic_finds_nothing_to_add(empty: Empty, by_scripts: bool) -> None:
 def test_every_step_can_be_taken_back_and_again(empty: Empty) -> None:
     empty.migrate()
     wanted = empty.do(schema)
-    empty.do(lambda c: command.downgrade(config_for(c, empty.branch), f"{empty.branch}@base"))
+    empty.do(lambda c: command.downgrade(alembic_config(c, empty.branch), f"{empty.branch}@base"))
     assert empty.do(schema) == {}
     for revision in steps(empty):
         empty.migrate(revision)
@@ -175,7 +174,9 @@ def test_rows_of_every_earlier_revision_survive_the_migration(empty: Empty) -> N
             for row, old in zip(found[table], rows, strict=True):
                 kept = old.keys() & row.keys()
                 assert {name: row[name] for name in kept} == {name: old[name] for name in kept}
-        empty.do(lambda c: command.downgrade(config_for(c, empty.branch), f"{empty.branch}@base"))
+        empty.do(
+            lambda c: command.downgrade(alembic_config(c, empty.branch), f"{empty.branch}@base")
+        )
 
 
 def test_migrating_twice_changes_nothing(empty: Empty) -> None:

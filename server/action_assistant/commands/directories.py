@@ -7,8 +7,7 @@ link is refused when it is seen, and somebody who puts one there at that moment 
 import errno
 import os
 import stat
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple, Protocol, Self
 
@@ -64,7 +63,7 @@ class Directory(Protocol):
         """Delete a file, on the disk when this returns."""
 
     def close(self) -> None:
-        """Release the directory and its descriptor."""
+        """Release the directory and its descriptor, if it holds one."""
 
 
 def opened(root: Path) -> Directory:
@@ -85,7 +84,6 @@ class HeldDirectory:
         return cls(os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC))
 
     def names(self) -> list[str]:
-        """Return the names of all entries."""
         with os.scandir(self._at) as entries:
             return [each.name for each in entries]
 
@@ -131,7 +129,6 @@ class HeldDirectory:
     def complete(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write the rest of a file."""
         flags = os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
         _refuse_special(self.status(name))
         file = os.open(name, flags, dir_fd=self._at)
@@ -175,7 +172,6 @@ class NamedDirectory:
         return cls(root)
 
     def names(self) -> list[str]:
-        """Return the names of all entries."""
         return [path.name for path in self._path.iterdir()]
 
     def status(self, name: str) -> os.stat_result:
@@ -223,7 +219,6 @@ class NamedDirectory:
     def complete(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write the rest of a file."""
         path = self._path / _component(name)
         _refuse_link(path)
         with path.open("r+b") as half:
@@ -244,15 +239,6 @@ class NamedDirectory:
 
     def close(self) -> None:
         """Do nothing: this kind holds no folder open."""
-
-
-@contextmanager
-def closing(directory: Directory) -> Iterator[Directory]:
-    """Close the folder after the block."""
-    try:
-        yield directory
-    finally:
-        directory.close()
 
 
 _NO_FILE: Final = "it is no file"

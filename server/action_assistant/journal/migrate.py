@@ -3,7 +3,7 @@
 import logging
 import re
 from collections.abc import Callable
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 from sqlalchemy import Connection, insert, inspect, select
 
@@ -16,6 +16,9 @@ from action_assistant.kit.clock import utc_us
 from action_assistant.schema.branches import BRANCHES, VERSIONS
 from action_assistant.schema.editor_tables import written_by
 from action_assistant.version import VERSION, commit, described
+
+if TYPE_CHECKING:
+    from alembic.config import Config
 
 #: The pattern of the names of our revisions, also of later ones; a script's file begins with its name.
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
@@ -67,10 +70,32 @@ def _upgraded(connection: Connection, branch: Branch, current: set[str], revisio
         VERSIONS.create(connection, checkfirst=True)
         connection.execute(insert(VERSIONS).values(version_num=newest))
         return newest
-    # Alembic takes longer to import than a start has otherwise to do with the database.
-    from action_assistant.journal import alembic_scripts
+    return run_scripts(connection, branch, revision)
 
-    return alembic_scripts.upgrade(connection, branch, revision)
+
+def alembic_config(connection: Connection, branch: str) -> "Config":
+    """Return Alembic's configuration with our scripts and an open connection."""
+    from alembic.config import Config
+
+    folder = paths.migrations()
+    config = Config(attributes={"connection": connection, "metadata": BRANCHES[branch]})
+    config.set_main_option("script_location", str(folder).replace("%", "%%"))
+    config.set_main_option("version_path_separator", "newline")
+    config.set_main_option("path_separator", "newline")
+    locations = "\n".join(str(folder / name) for name in BRANCHES)
+    config.set_main_option("version_locations", locations.replace("%", "%%"))
+    return config
+
+
+def run_scripts(connection: Connection, branch: str, revision: str) -> str:
+    """Run Alembic's scripts up to a revision, and return it."""
+    # Alembic takes longer to import than a start has otherwise to do with the database.
+    from alembic import command
+    from alembic.runtime.migration import MigrationContext
+
+    command.upgrade(alembic_config(connection, branch), f"{branch}@{revision}")
+    (now,) = MigrationContext.configure(connection).get_current_heads()
+    return now
 
 
 def recognize(connection: Connection) -> set[str]:

@@ -83,12 +83,10 @@ class PostgresSession:
         self.connection = sync
 
     def run(self, work: Callable[[], T]) -> T:
-        """Do work that uses this session."""
         assert self._open is not None
         return self._loop.run_until_complete(self._open.run_sync(lambda _: work()))
 
     def alive(self) -> bool:
-        """Return whether the connection still existed when it was last used."""
         self._loop.run_until_complete(_hear())
         return not self._raw.is_closed()
 

@@ -33,9 +33,10 @@ LOG: Final = frozenset({"event", "head"})
 CHILD: Final = """
 import os, signal, sys
 from pathlib import Path
+from alembic import command
 from action_assistant.commands.databases.migrate import go_back
 from action_assistant.editor.log import database_location
-from action_assistant.journal import alembic_scripts, postgres
+from action_assistant.journal import postgres
 
 data, copy, url, step = sys.argv[1:]
 steps = 0

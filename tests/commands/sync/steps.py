@@ -15,7 +15,7 @@ from action_assistant.commands.client import Server
 from action_assistant.commands.sync.folder import Folder
 from action_assistant.commands.sync.sync import SyncRound
 from action_assistant.errors import CannotStart
-from action_assistant.umrf.files.file_names import ENDING
+from action_assistant.umrf.files.writing import ENDING
 
 #: Calls that Python reports before it asks the system (docs.python.org, "Audit events table").
 _CALLS = frozenset(

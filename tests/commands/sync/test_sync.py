@@ -20,7 +20,7 @@ from action_assistant.commands.client import Server
 from action_assistant.commands.sync.folder import Folder, sha
 from action_assistant.commands.sync.sync import SyncRound
 from action_assistant.errors import CannotStart
-from action_assistant.umrf.files.file_names import ENDING
+from action_assistant.umrf.files.writing import ENDING
 from commands.sync.steps import no_link, round_until
 from editor.process import Editor, running
 from support.doses import examples

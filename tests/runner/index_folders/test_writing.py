@@ -23,7 +23,7 @@ from action_assistant.runner.robots.engine import EngineIndex
 from action_assistant.runner.start.index_writer import planned, read_index_write
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.files.file_names import graph_file_name
+from action_assistant.umrf.files.writing import graph_file_name
 from action_assistant.umrf.model import Graph, Signature
 from runner.harness import sequence
 from runner.index_folders.folders import add, held, put, sent, wish

@@ -126,7 +126,7 @@ _STEPS: Final[tuple[tuple[Any, str], ...]] = (
     (archive_file.ArchiveFile, "add"),
     (archive_file.ArchiveFile, "close"),
     (archive_file, "sha256_of"),
-    (archive_file, "_sync_folder"),
+    (archive_file, "sync"),
     (os, "fsync"),
     (Path, "replace"),
     (Path, "unlink"),

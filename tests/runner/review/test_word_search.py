@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from sqlalchemy import Connection, Row, Select, create_engine, insert, select, text
 
-from action_assistant.journal.alembic_scripts import config_for
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.migrate import alembic_config
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.review.background_loops import index_words
 from action_assistant.runner.review.stored_runs import numbers_with
@@ -157,7 +157,7 @@ async def test_runs_of_earlier_versions_are_found_before_and_after_their_words_a
     before = await words_of(journal)
     await journal.close()
     database_of(f"sqlite:///{tmp_path / 'runner.db'}").migrate(
-        lambda connection: command.downgrade(config_for(connection, "runner"), "runner_0005")
+        lambda connection: command.downgrade(alembic_config(connection, "runner"), "runner_0005")
     )
     journal = await opened(tmp_path)
     assert await words_of(journal) == set()
@@ -178,7 +178,7 @@ async def test_a_damaged_row_ends_the_looking_for_words_and_nothing_else(
     await journal.close()
     url = f"sqlite:///{tmp_path / 'runner.db'}"
     database_of(url).migrate(
-        lambda connection: command.downgrade(config_for(connection, "runner"), "runner_0005")
+        lambda connection: command.downgrade(alembic_config(connection, "runner"), "runner_0005")
     )
     with closing(sqlite3.connect(tmp_path / "runner.db")) as database, database:
         database.execute("UPDATE run SET graph_name = x'00'")

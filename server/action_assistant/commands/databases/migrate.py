@@ -30,7 +30,7 @@ from action_assistant.journal.copies.copying import sentence
 from action_assistant.journal.database import Branch, no_copy
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.lock import own
-from action_assistant.journal.migrate import last_writer, recognize, revisions_of
+from action_assistant.journal.migrate import last_writer, recognize, revisions_of, run_scripts
 from action_assistant.journal.sqlite import inspected, unchanged
 from action_assistant.private_files import opener, sync
 from action_assistant.schema.branches import BRANCHES, VERSIONS
@@ -220,9 +220,7 @@ def _exchanged(
     there = MetaData()
     there.reflect(connection, only=lambda name, _: name in names)
     there.drop_all(connection)
-    from action_assistant.journal import alembic_scripts
-
-    alembic_scripts.upgrade(connection, copy.branch, copy.revision)
+    run_scripts(connection, copy.branch, copy.revision)
     engine = create_engine(unchanged(copy.path), poolclass=NullPool)
     tables, events = MetaData(), 0
     try:

@@ -7,14 +7,14 @@ import errno
 import os
 import secrets
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
 
 import msgspec
 
-from action_assistant.commands.directories import Directory, closing, opened, why
+from action_assistant.commands.directories import Directory, opened, why
 from action_assistant.errors import CannotStart
 from action_assistant.umrf.packages.bases import (
     BASE_NAME,

@@ -20,7 +20,7 @@ from msgspec.structs import replace
 
 from action_assistant.commands.directories import Directory, Owner, is_component, opened, why
 from action_assistant.errors import CannotStart
-from action_assistant.umrf.files.file_names import ENDING, graph_file_name
+from action_assistant.umrf.files.writing import ENDING, graph_file_name
 
 _STATE: Final = ".action-assistant-sync.json"
 _FRESH: Final = re.compile(r"\.action-assistant-sync-([0-9a-f]{16})\.new")

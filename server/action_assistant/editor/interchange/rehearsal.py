@@ -78,7 +78,7 @@ def _script(value: Any) -> semantics.Script:
 
 def _refuse_unreadable(graph: Graph) -> None:
     """Raise Conflict for a graph that the engine's parser would refuse, since it cannot be simulated."""
-    refusals = refused_by_parser(codec.Reading(graph, "D3"))
+    refusals = refused_by_parser(codec.Reading(graph=graph, dialect="D3"))
     if refusals:
         raise Conflict(f"The engine would refuse this graph: {refusals[0].message}")
 

@@ -18,7 +18,7 @@ from action_assistant.editor.documents.contents import GraphAtSeq, Inside, graph
 from action_assistant.editor.interchange.edited_text import KeyChange, key_changes
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.files.file_names import graph_file_name
+from action_assistant.umrf.files.writing import graph_file_name
 from action_assistant.umrf.hierarchy.extraction import (
     Extracted,
     Extraction,

@@ -20,7 +20,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.chain import Damage, Inspector
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
-from action_assistant.journal.migrate import last_writer
+from action_assistant.journal.migrate import last_writer, run_scripts
 from action_assistant.journal.removal import taken_out
 from action_assistant.journal.sqlite import inspected
 from action_assistant.private_files import make_folder, sync
@@ -179,8 +179,6 @@ def _copy_rows(
 ) -> Callable[[], list[Damage]]:
     """Copy all our tables into a SQLite file of the same revision; return a function that returns
     the damage of the original."""
-    from action_assistant.journal import alembic_scripts
-
     _check_room(
         part.parent,
         connection.execute(text("SELECT pg_database_size(current_database())")).scalar_one(),
@@ -190,7 +188,7 @@ def _copy_rows(
     inspector, ends, tables = Inspector(taken_out), list[Sequence[Any]](), MetaData()
     try:
         with engine.begin() as here:
-            alembic_scripts.upgrade(here, branch, revision)
+            run_scripts(here, branch, revision)
             tables.reflect(here, only=lambda name, _: name != VERSIONS.name)
             for table in tables.sorted_tables:
                 for rows in _rows_of(connection, table):

@@ -19,7 +19,7 @@ import msgspec
 from action_assistant.errors import Refused
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.events import Event
-from action_assistant.private_files import make_folder, opener
+from action_assistant.private_files import make_folder, opener, sync
 from action_assistant.version import VERSION
 
 _FORMAT: Final = 1
@@ -108,7 +108,7 @@ class ArchiveFile:
                 pass
             digest = sha256_of(self._part)
             self._part.replace(self._path)
-            _sync_folder(self._path.parent)
+            sync(self._path.parent)
         finally:
             self.abandon()
         return digest
@@ -180,7 +180,7 @@ def put(source: Path, target: Path) -> str:
         if digest != sha256_of(source):
             raise Damaged(f"{source.name} is not the same after it was copied.")
         part.replace(target)
-        _sync_folder(target.parent)
+        sync(target.parent)
     finally:
         part.unlink(missing_ok=True)
     return digest
@@ -190,15 +190,6 @@ def sha256_of(path: Path) -> str:
     """Return the SHA-256 of a file, in hex. Raise OSError if the file cannot be read."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _sync_folder(folder: Path) -> None:
-    """Sync a folder, so that a rename in it survives a power cut."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
 
 
 def _check(holds: bool, path: Path, why: str) -> None:

@@ -13,7 +13,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.safe_text import printable
-from action_assistant.umrf.files.file_names import ACTION_MARK, GRAPH_MARK
+from action_assistant.umrf.files.writing import ACTION_MARK, GRAPH_MARK
 
 DEEP: Final = 2  # levels of folders below the first one
 _LARGEST: Final = 8 << 20  # bytes of a file

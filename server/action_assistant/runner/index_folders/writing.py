@@ -17,7 +17,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.runner.index_folders.scan import shown_path
-from action_assistant.umrf.files.file_names import graph_file_name, unmarked
+from action_assistant.umrf.files.writing import graph_file_name, unmarked
 
 _MOST_NAMES: Final = 1_000  # that are tried for a new file
 _KEPT_NAME: Final = 120  # bytes of the old name in that of a file that was moved away

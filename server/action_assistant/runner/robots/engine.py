@@ -132,20 +132,15 @@ class KnownEngine:
         return self._link.standing
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start message. Raise NotSent if the message has certainly not left,
-        EngineRefused if the engine refuses the start."""
         await self._link.start(order, leaves)
 
     async def stop(self, graph_name: str) -> None:
-        """Publish one stop message. Raise NotSent if it could not be sent."""
         await self._link.stop(graph_name)
 
     async def pause(self, graph_name: str) -> None:
-        """Publish one pause message. Raise NotSent if it could not be sent."""
         await self._link.pause(graph_name)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Publish one resume message. Raise NotSent if it could not be sent."""
         await self._link.resume(graph_name, continue_from)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:

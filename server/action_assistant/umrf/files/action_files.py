@@ -17,13 +17,15 @@ ACTION_DIALECTS: Final = frozenset({"D3-action", "D0"})
 _PLACE: Final = "/actions/0"
 
 
-class ActionReading(msgspec.Struct, frozen=True):
-    """An action as its own file describes it. `dialect`: `D3-action`, or `D0` of 2019.
+class FileReading(msgspec.Struct, frozen=True, kw_only=True):
+    """The remarks and problems about a text from which a graph or an action was read.
 
-    `remarks`, `problems`, `text` and `steps` as in `codec.Reading`.
+    `remarks`: notes on everything that was translated, left out, or has no place in D3. `problems`:
+    errors in the text that cannot be seen in the graph any more (H1 among them); `check` finds the
+    others. Both have their places in the text. `steps` lead from the canonical text of the graph to
+    `text` (`origins.Steps`).
     """
 
-    action: Action
     dialect: str
     remarks: tuple[Note, ...] = ()
     problems: tuple[Problem, ...] = ()
@@ -36,8 +38,15 @@ class ActionReading(msgspec.Struct, frozen=True):
         return tuple(note.sentence for note in self.remarks)
 
     def placed(self, problems: Iterable[Problem]) -> list[Problem]:
-        """Return problems of the graph that has only this action, with their places in its file."""
+        """Return problems of the graph, or of the graph that has only the action, with their places
+        in the text that was read."""
         return placed(problems, self.text, self.steps)
+
+
+class ActionReading(FileReading, frozen=True, kw_only=True):
+    """An action as its own file describes it. `dialect`: `D3-action`, or `D0` of 2019."""
+
+    action: Action
 
 
 def read_action(text: str | bytes) -> ActionReading:

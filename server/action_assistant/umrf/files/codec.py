@@ -1,21 +1,20 @@
 """Reads UMRF files of every dialect into graphs, and writes canonical D3 (docs/contracts.md 2)."""
 
-from collections.abc import Iterable
-
 import msgspec
 
 from action_assistant.umrf.files.action_files import (
     ACTION_DIALECTS,
     ActionReading,
+    FileReading,
     read_action,
     write_action,
 )
 from action_assistant.umrf.files.dialects import dialect_of, translated
-from action_assistant.umrf.files.origins import located, moved, placed
+from action_assistant.umrf.files.origins import located, moved
 from action_assistant.umrf.files.reading import Tree, read_tree
 from action_assistant.umrf.files.writing import Stamp, write
 from action_assistant.umrf.json.text import Json, Unreadable, decoded, parse, pointer
-from action_assistant.umrf.model import Graph, Key, Note, Problem, Where
+from action_assistant.umrf.model import Graph, Key, Problem, Where
 
 __all__ = [
     "ActionReading", "Reading", "Stamp", "Unreadable", "read", "read_action", "stamp_of", "write",
@@ -23,33 +22,13 @@ __all__ = [
 ]  # fmt: skip
 
 
-class Reading(msgspec.Struct, frozen=True):
-    """A graph, and the remarks and problems about the text from which it was read.
-
-    `remarks`: notes on everything that was translated, left out, or has no place in D3. `problems`:
-    errors in the text that cannot be seen in the graph any more (H1 among them); `check` finds the
-    others. Both have their places in the text. `states`, `graph_state`: run states that the text
-    carries, other than UNINITIALIZED. `steps` lead from the canonical text of the graph to `text`
-    (`origins.Steps`).
-    """
+class Reading(FileReading, frozen=True, kw_only=True):
+    """A graph as a text describes it. `states`, `graph_state`: run states that the text carries,
+    other than UNINITIALIZED."""
 
     graph: Graph
-    dialect: str
-    remarks: tuple[Note, ...] = ()
-    problems: tuple[Problem, ...] = ()
-    states: dict[Key, str] = {}
+    states: dict[Key, str] = msgspec.field(default_factory=dict)
     graph_state: str | None = None
-    text: str = ""
-    steps: tuple[dict[str, str], ...] = ()
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """The remarks as sentences, in the order of their messages."""
-        return tuple(note.sentence for note in self.remarks)
-
-    def placed(self, problems: Iterable[Problem]) -> list[Problem]:
-        """Return problems of the graph with their places in the text that was read."""
-        return placed(problems, self.text, self.steps)
 
 
 def read(text: str | bytes) -> Reading:
