@@ -20,14 +20,25 @@ from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Override
 from action_assistant.runner.start.admission import StartRequest
-from action_assistant.umrf.model import Action, Conditions, Graph, Parameter
+from action_assistant.umrf.model import (
+    ENTRY,
+    ENTRY_CONDITIONS,
+    Action,
+    Conditions,
+    Graph,
+    Parameter,
+    Relation,
+)
 from runner.harness import ANN, MemoryJournal, at_once, order, sequence
 from support.real_engine import PROGRAM
 
 ALWAYS = Conditions(on_true="run", on_false="run", on_error="run")
 #: The robot of each actor.
 PLAYERS = {"Scout": "Ann", "Carrier": "Bob", "Guard": "Cy"}
+ACCEPTED = Override(("two-at-once", "stop-across", "H12", "H14"), "They are far apart.")
+LATE_S = 0.25  # from a start message to the begin of the code, on a busy computer
 
 
 def clock_us() -> int:
@@ -140,6 +151,25 @@ def relay(name: str, works: list[tuple[float, str]], count: int = 2) -> Graph:
     relations = tuple(
         each if each.parent == "entry" else msgspec.structs.replace(each, conditions=ALWAYS)
         for each in line.relations
+    )
+    return msgspec.structs.replace(line, actions=actions, relations=relations)
+
+
+def watch(name: str) -> Graph:
+    """Scout works for a minute, while Carrier and Guard take turns of 0.15 s for ever."""
+    line = sequence(name, 3)
+    long, one, other = line.actions
+    actions = (
+        working(long, "Scout", 60),
+        working(one, "Carrier", 0.15),
+        working(other, "Guard", 0.15, "on_false"),
+    )
+    relations = (
+        *(each for each in line.relations if each.parent == ENTRY),
+        Relation(parent=ENTRY, child=one.key, conditions=ENTRY_CONDITIONS),
+        Relation(parent=one.key, child=other.key, conditions=ALWAYS, required=False),
+        Relation(parent=other.key, child=one.key, conditions=ALWAYS, required=False),
+        msgspec.structs.replace(line.relations[-1], parent=long.key),
     )
     return msgspec.structs.replace(line, actions=actions, relations=relations)
 

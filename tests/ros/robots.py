@@ -20,6 +20,8 @@ from action_assistant.runner.emulator.node import EmulatorNode
 from action_assistant.umrf.facts import PINNED, EngineFacts
 from action_assistant.umrf.semantics import script_from
 
+#: Every snapshot of such a robot arrives.
+LOSSLESS = EngineTraits(loss=0.0)
 _FOREIGN_START = Path(__file__).parents[2] / "frontend" / "e2e" / "foreign_start.py"
 
 

@@ -22,7 +22,6 @@ pytest.importorskip(
 )
 
 from action_assistant.errors import Refused
-from action_assistant.runner.emulator.messages import EngineTraits
 from action_assistant.runner.emulator.node import EmulatorNode
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Registration
@@ -31,7 +30,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override, PieceEnded
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Behaviour, GraphRefused
-from ros.robots import robot
+from ros.robots import LOSSLESS, robot
 from runner.execution.test_conducted_courses import (
     Seen,
     as_long_as_seen,
@@ -48,7 +47,6 @@ GRAPHS = int(os.environ.get("TEST_LED_GRAPHS", "2"))
 FROM = int(os.environ.get("TEST_LED_FROM", "1"))
 NAMES = {"A": "Ann", "B": "Bob", "C": "Cy"}
 ACCEPTED = Override(("two-at-once", "stop-across"), "They are far apart.")
-LOSSLESS = EngineTraits(loss=0.0)
 _CLOSE_MS = 3.0  # between two ends whose order only the robots know
 
 pytestmark = pytest.mark.timeout(0 if GRAPHS > 5 else 180)

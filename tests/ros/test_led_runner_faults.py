@@ -1,0 +1,246 @@
+"""The runner's process is frozen, killed or its clock is moved in the middle of a run that it leads: the run
+is held, nothing begins until a person lets it go on, and Stop works after that.
+
+The runner is a process; the robots are emulated ones over rclpy or, where ENGINE_LAB and UMRF_SHARED name a
+built engine, real ones as well, whose code says what it did. `TEST_LED_FAULTS` is how often each fault is
+tried (default 1), from the seed `TEST_LED_FROM` on; `TEST_LED_DOMAIN` the first domain of real engines. A
+clock is moved by libfaketime.
+"""
+
+import os
+import random
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+from action_assistant.runner.emulator.messages import LogMessage, Said
+from ros.led_engines import ACCEPTED, LATE_S, PLAYERS, Engines, as_led, watch
+from ros.robots import LOSSLESS, robot
+from runner.process import RunnerProcess, body
+from support.real_engine import IS_HERE
+
+FAULTS = int(os.environ.get("TEST_LED_FAULTS", "1"))
+FROM = int(os.environ.get("TEST_LED_FROM", "0"))
+DOMAIN = int(os.environ.get("TEST_LED_DOMAIN", "220"))
+FAKETIME = next(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"), None)
+SCRIPT: dict[str, Any] = {
+    "OxWork_0": [{"never": True}],
+    "OxWork_1": [{"after_s": 0.15}],
+    "OxWork_2": [{"after_s": 0.15, "result": "on_false"}],
+}
+
+pytestmark = pytest.mark.timeout(0 if FAULTS > 1 else 180)
+
+
+class Begun:
+    """When actions have begun: heard by emulated robots, or written down by the code of real ones."""
+
+    def __init__(self) -> None:
+        self.engines: Engines | None = None
+        self._heard: list[float] = []
+
+    def told(self, said: Said) -> None:
+        """Note that an emulated robot hears a start."""
+        if isinstance(said, LogMessage) and said.text.startswith("Received request to start"):
+            self._heard.append(time.time())
+
+    def times(self) -> list[float]:
+        """Return when, in seconds UTC, oldest first."""
+        if self.engines is None:
+            return list(self._heard)
+        return [line.second for line in self.engines.lines() if line.what == "begin"]
+
+    def since(self, second: float) -> list[float]:
+        """Return how long after `second` each later action has begun."""
+        return [round(each - second, 3) for each in self.times() if each > second]
+
+
+@contextmanager
+def robots_of(
+    kind: str, domains: list[int], folder: Path
+) -> Iterator[tuple[Begun, dict[str, int]]]:
+    """Three robots, with their domains by name."""
+    begun = Begun()
+    if kind == "real":
+        engines = begun.engines = Engines(folder, DOMAIN, 3)
+        try:
+            for name in engines.names:
+                engines.start(name)
+            yield begun, engines.names
+        finally:
+            engines.end()
+        return
+    names = dict(zip(PLAYERS.values(), domains, strict=False))
+    with ExitStack() as opened:
+        for name, domain in names.items():
+            opened.enter_context(robot(domain, SCRIPT, name=name, quirks=LOSSLESS, told=begun.told))
+        yield begun, names
+
+
+def frozen(runner: RunnerProcess, chance: random.Random, _: Path) -> None:
+    """Freeze the process of the runner for more than 3 s."""
+    os.kill(runner.pid, signal.SIGSTOP)
+    time.sleep(chance.uniform(3.6, 6))
+    os.kill(runner.pid, signal.SIGCONT)
+
+
+def killed(runner: RunnerProcess, chance: random.Random, _: Path) -> None:
+    """Kill the runner, and start it again."""
+    runner.kill()
+    time.sleep(chance.uniform(0, 2))
+    runner.start()
+
+
+def moved(runner: RunnerProcess, chance: random.Random, offset: Path) -> None:
+    """Move the clock of the runner's process by an hour."""
+    offset.write_text(f"{chance.choice([-3600, 3600]):+d}")
+
+
+def clock_at(offset: Path) -> tuple[str, ...]:
+    """Return the wrapper of a process whose clock can be moved by writing to a file."""
+    offset.write_text("+0")
+    return (
+        "env",
+        f"LD_PRELOAD={FAKETIME}",
+        f"FAKETIME_TIMESTAMP_FILE={offset}",
+        "FAKETIME_NO_CACHE=1",
+        "DONT_FAKE_MONOTONIC=1",
+        "FAKETIME_DONT_FAKE_MONOTONIC=1",
+    )
+
+
+Fault = Callable[[RunnerProcess, random.Random, Path], None]
+
+
+def until(what: str, true: Callable[[], Any], seconds: float = 30) -> None:
+    """Wait until it is so."""
+    deadline = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < deadline, what
+        time.sleep(0.05)
+
+
+class Scene:
+    """One led run, and what is asked of the runner that leads it."""
+
+    def __init__(self, client: httpx.Client, begun: Begun, domains: dict[str, int]) -> None:
+        self.client = client
+        self.begun = begun
+        for name, domain in domains.items():
+            asked = {"name": name, "domain": domain, "led": True}
+            client.post("/api/robots", json=asked).raise_for_status()
+        until("not all robots answer", self._answering)
+        start = client.post("/api/runs", content=body(as_led(watch("watch"), override=ACCEPTED)))
+        assert start.status_code == 201, start.text
+        self.run = start.json()["id"]
+        until("the robots do not take turns", lambda: len(begun.times()) > 4)
+
+    def _answering(self) -> bool:
+        robots = self.client.get("/api/robots").json()
+        return len(robots) >= 3 and all(each["state"] == "answering" for each in robots)
+
+    def shown(self) -> dict[str, Any]:
+        """Return the run as the runner shows it."""
+        found: dict[str, Any] = self.client.get(f"/api/runs/{self.run}").json()
+        return found
+
+    def wait_until_held(self) -> None:
+        """Wait until nothing further begins."""
+        deadline = time.monotonic() + 15
+        while (found := self.shown())["held"] is None:
+            assert time.monotonic() < deadline, (found["state"], found["alarms"])
+            time.sleep(0.05)
+
+    def go_on(self) -> None:
+        """Let it go on, and see that robots take turns again."""
+        at = time.time()
+        since = {"since": self.shown()["held"]["since"]}
+        self.client.post(f"/api/runs/{self.run}/go_on", json=since).raise_for_status()
+        until("nothing goes on", lambda: len(self.begun.since(at)) > 3)
+
+    def stop(self) -> str:
+        """Stop it; return its state once it has ended. Nothing may begin after that."""
+        self.client.post(f"/api/runs/{self.run}/stop").raise_for_status()
+        until(f"it does not end: {self.shown()}", lambda: self.shown()["ended_at"] is not None)
+        return str(self.shown()["state"])
+
+
+@pytest.mark.parametrize("fault", [frozen, killed, moved], ids=lambda each: each.__name__)
+@pytest.mark.parametrize("kind", ["emulated", "real"])
+def test_a_led_run_is_held_and_begins_nothing(
+    kind: str, fault: Fault, domains: list[int], tmp_path: Path
+) -> None:
+    if kind == "real" and not IS_HERE:
+        pytest.skip("the real engine is not here (ENGINE_LAB, UMRF_SHARED)")
+    if fault is moved and FAKETIME is None:
+        pytest.skip("libfaketime is not here")
+    held_s: list[float] = []
+    for seed in range(FROM, FROM + FAULTS):
+        chance = random.Random(f"{seed} {kind} {fault.__name__}")
+        folder = tmp_path / str(seed)
+        folder.mkdir()
+        offset = folder / "offset"
+        runner = RunnerProcess(folder / "runner")
+        with robots_of(kind, domains, folder) as (begun, names):
+            try:
+                runner.start(*(clock_at(offset) if fault is moved else ()))
+                with runner.client() as client:
+                    scene = Scene(client, begun, names)
+                    time.sleep(chance.uniform(0, 0.5))
+                    fault(runner, chance, offset)
+                    over_at = time.time()
+                    scene.wait_until_held()
+                    held_s.append(time.time() - over_at)
+                    # Robots take note of what had left; a clock is looked at twice a second.
+                    allowed = over_at + LATE_S + (0.6 if fault is moved else 0)
+                    time.sleep(2.5)
+                    assert scene.shown()["state"] == "running"
+                    assert begun.since(allowed) == [], seed
+                    if chance.random() < 0.6:
+                        scene.go_on()
+                    assert scene.stop() == "stopped", (seed, scene.shown())
+                    ended = time.time()
+                    time.sleep(1)
+                    assert begun.since(ended) == [], seed
+            finally:
+                runner.end()
+    sys.stdout.write(
+        f"\n{kind} robots, {fault.__name__}: {len(held_s)} of {FAULTS} held, "
+        f"at most {max(held_s):.1f} s after\n"
+    )
+
+
+def test_a_stop_that_was_pressed_while_the_runner_stood_still_works(
+    domains: list[int], tmp_path: Path
+) -> None:
+    runner = RunnerProcess(tmp_path / "runner").start()
+    with robots_of("emulated", domains, tmp_path) as (begun, names):
+        try:
+            with runner.client() as client:
+                scene = Scene(client, begun, names)
+                os.kill(runner.pid, signal.SIGSTOP)
+                pressed = threading.Thread(
+                    target=lambda: client.post(f"/api/runs/{scene.run}/stop").raise_for_status()
+                )
+                pressed.start()
+                time.sleep(4)
+                os.kill(runner.pid, signal.SIGCONT)
+                thawed = time.time()
+                pressed.join()
+                until("it is not stopped", lambda: scene.shown()["state"] == "stopped")
+                time.sleep(0.5)
+                assert begun.since(thawed + LATE_S) == []
+        finally:
+            runner.end()
