@@ -91,6 +91,23 @@ class VirtualLoop(asyncio.SelectorEventLoop):
         return self._jumping.now
 
 
+def stand_still(seconds: float) -> None:
+    """Freeze this process for so long, as SIGSTOP does. Messages of others that come meanwhile are read
+    only after what has become due."""
+    loop = asyncio.get_running_loop()
+    assert isinstance(loop, VirtualLoop)
+    loop._jumping.now += seconds
+
+
+async def arrives_after(seconds: float) -> None:
+    """Wait for a message that is under way. Where the process stood still meanwhile, whatever was due is
+    done before the message is read."""
+    began = anyio.current_time()
+    await anyio.sleep(seconds)
+    if anyio.current_time() > began + seconds + 1:
+        await anyio.sleep(0.001)
+
+
 def run_in_virtual_time(main: Callable[[], Awaitable[Any]]) -> Any:
     """Run a coroutine function in virtual time."""
     return anyio.run(main, backend_options={"loop_factory": VirtualLoop})
@@ -289,7 +306,7 @@ class Robot:
         if self.silent or self.chance.random() < self.loss:
             await anyio.sleep_forever()
         answer = await self.engine.get()
-        await anyio.sleep(self.chance.random() * self.old)
+        await arrives_after(self.chance.random() * self.old)
         shown = tuple(self._blinded(each, answer) for each in answer.graphs)
         graphs = self.engine._engine.graphs
         texts = {each.graph: codec.write(graphs[each.graph].graph) for each in shown}

@@ -30,7 +30,9 @@ from runner.harness import (
     ended,
     engine,
     order,
+    run_in_virtual_time,
     sequence,
+    stand_still,
     two_ends,
     two_lines,
     until,
@@ -135,6 +137,30 @@ async def test_a_silent_robot_holds_the_run_until_a_person_lets_it_go_on() -> No
         await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
         assert await ended(control, run) == "finished"
         assert len(lab.carol.starts) == 2
+
+
+@pytest.mark.parametrize("tenths", range(3, 40, 4))
+def test_a_runner_that_stood_still_calls_no_robot_silent(tenths: int) -> None:
+    async def main() -> None:
+        lab = Lab({"*": [{"after_s": 0.4}]})
+        lab.david.old = lab.carol.old = 0.4  # a get takes so long: it is often under way
+        async with lab.runner() as control:
+            graph = shared(sequence("task", 60), "Scout", "Carrier")
+            run = (await control.start(led(graph, lost="stop"), ANN)).run.id
+            await anyio.sleep(1 + tenths / 10)
+            stand_still(4 + tenths % 3)
+            await until(lambda: control.open[run].run.held is not None, 10)
+            sent = len(lab.david.starts) + len(lab.carol.starts)
+            await anyio.sleep(10)
+            found = control.open[run].run
+            assert found.held is not None
+            assert "stood still" in found.held.why
+            assert (found.desired, found.alarms) == ("running", ())
+            assert len(lab.david.starts) + len(lab.carol.starts) == sent
+            await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
+            await until(lambda: len(lab.david.starts) + len(lab.carol.starts) > sent + 1, 20)
+
+    run_in_virtual_time(main)
 
 
 @virtual

@@ -429,7 +429,8 @@ class Conductor:
         try:
             cleared = await self._look.before_piece(robot, self._first)
         except NoAnswer as why:
-            self._trouble(step, "silent", f"{step.engine} was not given {step.node}: {why}")
+            if not self._stalls.stands_still:  # else the run is held, and the robot asked again
+                self._trouble(step, "silent", f"{step.engine} was not given {step.node}: {why}")
             return
         with anyio.CancelScope(shield=True):
             self._pieces += 1
@@ -556,7 +557,7 @@ class Conductor:
         where = f"{step.node} on {step.engine}"
         if run.end == "refused":
             step.has_not_left = True
-            if self._gate.is_open:
+            if self._gate.is_open and not self._stalls.stands_still:
                 self._trouble(step, "refused", f"{where} was not begun: {run.detail}")
             return None
         if outcome == "on_stopped" and step.lacks_output:

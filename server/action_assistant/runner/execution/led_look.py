@@ -22,6 +22,7 @@ from action_assistant.runner.start.preflight import Item, is_blocking, led_item
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 
 _GET_S: Final = 2.0  # within which a robot has to answer before a piece leaves
+_STOOD_S: Final = 0.5  # a wait that lasts longer by this: the process itself stood still
 _FRESH_S: Final = 3.0  # for which a look at a robot counts
 
 
@@ -75,8 +76,7 @@ class LedLook:
         name = robot.registration.name
         await robot.indexed()
         try:
-            with anyio.fail_after(_GET_S):
-                answer = await robot.get()
+            answer = await _asked(robot)
         except TimeoutError as late:
             raise NoAnswer(f"it has not answered for {_GET_S:.0f} s. {robot.why}") from late
         if answer.incarnation != run.led.lives.get(name):
@@ -143,3 +143,17 @@ class LedLook:
         Unavailable if the journal cannot store it."""
         for robot, life in lives.items():
             await self._indexing.give(robot, life, author, reason)
+
+
+async def _asked(robot: KnownEngine) -> Answer:
+    """Ask a robot; once more if this process stood still meanwhile. Raise NoAnswer or TimeoutError if it
+    does not answer."""
+    began = anyio.current_time()
+    try:
+        with anyio.fail_after(_GET_S):
+            return await robot.get()
+    except (NoAnswer, TimeoutError):
+        if anyio.current_time() - began < _GET_S + _STOOD_S:
+            raise
+    with anyio.fail_after(_GET_S):
+        return await robot.get()

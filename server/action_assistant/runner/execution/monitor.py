@@ -226,6 +226,13 @@ class Monitor:
         jobs, self._jobs = self._jobs, []
         return jobs
 
+    def stood_still(self, seconds: float) -> None:
+        """Leave out a time in which this process stood still: it is no silence of the engine."""
+        self._heard_at += seconds
+        self._began_at += seconds
+        if self._absent is not None:
+            self._absent += seconds
+
     def unanswered(self, changes: RunChanges, standing: Standing, why: str) -> None:
         """Note that the engine has not answered, and why, if known."""
         self._is_alone(changes.run, standing)

@@ -67,6 +67,7 @@ _HAND_OVER_S: Final = 5.0
 _UNCONFIRMED_S: Final = 2.0
 _SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
 _GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
+_STOOD_S: Final = 0.5  # a wait that lasts longer by this: the process itself stood still
 _NO_TURN: Final = (
     "It was not sent: its turn among the starts on its domain did not come within 5 seconds."
 )
@@ -377,22 +378,30 @@ class OpenRun:
         """Ask the engine until cancelled: each second, sooner after news, ten times as often during
         a Stop. Slow jobs run beside it, so that no proof waits for them."""
         async with anyio.create_task_group() as beside:
-            wait = 0.0
+            wait, has_stood = 0.0, False
             while True:
+                began = anyio.current_time()
                 with anyio.move_on_after(wait):
                     await self._asks.wait()
                 self._asks = anyio.Event()
                 look = self.watch.begin_query()
+                self.watch.stood_still(max(0.0, look.began - began - wait - _STOOD_S))
+                answer, why = None, ""
                 try:
                     with anyio.fail_after(_GET_S):
                         answer = await self._link.get()
-                    is_silent = False
-                except (NoAnswer, TimeoutError) as why:
-                    is_silent = True
-                    with self._changing() as changes:
-                        self.watch.unanswered(changes, self._link.standing, str(why))
-                else:
-                    with self._changing() as changes:
+                except (NoAnswer, TimeoutError) as failure:
+                    why = str(failure)
+                stood = anyio.current_time() - look.began - _GET_S
+                if stood > _STOOD_S and not has_stood:  # this says nothing of the engine
+                    self.watch.stood_still(stood)
+                    wait, has_stood = 0.0, True
+                    continue
+                has_stood = False
+                with self._changing() as changes:
+                    if answer is None:
+                        self.watch.unanswered(changes, self._link.standing, why)
+                    else:
                         self.watch.answered(changes, self._link.standing, answer, look)
                 for job in self.watch.take_jobs():
                     beside.start_soon(self._work_on, job)
@@ -401,7 +410,7 @@ class OpenRun:
                         changes.engine_ended()
                 cost = anyio.current_time() - look.began
                 wait = max(self.watch.pace(self.run), 5 * cost)
-                if is_silent and self.run.unknown_since is None:  # known after 3 s, not later
+                if answer is None and self.run.unknown_since is None:  # known after 3 s, not later
                     wait = max(0.0, self.watch.pace(self.run) - cost)
 
     async def _work_on(self, job: Job) -> None:
