@@ -275,3 +275,31 @@ def test_an_arrow_is_refused_where_the_engine_would_lose_a_renamed_output(
     ((arrow, why),) = hindered(graph)
     assert (arrow.parent, arrow.child) == tuple(each.key for each in graph.actions)
     assert "under other names" in why
+
+
+@virtual
+async def test_nothing_is_said_of_outputs_that_nobody_could_see() -> None:
+    only_true = tuple(
+        msgspec.structs.replace(each, conditions=Conditions(on_true="run"))
+        for each in HAND_OVER.relations
+    )
+    graph = msgspec.structs.replace(HAND_OVER, relations=only_true)
+    lab = Lab({"Do0_0": [{"after_s": 1, "result": "on_false", "outputs": DOOR}]})
+    async with lab.runner(graph) as control:
+        run = (await control.start(led(graph), ANN)).run.id
+        assert await ended(control, run) == "halted"
+        (first,) = lab.ends(run)
+        assert (first.outcome, first.outputs, first.unset) == ("on_false", {}, ())
+        assert lab.harness.journal.history(run).alarms == ()
+
+
+@virtual
+async def test_a_stopped_action_is_not_said_to_lack_outputs() -> None:
+    lab = Lab({"Do0_0": [{"never": True, "stop_s": 0.5, "outputs": DOOR}]})
+    async with lab.runner(HAND_OVER) as control:
+        run = (await control.start(led(HAND_OVER), ANN)).run.id
+        await until(lambda: lab.harness.journal.history(run).actions["Do0_0"].state == "RUNNING")
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+        assert lab.harness.journal.history(run).alarms == ()
+        assert (lab.ends(run)[0].outputs, lab.ends(run)[0].unset) == ({}, ())

@@ -83,11 +83,11 @@ class PieceValues:
 
     def _given(self, step: Step, outcome: Precondition, how: str) -> GivenOutputs:
         text = self._texts[step.node]
-        names = tuple(each.name for each in text.outputs)
-        if step.run is None or step.engine not in self._keeping or outcome == "on_error":
+        is_shown = outcome == "on_true" or (outcome == "on_false" and text.taken_on_false)
+        if step.run is None or step.engine not in self._keeping or not is_shown:
             return GivenOutputs()
-        is_known = outcome == "on_true" or (outcome == "on_false" and text.taken_on_false)
-        if how != "shape" or not is_known or step.run.kept.wrong:
+        names = tuple(each.name for each in text.outputs)
+        if how != "shape" or step.run.kept.wrong:
             return GivenOutputs(unset=names if text.is_taken else ())
         kept = step.run.kept.values
         values = {each.name: kept[each.place] for each in text.outputs if each.place in kept}

@@ -365,7 +365,8 @@ class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A call of a conducted run has its outcome. `how`: by the states of the piece in an answer that
     was asked for after its end, by the word of a person, or because nothing of it was ever sent.
     `hash`: the SHA-256 of that answer. `outputs`: the values that the action gave, as JSON by flat
-    name, and `unset` those that it did not give; both empty where no answer can show them."""
+    name, and `unset` those that it did not give, or that nobody saw where a person gave the outcome;
+    both empty where no answer can show them."""
 
     kind: ClassVar[str] = "run.piece_ended.v1"
 
