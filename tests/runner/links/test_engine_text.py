@@ -3,11 +3,33 @@
 import json
 from typing import Any
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.runner.links.engine_text import NotAGraph, name_of, snapshot
+from action_assistant.umrf.facts import PINNED
+from action_assistant.umrf.kept_values import (
+    KEEPER,
+    NEVER,
+    KeptValues,
+    as_json,
+    kept_outputs,
+    with_keepers,
+)
+from action_assistant.umrf.model import Parameter
+from action_assistant.umrf.pieces import piece_of
+from action_assistant.umrf.semantics import Behaviour, Engine, Script
+from action_assistant.umrf.semantics.printing import GraphPrinter
+from runner.harness import sequence
+
+GIVEN = {
+    "a": "bools", "b": "number", "c": "string", "d": "strings", "deep/e": "bool", "z": "numbers",
+}  # fmt: skip
+VALUES = {
+    "a": [True, False], "b": 0.1, "c": 'ä"', "d": ["", "x"], "deep::e": True, "z": [-2e300, 1.5],
+}  # fmt: skip
 
 
 def text(*actions: dict[str, Any], **more: Any) -> str:
@@ -95,3 +117,84 @@ def test_any_json_is_a_graph_or_refused(value: object) -> None:
         return
     assert isinstance(value, dict)
     assert found.graph == value["graph_name"]
+
+
+def keeping(number: int = 0, state: str = "UNINITIALIZED", **inputs: Any) -> dict[str, Any]:
+    leaves = {
+        name: {"pvf_type": name.partition("_")[2], "pvf_value": v} for name, v in inputs.items()
+    }
+    return node(
+        KEEPER,
+        number,
+        state=state,
+        input_parameters={NEVER: {"pvf_type": "string"}, **leaves},
+    )
+
+
+def test_values_are_read_from_keepers_that_wait_which_are_no_actions_of_a_run() -> None:
+    shown = text(node(), keeping(A0_number=5, A1_strings=["a", "ä"]), keeping(1, A3_bool=True))
+    found = snapshot(shown, at=1, source="get")
+    assert found.nodes == {"Work_0": "RUNNING"}
+    assert found.run == "r1"
+    values = {"0_number": "5", "1_strings": '["a","ä"]', "7_bool": "true"}
+    assert found.kept == KeptValues(values)
+
+
+@pytest.mark.parametrize(
+    "keeper",
+    [
+        keeping(state="RUNNING", A0_number=5),
+        keeping(state="INITIALIZED", A0_number=5),
+        keeping() | {"input_parameters": {NEVER: {"pvf_type": "string", "pvf_value": "x"}}},
+        keeping() | {"input_parameters": {}},
+        keeping() | {"input_parameters": [5]},
+    ],
+    ids=["runs", "is loaded", "may run", "lacks an input", "no inputs"],
+)
+def test_a_keeper_that_moves_or_may_move_is_an_action_like_others(keeper: dict[str, Any]) -> None:
+    found = snapshot(text(keeper), at=1, source="get")
+    assert found.nodes == {f"{KEEPER}_0": keeper["state"]}
+    assert found.kept == KeptValues()
+
+
+@pytest.mark.parametrize(
+    ("value", "why"),
+    [
+        ({"A0_string": 5}, "is no string"),
+        ({"A0_number": True}, "is no number"),
+        ({"A0_number": None}, "is no number"),
+        ({"A0_bools": [True, 1]}, "is no bools"),
+        ({"A0_numbers": {"a": 1}}, "is no numbers"),
+        ({"A0_string": "x" * 70_000}, "larger than 64 KB"),
+        ({"A0_strings": ["x" * 100] * 9_000}, "larger than 64 KB"),
+    ],
+)
+def test_a_value_that_is_not_as_it_should_be_gives_none_and_the_reason(
+    value: dict[str, Any], why: str
+) -> None:
+    kept = snapshot(text(node(), keeping(**value)), at=1, source="get").kept
+    assert kept.values == {}
+    assert why in kept.wrong
+
+
+def test_an_engine_that_is_emulated_shows_kept_values_as_a_real_one() -> None:
+    outputs = tuple(Parameter(name, f'{{"pvf_type": "{kind}"}}') for name, kind in GIVEN.items())
+    line = sequence("g", 1)
+    action = msgspec.structs.replace(line.actions[0], outputs=outputs)
+    graph = msgspec.structs.replace(line, actions=(action,))
+    piece = with_keepers(piece_of(graph, action), action, taken_on_false=True)
+    for result, state in (("on_true", "FINISHED"), ("on_false", "RUNNING"), ("on_error", "HALTED")):
+        call = Behaviour(after_s=1, result=result, outputs=VALUES)  # type: ignore[arg-type]
+        engine = Engine(facts=PINNED, script=Script({"Work_0": (call,)}))
+        engine.start(piece, 0)
+        engine.advance(2000)
+        running = engine.graphs[piece.name]
+        nodes = engine.states()[piece.name].nodes
+        shown = snapshot(
+            GraphPrinter(running, {}).text(running.state, nodes, {}), at=1, source="get"
+        )
+        ended = "ERROR" if result == "on_error" else "FINISHED"
+        assert (shown.state, shown.nodes) == (state, {"Work_0": ended})
+        got = {each.name: shown.kept.values.get(each.place) for each in kept_outputs(action)}
+        wanted = {name: None if result == "on_error" else as_json(VALUES[name]) for name in VALUES}
+        assert got == wanted
