@@ -15,12 +15,13 @@ from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import Answer, Order, Registration
 from action_assistant.runner.runs.events import PieceEnded
 from action_assistant.runner.runs.views import time
-from action_assistant.runner.start.admission import GoOnRequest
+from action_assistant.runner.start.admission import GoOnRequest, GroupRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.kept_values import KEEPER_PACKAGE, hindered, keeper, kept_outputs
 from action_assistant.umrf.model import EXIT, Conditions, Graph, Parameter, Relation
 from action_assistant.umrf.semantics import Behaviour
 from action_assistant.umrf.semantics.values import MISSING, slots_of
+from runner.execution.test_conducted_subgraphs import sent as with_inside
 from runner.execution.test_conductor import led, shared
 from runner.harness import ANN, BEN, GO_ON, Harness, Robot, ended, engine, sequence, until, virtual
 
@@ -29,11 +30,14 @@ class KeepingRobot(Robot):
     """A robot whose engine has indexed the helper package, and so names its actions."""
 
     known: tuple[str, ...] = ()
+    known_graphs: tuple[str, ...] = ()
 
     async def get(self) -> Answer:
         """The answer with the index."""
         answer = await super().get()
-        return msgspec.structs.replace(answer, known_actions=self.known)
+        return msgspec.structs.replace(
+            answer, known_actions=self.known, known_graphs=self.known_graphs
+        )
 
 
 def parameter(path: str, kind: str, *value: Any) -> Parameter:
@@ -303,3 +307,41 @@ async def test_a_stopped_action_is_not_said_to_lack_outputs() -> None:
         assert await ended(control, run) == "stopped"
         assert lab.harness.journal.history(run).alarms == ()
         assert (lab.ends(run)[0].outputs, lab.ends(run)[0].unset) == ({}, ())
+
+
+@pytest.mark.parametrize("outcome", ["on_true", "on_false"])
+@virtual
+async def test_the_outputs_of_a_sub_graph_are_handed_on_too(outcome: str) -> None:
+    look = msgspec.structs.replace(
+        sequence("Do0", 1).actions[0], name="Look", outputs=(PLACE, SPEED)
+    )
+    inside = msgspec.structs.replace(sequence("Do0", 1), actions=(look,))
+    lab = Lab({"Look_0": [{"after_s": 1, "result": outcome, "outputs": DOOR}]})
+    async with lab.runner(HAND_OVER) as control:
+        known = (look, HAND_OVER.actions[1], keeper())
+        for robot in (lab.david, lab.carol):
+            robot.known = tuple(map(codec.write_action, known))
+            robot.known_graphs = (codec.write(inside),)
+        run = (await control.start(with_inside(HAND_OVER, inside), ANN)).run.id
+        assert await ended(control, run) == "finished"
+        first = lab.ends(run)[0]
+        assert first.outcome == outcome
+        assert sent(lab.carol, 0) == DOOR
+        assert lab.harness.journal.history(run).alarms == ()
+
+
+@virtual
+async def test_the_look_before_a_start_names_the_arrow_and_the_package() -> None:
+    lab = Lab({}, keeping=("Carol",))
+    async with lab.runner(HAND_OVER) as control:
+        request = led(HAND_OVER)
+        group = GroupRequest(
+            umrf=request.umrf, engines=("conducted",), robots=request.robots, lost="stop"
+        )
+        looks = {each.engine: each for each in await control.look(group, ANN.id)}
+        (item,) = (each for each in looks["David"].items if each.code == "values")
+        assert item.verdict == "blocked"
+        assert not item.overridable
+        assert "Do0_0 hands “goal::speed”, “place” to Do1_0" in item.text
+        assert "values" not in {each.code for each in looks["Carol"].items}
+        assert looks["David"].never
