@@ -10,7 +10,7 @@ from action_assistant.errors import Conflict
 from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.sent_graphs import SentSubgraph
 from action_assistant.runner.runs.views import time
-from action_assistant.runner.start.admission import GoOnRequest, WordRequest
+from action_assistant.runner.start.admission import GoOnRequest, GroupRequest, WordRequest
 from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.hierarchy.extraction import Extracted, extracted
@@ -58,6 +58,13 @@ def sent(graph: Graph, *inside: Graph, **more: Any) -> Any:
     )
     tree = tree_digest(digest(graph), ((each.name, each.digest) for each in subgraphs))
     return led(graph, subgraphs=subgraphs, tree_digest=tree, **more)
+
+
+def looking(request: Any) -> GroupRequest:
+    """The pre-flight of a start."""
+    names = GroupRequest.__struct_fields__
+    fields = {name: getattr(request, name) for name in request.__struct_fields__ if name in names}
+    return GroupRequest(**fields, engines=(request.engine,))
 
 
 #: Scout picks something up, which is a graph of two steps, and Carrier follows.
@@ -203,6 +210,9 @@ async def test_a_sub_graph_of_several_robots_is_refused_with_what_to_do() -> Non
         assert why.value.where is not None
         (obstacle,) = why.value.where["obstacles"]
         assert obstacle["code"] == "subgraph-across"
+        (look,) = await control.look(looking(sent(TASK, inside)))
+        (item,) = look.items
+        assert item.code == "subgraph-across"
         assert lab.david.starts == lab.carol.starts == []
 
 

@@ -13,8 +13,28 @@ const umrf = (...actors: string[]) =>
   });
 
 test("the actors of a graph come once, and actions that name none come last", () => {
-  expect(actorsIn(umrf("Scout", "", "Carrier", "Scout"))).toEqual(["Carrier", "Scout", ""]);
-  expect(actorsIn(undefined)).toEqual([]);
+  const actors = umrf("Scout", "", "Carrier", "Scout");
+  expect(actorsIn(actors, undefined)).toEqual(["Carrier", "Scout", ""]);
+  expect(actorsIn(undefined, undefined)).toEqual([]);
+  expect(actorsIn(actors, null)).toEqual([]);
+});
+
+test.each([
+  ["", ["", ""], [""]],
+  ["Scout", ["", ""], ["Scout"]],
+  ["Carrier", ["Scout", "Scout"], ["Scout"]],
+  ["Carrier", ["Scout", ""], ["Carrier", "Scout"]],
+  ["", ["Scout", ""], ["Scout", ""]],
+  ["Carrier", [], ["Carrier"]],
+])("a graph inside of %j with the actors %j has those of its actions", (around, within, found) => {
+  const named = (name: string, ...actors: string[]) => ({
+    name,
+    umrf: JSON.parse(umrf(...actors)) as Record<string, unknown>,
+  });
+  const top = umrf(around).replace('"Do"', '"Sub"');
+  expect(actorsIn(top, [named("Sub", ...within)])).toEqual(found);
+  const deep = { name: "Sub", umrf: umrf("").replace('"Do"', '"Deep"') };
+  expect(actorsIn(top, [deep, named("Deep", ...within)])).toEqual(found);
 });
 
 test("a robot that cannot play says why", () => {

@@ -6,7 +6,9 @@ import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useMay } from "../../api/people";
 import { type Robot, SIMULATOR } from "../../api/robots";
+import type { Inside } from "../../api/runs";
 import { fromUmrf } from "../../canvas/from-umrf";
+import type { Action } from "../../graph/model";
 import { robotCounts } from "../../graph/robots";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
@@ -14,11 +16,35 @@ import style from "./led-choice.module.css";
 import dialogStyle from "./start-dialog.module.css";
 
 type Cast = LedOrder["robots"];
+type Player = Pick<Action, "actor" | "missing">;
 
-/** Return the actors of a graph, "" (actions that name none) last; empty while its text is not there. */
-export function actorsIn(umrf: string | undefined): string[] {
-  if (umrf === undefined) return [];
-  return robotCounts(fromUmrf(JSON.parse(umrf)).actions).map(([actor]) => actor);
+/** Levels of graphs inside that are looked into; the server looks as deep. */
+const DEEPEST = 32;
+
+/**
+ * Return the actors of a graph, "" (actions that name none) last; empty while its text, or the graphs
+ * inside, are not there. An action that stands for a graph has the actors of the actions inside; one of
+ * these that names none has the actor of the action around it.
+ */
+export function actorsIn(umrf: string | undefined, inside: Inside["subgraphs"] | null): string[] {
+  if (umrf === undefined || inside === null) return [];
+  const graphs = new Map(
+    (inside ?? []).map((each) => {
+      const text = each.umrf;
+      return [each.name, fromUmrf(typeof text === "string" ? JSON.parse(text) : text).actions];
+    }),
+  );
+  const played = (action: Action, around: string, depth: number): Player[] => {
+    const actor = action.actor === "" ? around : action.actor;
+    const within = action.missing || depth >= DEEPEST ? undefined : graphs.get(action.name);
+    if (within === undefined) return [{ actor, missing: action.missing }];
+    return within.flatMap((each) => played(each, actor, depth + 1));
+  };
+  const top = fromUmrf(JSON.parse(umrf)).actions.flatMap((action) => {
+    const found = played(action, "", 0);
+    return found.some(({ missing }) => !missing) ? found : [action];
+  });
+  return robotCounts(top).map(([actor]) => actor);
 }
 
 /** Return why a robot can play nobody in a led run; "" if it can. */

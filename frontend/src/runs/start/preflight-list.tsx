@@ -343,6 +343,13 @@ function InsideRemedies({ item, look, graph, seq, onLeave }: InsideRemediesProps
       </span>
     );
   }
+  if (item.code === "subgraph-across") {
+    return (
+      <span className={style.remedies}>
+        <OneGraph graph={graph} onLeave={onLeave} />
+      </span>
+    );
+  }
   if (item.code !== "again" || !look.items.some(({ code }) => code === "subgraphs")) return null;
   return (
     <span className={style.remedies}>

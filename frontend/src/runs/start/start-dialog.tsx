@@ -48,6 +48,15 @@ function useText(graph: string, seq: number) {
   });
 }
 
+/** Query the graphs inside of a moment, for the actors of their actions. */
+function useInside(graph: string, seq: number) {
+  return useQuery({
+    queryKey: ["inside", graph, seq],
+    queryFn: ({ signal }) => fetchInside(graph, seq, signal),
+    staleTime: 0,
+  });
+}
+
 /** Query the state of the chosen engines, as the runner sees it now. */
 function useLook(
   { graph, seq, umrf }: { graph: string; seq: number; umrf: string | undefined },
@@ -199,7 +208,10 @@ function useWay({ graph, seq, chosen, robots }: Props) {
   const { now } = useLive();
   const may = useMay("operate");
   const text = useText(graph, seq);
-  const actors = useMemo(() => actorsIn(text.data), [text.data]);
+  const inside = useInside(graph, seq);
+  // Without an answer only the actors of the graph itself are known; the look says what is missing.
+  const graphs = inside.isPending ? null : inside.data?.subgraphs;
+  const actors = useMemo(() => actorsIn(text.data, graphs), [text.data, graphs]);
   const [before] = useState(() => lastLed(graph));
   const [picked, pick] = useState<LedOrder["robots"]>(robots ?? before?.robots ?? {});
   const [lost, setLost] = useState<LedOrder["lost"]>(before?.lost ?? "stop");

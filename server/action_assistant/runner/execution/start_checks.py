@@ -385,7 +385,7 @@ class StartChecks:
                 partial(prepared_pieces, approved=False), request, CONDUCTED_FACTS, ""
             )
         except Refused as refused:
-            item = preflight.refusal_item("graph", refused)
+            item = preflight.refusal_item(_code_of(refused), refused)
             return [preflight.with_verdict(CONDUCTED, [item])]
         whole = ready.whole
         items = [preflight.graph_item(whole), *preflight.led_items(ready)]
@@ -469,6 +469,16 @@ class StartChecks:
             return (preflight.unknown_courses_item(why),)
         except Refused as refused:
             return (preflight.unknown_courses_item(refused.detail),)
+
+
+def _code_of(refused: Refused) -> str:
+    """Return the code of the item for a graph that cannot be led: that of a sub-graph of several
+    robots, which has a remedy of its own, or `graph`."""
+    obstacles = (refused.where or {}).get("obstacles")
+    is_shared = isinstance(obstacles, list | tuple) and any(
+        each["code"] == "subgraph-across" for each in obstacles
+    )
+    return "subgraph-across" if is_shared else "graph"
 
 
 def _require_plain(request: StartRequest) -> None:
