@@ -20,7 +20,7 @@ import { type Run, useRun, type Visit } from "../api/runs";
 import { DifferenceView } from "../differences/difference-view";
 import { boundsText, durationText } from "../status/durations";
 import { INTO } from "../status/level-places";
-import { runEndText, useRunStatus, visitDuration } from "../status/progress";
+import { howWords, runEndText, useRunStatus, visitDuration } from "../status/progress";
 import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { clock, day, instant, useNow } from "../ui/times";
@@ -305,7 +305,8 @@ function VisitCell({ visit, slower }: { visit: Visit | null; slower: boolean }) 
       <span className={style.took} data-slower={slower || undefined}>
         {took(visit)}
         {slower && " · slower"}
-        {visit.how === "inferred" && " · inferred"}
+        {visit.robot && ` · on ${isolated(visit.robot)}`}
+        {howWords(visit) && ` · ${howWords(visit)}`}
       </span>
     </span>
   );

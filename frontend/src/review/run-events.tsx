@@ -10,6 +10,7 @@ import { exportUrl, useRawEvents } from "../api/review";
 import { type Run, runPlace } from "../api/runs";
 import { placesOf, wayWords } from "../status/level-places";
 import {
+  howWords,
   runEndText,
   type Tone,
   visitBegin,
@@ -67,6 +68,7 @@ export function eventLines(
     const place = places.get(fact) ?? { levels: [], name: fact };
     const who = { name: wayWords(place), fact };
     const depth = place.levels.length;
+    const where = action.robot ? ` on ${isolated(action.robot)}` : "";
     action.visits.forEach((visit, i) => {
       const from = visitBegin(visit);
       const until = visitEnd(visit);
@@ -74,12 +76,19 @@ export function eventLines(
       const often = action.at_least ? ", or more often" : "";
       const again = number > 1 ? `again (${number}.)${often}` : "";
       if (from !== null)
-        all.push({ at: from, tone: "run", ...who, text: `runs ${again}`.trim(), order: depth });
+        all.push({
+          at: from,
+          tone: "run",
+          ...who,
+          text: `runs${where} ${again}`.trim(),
+          order: depth,
+        });
       if (until !== null) {
         const result = visit.result?.replace(/^on_/, "") ?? null;
         const tone = (result ?? "done") as Tone;
         const last = visitDurationBound(visit) === null ? until : instant(visit.not_after);
-        const seen = visit.how === "inferred" ? " (inferred)" : "";
+        const how = howWords(visit);
+        const seen = how === "" ? "" : ` (${how})`;
         const since =
           last === until || start === null ? "" : ` (not before ${after(start, until)})`;
         const open = last === null ? "; its code may go on" : "";

@@ -4,7 +4,7 @@ import { type Run, requesterPlace, runPlace, type Visit } from "../api/runs";
 import { serverNow } from "../clock/server-clock";
 import { boundsText, durationText } from "../status/durations";
 import { actionWords } from "../status/level-places";
-import { progressOf, runEndText, visitDuration } from "../status/progress";
+import { howWords, progressOf, runEndText, visitDuration } from "../status/progress";
 import { useUnsure } from "../status/silence";
 import { PrintSheet } from "../ui/print-sheet";
 import { clock, dateText, instant } from "../ui/times";
@@ -49,14 +49,17 @@ function ActionRows({ run, name, action }: VisitRowsProps) {
     const word = last ? now.word : (visit.result ?? "finished");
     return (
       <tr key={`${visit.from} ${visit.not_before}`}>
-        <td>{name}</td>
+        <td>
+          {name}
+          {action.robot && ` on ${isolated(action.robot)}`}
+        </td>
         <td>
           {action.at_least && "≥ "}
           {action.older + i + 1}
         </td>
         <td>
           {word}
-          {visit.how === "inferred" && " (inferred)"}
+          {howWords(visit) && ` (${howWords(visit)})`}
         </td>
         <td>{rangeText(visit.not_before, visit.from)}</td>
         <td>{endOf(visit, over, last && now.tone === "unknown")}</td>

@@ -76,8 +76,19 @@ export function finishedWords(result: string | null | undefined): StateWords {
   return { tone, word: result.replace(/^on_/, "") };
 }
 
+/** Return in words how the result of a visit is known; "" for one that an engine has shown. */
+export function howWords(visit: Visit): string {
+  if (visit.said) return `said by ${isolated(visit.said.by.name)}: ${visit.said.reason}`;
+  return visit.how === "inferred" ? "inferred" : "";
+}
+
 function stateOf(action: ActionRun, over: boolean, unsure: boolean): StateWords {
   const last = action.visits.at(-1);
+  if (action.asks && !over) return { tone: "unknown", word: "outcome not known" };
+  if (last?.said && !MOVES.has(action.state)) {
+    const { tone, word } = finishedWords(last.result);
+    return { tone, word: `${word}, said by ${isolated(last.said.by.name)}` };
+  }
   if (MOVES.has(action.state)) {
     if (over) return { tone: "unknown", word: "end not seen" };
     if (unsure) return { tone: "unknown", word: "unknown" };
@@ -126,11 +137,11 @@ export function progressOf(action: ActionRun, run: Run, unsure: Unsure): Progres
   return {
     tone,
     word,
-    since: until === null && !over ? from : null,
+    since: until === null && !over && !action.asks ? from : null,
     ...(last ? visitDuration(last) : { took: null, atMost: null }),
     visits: action.count ?? action.older + action.visits.length,
     ...(action.at_least ? { atLeast: true } : {}),
-    inferred: last?.how === "inferred",
+    inferred: last?.how === "inferred" && !last.said,
     ...(last?.inputs ? { inputs: last.inputs } : {}),
     message: action.messages.at(-1)?.text ?? null,
   };

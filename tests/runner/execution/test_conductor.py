@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from action_assistant.errors import Conflict, NotFound, Refused
-from action_assistant.runner.analysis import statistics
+from action_assistant.runner.analysis import exports, statistics
 from action_assistant.runner.execution.interventions import RestRequest
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import EngineChanged, ForeignCommand, Registration
@@ -102,6 +102,12 @@ async def test_each_robot_gets_its_own_actions_one_after_the_other() -> None:
         assert [each.result for each in times] == ["true", "true", "true"]
         assert times[0].not_after <= times[1].start <= times[2].start
         assert all(each.state == "FINISHED" for each in found.actions.values())
+        shown = run_view(found).actions
+        assert [shown[f"Work_{n}"].visits[-1].robot for n in range(3)] == [
+            "David",
+            "Carol",
+            "David",
+        ]
 
 
 @virtual
@@ -330,6 +336,12 @@ async def test_the_word_of_a_person_counts_once_rest_is_seen_and_is_not_called_o
         said = run_view(lab.harness.journal.history(run)).actions["Work_0"].visits[-1].said
         assert said is not msgspec.UNSET
         assert (said.by, said.reason) == (BEN, "It stands at the door.")
+        lines = exports.intervals(lab.harness.journal.history(run)).decode().splitlines()
+        assert [line.split(",")[-2:] for line in lines] == [
+            ["robot", "said_by"],
+            ["David", BEN.name],
+            ["Carol", ""],
+        ]
 
 
 def rests_of(run: Run) -> list[RobotRestShown]:

@@ -1757,8 +1757,9 @@ export interface RunnerApi {
      *     (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
      *     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
      *     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
-     *     none were seen; `outputs`: likewise those that it gave, where an answer could show them. `said`:
-     *     who gave the result by word, where no answer has shown it.
+     *     none were seen; `outputs`: likewise those that it gave, where an answer could show them. In a
+     *     conducted run, `robot`: the engine that played it; `said`: who gave the result by word, where no
+     *     answer has shown it.
      */
     VisitShown: {
         /** Format: date-time */
@@ -1773,6 +1774,7 @@ export interface RunnerApi {
         inputs: {
             [key: string]: string;
         } | null;
+        robot?: string;
         said?: RunnerApi["SaidShown"];
         outputs?: {
             [key: string]: string;

@@ -248,8 +248,12 @@ def _steps(
                 name=pair.place.name,
                 aid=(right or left or ActionRun()).aid,
                 visit=number,
-                a=views.visit_view(one, words_a.get(number, msgspec.UNSET)) if one else None,
-                b=views.visit_view(other, words_b.get(number, msgspec.UNSET)) if other else None,
+                a=views.visit_view(one, _robot(left), words_a.get(number, msgspec.UNSET))
+                if one
+                else None,
+                b=views.visit_view(other, _robot(right), words_b.get(number, msgspec.UNSET))
+                if other
+                else None,
                 relation=missed.relation(pair, _relation(one, other)),
                 slower=_slower(one, other),
             )
@@ -302,6 +306,10 @@ def _visits(action: ActionRun | None) -> Mapping[int, Visit]:
     if action is None:
         return {}
     return {action.older + place: visit for place, visit in enumerate(action.visits, 1)}
+
+
+def _robot(action: ActionRun | None) -> str:
+    return "" if action is None else action.robot
 
 
 def _relation(a: Visit | None, b: Visit | None) -> Relation:

@@ -34,6 +34,7 @@ _COLUMNS: Final = (
     "seconds_most",
     "missed",
 )
+_LED_COLUMNS: Final = ("robot", "said_by")
 _ANY: Final = b'{"type":"object"}'
 #: The schema of foxglove.Log, so that Foxglove's panel shows messages of actions and engines.
 _LOG: Final = msgspec.json.encode(
@@ -76,10 +77,11 @@ def intervals(run: Run) -> bytes:
     """Return CSV with a line per visit of an action, sorted by its begin. A cell is empty if its
     value is unknown. If only bounds of a duration are known, `seconds` is empty, and
     `seconds_least` and `seconds_most` have the bounds. `missed`: how many visits of the action have
-    no line, "none" or "N or more"."""
+    no line, "none" or "N or more". A conducted run has two columns more: `robot`, the engine that
+    played the visit, and `said_by`, the person who gave its result by word."""
     text = io.StringIO()
     sheet = csv.writer(text)
-    sheet.writerow(_COLUMNS)
+    sheet.writerow(_COLUMNS if run.led is None else (*_COLUMNS, *_LED_COLUMNS))
     missed = {name: _missed(each) for name, each in visit_counts(run).items()}
     rows = [
         (visit.start, name, number, visit)
@@ -94,8 +96,14 @@ def intervals(run: Run) -> bytes:
         moments = (visit.start, visit.until, visit.not_before, visit.not_after)
         shown = ("" if each is None else views.time(each).isoformat() for each in moments)
         cells = [_cell(name), number, *shown, _figure(seconds), visit.result or "", visit.how]
-        sheet.writerow([*cells, *map(_figure, bounds), missed[name]])
+        row = [*cells, *map(_figure, bounds), missed[name]]
+        sheet.writerow(row if run.led is None else [*row, *_led_cells(run, name, number)])
     return text.getvalue().encode()
+
+
+def _led_cells(run: Run, name: str, number: int) -> tuple[str, str]:
+    said = views.words_for(run.said.get(name, ())).get(number)
+    return _cell(run.actions[name].robot), "" if said is None else _cell(said.by.name)
 
 
 def _missed(count: VisitCount) -> str:
@@ -173,7 +181,7 @@ class _Track:
             for number, visit in enumerate(action.visits, action.older + 1):
                 if visit.until is not None and visit not in known:
                     said = views.words_for(after.said.get(name, ())).get(number, msgspec.UNSET)
-                    shown = msgspec.to_builtins(views.visit_view(visit, said))
+                    shown = msgspec.to_builtins(views.visit_view(visit, action.robot, said))
                     counts = counts or visit_counts(after)
                     missed = counts[name].at_least
                     body = {"visit": number, **shown, "took": of_visit(visit), "at_least": missed}

@@ -218,7 +218,7 @@ def _changed(
         state=after.state,
         first=first,
         visits=[
-            views.visit_view(each, words.get(number, msgspec.UNSET))
+            views.visit_view(each, after.robot, words.get(number, msgspec.UNSET))
             for number, each in enumerate(after.visits[first - after.older :], first + 1)
         ],
         messages=[views.MessageShown(views.time(each.at), each.text) for each in fresh],

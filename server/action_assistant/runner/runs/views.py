@@ -54,8 +54,9 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
-    none were seen; `outputs`: likewise those that it gave, where an answer could show them. `said`:
-    who gave the result by word, where no answer has shown it."""
+    none were seen; `outputs`: likewise those that it gave, where an answer could show them. In a
+    conducted run, `robot`: the engine that played it; `said`: who gave the result by word, where no
+    answer has shown it."""
 
     start: datetime
     not_before: datetime
@@ -64,6 +65,7 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     result: Outcome | None
     how: How
     inputs: dict[str, str] | None = None
+    robot: str | msgspec.UnsetType = msgspec.UNSET
     said: "SaidShown | msgspec.UnsetType" = msgspec.UNSET
     outputs: dict[str, str] | msgspec.UnsetType = msgspec.UNSET
 
@@ -484,8 +486,11 @@ def _rest_view(run: Run, rest: PieceRest) -> RobotRestShown:
     return replace(shown, state=state, since=at, why="", stops=False)
 
 
-def visit_view(each: Visit, said: SaidShown | msgspec.UnsetType = msgspec.UNSET) -> VisitShown:
-    """Return one visit with its times as datetimes. `said`: who gave its result by word."""
+def visit_view(
+    each: Visit, robot: str = "", said: SaidShown | msgspec.UnsetType = msgspec.UNSET
+) -> VisitShown:
+    """Return one visit with its times as datetimes. `robot`: the engine that played it in
+    a conducted run; `said`: who gave its result by word."""
     return VisitShown(
         time(each.start),
         time(each.not_before),
@@ -494,6 +499,7 @@ def visit_view(each: Visit, said: SaidShown | msgspec.UnsetType = msgspec.UNSET)
         each.result,
         each.how,
         each.inputs,
+        robot or msgspec.UNSET,
         said,
         msgspec.UNSET if each.outputs is None else each.outputs,
     )
@@ -521,7 +527,7 @@ def _action_view(
     words = words_for(said)
     first = action.older + len(action.visits) - len(action.visits[-most:]) + 1
     visits = [
-        visit_view(each, words.get(number, msgspec.UNSET))
+        visit_view(each, action.robot, words.get(number, msgspec.UNSET))
         for number, each in enumerate(action.visits[-most:], first)
     ]
     messages = [MessageShown(time(each.at), each.text) for each in action.messages]
