@@ -24,6 +24,8 @@ interface Props {
   silentSince: number | null;
   selected: boolean;
   onPick: ((lane: Lane) => void) | undefined;
+  /** How long after another robot's action the newest visit began, in words; "" if that is not known. */
+  waited: string;
   /** True if its inner lanes are shown, false if hidden; null if it has none. */
   opened: boolean | null;
   /** Set if any lane has inner lanes: then all names leave room for the toggle. */
@@ -153,7 +155,7 @@ const isLong = (progress: Progress | null): boolean =>
   progress?.tone === "idle" && progress.word.length > 14;
 
 export const LaneRow = memo(function LaneRow(props: Props) {
-  const { lane, visits, progress, axis, ended, silentSince, selected } = props;
+  const { lane, visits, progress, axis, ended, silentSince, selected, waited } = props;
   const silent = ended === null ? silentSince : null;
   const was = visits.at(-1)?.until === null;
   return (
@@ -172,6 +174,7 @@ export const LaneRow = memo(function LaneRow(props: Props) {
       </div>
       <span className={style.state} data-wide={isLong(progress) || undefined}>
         {progress && <LaneState progress={progress} />}
+        {waited !== "" && <span className="visually-hidden">, {waited}</span>}
       </span>
     </li>
   );

@@ -27,6 +27,8 @@ import {
   WHOLE_WAY,
   wholeSpan,
 } from "./axis";
+import { HandOverLines } from "./hand-over-lines";
+import { type HandOver, handOversOf, handOverWords } from "./hand-overs";
 import { AllLevels, LaneRow, type OpenLanes, useOpenLanes } from "./lane-row";
 import { type Lane, openLanes, robotsOf } from "./lanes";
 import style from "./timeline.module.css";
@@ -216,14 +218,16 @@ interface GroupsProps extends Pick<Props, "selected" | "onPick" | "picks"> {
   inside: OpenLanes;
   /** Robots have their names above their lanes. */
   named: boolean;
+  overs: readonly HandOver[];
 }
 
 /** The lanes of one run, those of each robot together. */
-function Groups({ track, axis, named, inside, ...props }: GroupsProps) {
+function Groups({ track, axis, named, overs, inside, ...props }: GroupsProps) {
   const { selected = null, picks = isOwn, onPick } = props;
   const { run, silentSince = null } = track;
   const lanes = openLanes(track.lanes, inside.open);
   const nested = track.lanes.some(({ holds }) => holds);
+  const waited = new Map(overs.map((over) => [over.to, handOverWords(over)]));
   const ended = instant(run.ended_at);
   const silent = ended === null ? silentSince : null;
   const { now } = useLive();
@@ -263,6 +267,7 @@ function Groups({ track, axis, named, inside, ...props }: GroupsProps) {
               silentSince={silent ?? (action && ended === null ? silentSinceOf(action, now) : null)}
               selected={lane.name === selected}
               onPick={picks(lane) ? onPick : undefined}
+              waited={waited.get(lane.name) ?? ""}
               opened={lane.holds ? inside.open.has(lane.name) : null}
               nested={nested}
               onOpen={inside.toggle}
@@ -280,11 +285,9 @@ export function Timeline(props: Props) {
   const axis = useAxis(tracks);
   const goes = tracks.some((track) => track.run.ended_at === null);
   const silentSince = run.ended_at === null ? (props.silentSince ?? null) : null;
-  const list = useNewestInView(
-    openLanes(lanes, inside.open),
-    run,
-    run.ended_at === null && cursor === null,
-  );
+  const shown = openLanes(lanes, inside.open);
+  const list = useNewestInView(shown, run, run.ended_at === null && cursor === null);
+  const overs = useMemo(() => handOversOf(run, lanes), [run, lanes]);
   const { ruler, pull, onKeyDown } = useSeeking(axis, cursor, onSeek);
   const named = tracks.length > 1 || robotsOf(lanes).length > 1;
   const slider = props.seeksByKeys && onSeek ? { ...sliderOf(axis, cursor), onKeyDown } : {};
@@ -299,7 +302,7 @@ export function Timeline(props: Props) {
       <Across {...{ axis, cursor, goes, silentSince, signs, gaps }} />
       <ul
         ref={list}
-        className="list-reset min-h-0 overflow-auto"
+        className={`list-reset ${style.lanes}`}
         aria-label="Actions of the run over time"
       >
         {tracks.map((track) => (
@@ -308,12 +311,21 @@ export function Timeline(props: Props) {
             track={track}
             axis={axis}
             named={named}
+            overs={track.run.id === run.id ? overs : NOTHING}
             inside={inside}
             selected={props.selected ?? null}
             onPick={props.onPick}
             {...(props.picks ? { picks: props.picks } : {})}
           />
         ))}
+        {overs.length > 0 && (
+          <HandOverLines
+            overs={overs}
+            axis={axis}
+            list={list}
+            rows={shown.map(({ name }) => name).join("\n")}
+          />
+        )}
       </ul>
     </div>
   );
