@@ -21,6 +21,14 @@ export async function add(page: Page, name: string): Promise<void> {
   await expect(card(page, name)).toBeVisible();
 }
 
+/** Says whose an action is. */
+export async function setRobot(page: Page, action: string, robot: string): Promise<void> {
+  await card(page, action).click({ position: { x: 40, y: 24 } });
+  const field = page.getByRole("combobox", { name: "Robot" });
+  await field.fill(robot);
+  await field.press("Tab");
+}
+
 /** Drags an arrow from one of the four outcomes of an action to another one, or to the exit. */
 export async function connect(
   page: Page,

@@ -1,7 +1,7 @@
 /** A graph of two robots, led step by step: started from the page, handed from one to the other, stopped. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { card, holdEnter, saved } from "./canvas";
+import { add, card, connect, enter, fitView, holdEnter, saved, setRobot } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { type Person, Product } from "./product";
 
@@ -12,6 +12,7 @@ const product = new Product();
 const carol = new StandIn("Carol");
 const david = new StandIn("David");
 let ada: Person;
+let mari: Person;
 let graph: string;
 
 const dialog = (page: Page) => page.getByRole("dialog");
@@ -43,11 +44,12 @@ test.beforeAll(async ({ browser }) => {
   await post("/api/robots", reach(david));
   graph = (await driveThenLook()).id;
   ada = await product.person(browser, "Ada");
+  mari = await product.person(browser, "Mari");
 });
 
 test.afterAll(async () => {
   for (const robot of [carol, david]) await robot.kill();
-  expect(ada.failures).toEqual([]);
+  expect([...ada.failures, ...mari.failures]).toEqual([]);
   await product.dispose();
 });
 
@@ -103,4 +105,94 @@ test("a led run passes from one robot to the other, and Stop ends it", async () 
   expect(run).toMatchObject({ state: "stopped", proof_at: expect.any(String) });
   await page.goto(`${product.url}/runs`);
   await expect(page.getByRole("row", { name: /drive_look/ })).toContainText("Carol, David");
+});
+
+const rest = (page: Page, robot: string) =>
+  page.locator(`[data-robot-rest="${robot}"]`).filter({ visible: true }).first();
+const lane = (page: Page, name: string) =>
+  page.getByRole("region", { name: "Run" }).locator(`[data-lane="${name}_0"]`);
+
+/** Starts the graph on screen: Carrier is Carol, Scout is David, and a lost robot is waited for. */
+async function startLed(page: Page): Promise<void> {
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  await dialog(page).getByRole("combobox", { name: "Robot for Carrier" }).selectOption("Carol");
+  await dialog(page).getByRole("combobox", { name: "Robot for Scout" }).selectOption("David");
+  await dialog(page).getByRole("radio", { name: /wait/i }).check();
+  const start = dialog(page).getByRole("button", { name: /^Start v1, step by step, on/ });
+  await expect(start).toBeEnabled({ timeout: 15_000 });
+  await holdEnter(page, start);
+}
+
+test("two people draw what Scout does when Carrier has arrived; one robot is lost, and stopped", async () => {
+  const { page } = ada;
+  await page.goto(product.url);
+  await page.getByRole("button", { name: "New graph" }).first().click();
+  await page.waitForURL(/\/graphs\/.+/);
+  await mari.page.goto(page.url());
+  await add(page, "Arrive");
+  await enter(page, "Arrive");
+  await setRobot(page, "Arrive", "Carrier");
+  await add(mari.page, "Inspect");
+  await setRobot(mari.page, "Inspect", "Scout");
+  await connect(mari.page, "Arrive", "true", "Inspect");
+  await fitView(page);
+  await connect(page, "Inspect", "true", "exit");
+  await saved(page);
+  await startLed(page);
+  await expect(lane(page, "Inspect")).toContainText("running", { timeout: 15_000 });
+  await expect(lane(page, "Inspect")).toContainText(/began .* ms after Carrier: Arrive had ended/);
+  await expect(rest(mari.page, "Carol")).toContainText("proven at rest");
+  await expect(rest(mari.page, "David")).toContainText(/Inspect.* goes on/);
+
+  david.freeze();
+  await expect(rest(page, "David")).toContainText("silent since", { timeout: 15_000 });
+  await page.getByRole("button", { name: /^Stop/ }).first().click();
+  const notice = page.getByRole("alert").filter({ hasText: "STOP UNCONFIRMED" });
+  await expect(notice.getByRole("listitem").filter({ hasText: "Carol" })).toContainText(
+    "proven at rest",
+  );
+  await expect(notice.getByRole("listitem").filter({ hasText: "David" })).toContainText(
+    /silent since .* the stop is repeated/,
+  );
+  for (const each of [page, mari.page]) {
+    await expect(rest(each, "David")).toContainText("not known; the stop is repeated");
+    await expect(rest(each, "Carol")).toContainText("proven at rest");
+    await expect(each.getByText(/\d of \d/)).toHaveCount(0);
+  }
+  await page.setViewportSize({ width: 390, height: 844 });
+  await expect(notice.getByRole("listitem")).toHaveCount(2);
+  await page.setViewportSize({ width: 1440, height: 900 });
+  david.thaw();
+  for (const robot of ["Carol", "David"])
+    await expect(rest(page, robot)).toContainText("proven at rest", { timeout: 15_000 });
+  await expect(moves(page)).toBeHidden();
+});
+
+test("an outcome that nothing shows is given by word, and shown as said", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${graph}`);
+  await saved(page);
+  await startLed(page);
+  await expect(lane(page, "Look")).toContainText("running", { timeout: 15_000 });
+  await mari.page.goto(`${product.url}/robots`);
+  const carried = mari.page.getByRole("article", { name: "David" });
+  await expect(carried).toContainText(
+    /In drive_look.*s run \d+ \(led\): further actions begin here/,
+  );
+  await david.kill();
+  david.start(product.data, { "*": { after_s: 60, stop_s: 0.05 } });
+  const question = page.getByRole("region", { name: /^Outcome of Look/ });
+  await question.getByRole("radio", { name: "True" }).check({ force: true });
+  await question.getByRole("textbox").fill("The picture is on my desk");
+  await holdEnter(page, question.getByRole("button", { name: /^Say that/ }));
+  await expect(lane(page, "Look")).toContainText("true, said by Ada");
+  await expect(rest(page, "David")).toContainText(/^David.*seen at rest .*, not proven/);
+  await holdEnter(page, page.getByRole("button", { name: /^Let run \d+ go on/ }));
+  await expect(moves(page)).toBeHidden({ timeout: 15_000 });
+  const [run] = await product.ask<{ state: string; proof_at: string | null }[]>(
+    "/api/runs?robot=David",
+    {},
+    product.runnerUrl,
+  );
+  expect(run).toMatchObject({ proof_at: null });
 });

@@ -1,7 +1,7 @@
 /** Two people draw a task of two robots, see whose each action is and who waits for whom, and play it. */
 
 import { expect, type Page, test } from "@playwright/test";
-import { atRest, card, connect, enter, fitView, saved } from "./canvas";
+import { atRest, card, connect, enter, fitView, saved, setRobot } from "./canvas";
 import { Product } from "./product";
 
 const product = new Product();
@@ -16,13 +16,6 @@ async function add(page: Page, name: string): Promise<void> {
   await field.fill(name);
   await page.getByRole("option", { name }).first().click();
   await expect(card(page, name)).toBeVisible();
-}
-
-async function setRobot(page: Page, action: string, robot: string): Promise<void> {
-  await card(page, action).click({ position: { x: 40, y: 24 } });
-  const field = page.getByRole("combobox", { name: "Robot" });
-  await field.fill(robot);
-  await field.press("Tab");
 }
 
 const arrow = (page: Page) => page.locator('[aria-label*="Scout waits for Carrier"]');

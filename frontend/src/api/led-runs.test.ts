@@ -3,7 +3,7 @@ import { enginesOf, engineWords, isPieceOf } from "./led-runs";
 import type { LiveState } from "./live-socket";
 import { foreignGraphs } from "./live-socket";
 import type { Run } from "./run-stop";
-import { newestPieces, runPlace } from "./runs";
+import { runPlace } from "./runs";
 
 const run = (part: object) =>
   ({
@@ -41,19 +41,4 @@ test("an action that a led run has sent is not called started elsewhere, and oth
     ],
   } as unknown as LiveState;
   expect(foreignGraphs(now).map((each) => each.robot.name)).toEqual(["Carol", "Eve"]);
-});
-
-test("rest of a led run is confirmed for the newest action on each robot", () => {
-  const sent = (robot: string, piece: string) => ({ robot, piece, state: "RUNNING" });
-  const actions = {
-    Drive_0: sent("Carol", "r.2"),
-    Look_0: sent("David", "r.9"),
-    Drive_1: sent("Carol", "r.10"),
-    Ring_0: { state: "RUNNING" },
-  };
-  const found = newestPieces(run({ actions } as object));
-  expect(found.map(({ robot, run: piece }) => [robot, piece])).toEqual([
-    ["Carol", "r.10"],
-    ["David", "r.9"],
-  ]);
 });

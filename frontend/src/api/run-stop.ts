@@ -26,9 +26,18 @@ export const MOVES: ReadonlySet<string> = new Set([
   "PAUSED",
 ]);
 
+/** The states of a robot of a led run in which no answer tells of its rest. */
+const SILENT: ReadonlySet<string> = new Set(["silent", "unproven"]);
+
+/** Return the robots of a led run about whose rest only a person at the robot can tell. */
+export function silentRests(run: Run): RunnerApi["RobotRestShown"][] {
+  return (run.rests ?? []).filter(({ state }) => SILENT.has(state));
+}
+
 /** Return whether a person's word can end the run, since no answer of its engine can. */
 export function needsRestConfirmation(run: Run): boolean {
   if (hasEnded(run) || run.simulated || run.started_at === null) return false;
+  if (silentRests(run).length > 0) return true;
   if (run.state === "lost" || run.unknown_since !== null) return true;
   const moves = Object.values(run.actions ?? {}).some((action) => MOVES.has(action.state));
   return Boolean(run.unconfirmed) && !moves;

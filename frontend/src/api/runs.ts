@@ -164,21 +164,17 @@ export function letGoOn(runner: string, run: string, since: string): Promise<Run
   return runnerAt(runner).post("/api/runs/{run}/go_on", { path: { run }, body: { since } });
 }
 
-/** The newest action that a led run has sent to a robot, as a run of its own. */
-export interface Piece {
-  readonly run: string;
-  readonly robot: string;
-  readonly action: string;
-}
+/** An outcome by the word of a person. */
+export type SaidOutcome = RunnerApi["WordRequest"]["outcome"];
 
-/** Return the newest piece of a led run on each robot. */
-export function newestPieces(run: Run): Piece[] {
-  const number = (piece: string) => Number(piece.slice(piece.lastIndexOf(".") + 1));
-  const newest = new Map<string, Piece>();
-  for (const [action, { robot = "", piece = "" }] of Object.entries(run.actions ?? {})) {
-    const before = newest.get(robot);
-    if (piece !== "" && (before === undefined || number(before.run) < number(piece)))
-      newest.set(robot, { run: piece, robot, action });
-  }
-  return [...newest.values()];
+/** Say how an action of a led run has ended, where nothing shows it. */
+export function giveOutcome(
+  runner: string,
+  run: string,
+  action: string,
+  outcome: SaidOutcome,
+  reason: string,
+): Promise<Run> {
+  const body = { action, outcome, reason: reason.trim() };
+  return runnerAt(runner).post("/api/runs/{run}/outcome", { path: { run }, body });
 }

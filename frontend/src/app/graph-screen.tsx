@@ -32,6 +32,7 @@ import type { Waits } from "../runs/sent-graph";
 import { StartControl } from "../runs/start/start-control";
 import type { Unsure } from "../status/progress";
 import { type GraphInRun, isInRun, useProgress } from "../status/progress-inside";
+import { asksPeople } from "../status/rests";
 import { useUnsure } from "../status/silence";
 import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
@@ -48,8 +49,8 @@ const DraftStatus = boundedPart(
 const RunWaits = boundedPart(() => import("../runs/sent-graph").then((part) => part.RunWaits), {
   waiting: null,
 });
-const HeldNotice = boundedPart(
-  () => import("../status/held-notice").then((part) => part.HeldNotice),
+const RunQuestions = boundedPart(
+  () => import("../status/held-notice").then((part) => part.RunQuestions),
   { waiting: null },
 );
 const RecordDryRun = lazyPart(() =>
@@ -208,7 +209,7 @@ function Inside({ id }: { id: string }) {
           />
         }
         seed={seed}
-        held={live?.held && <HeldNotice run={live} />}
+        held={live && asksPeople(live) && <RunQuestions run={live} />}
         corner={<ConnectionStatus run={live} whose={going.length > 1} />}
       />
     </>

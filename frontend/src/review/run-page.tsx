@@ -14,12 +14,13 @@ import { type Run, useRun } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
 import { GraphView } from "../canvas/graph-view";
 import { serverTimeOf } from "../clock/server-clock";
-import { HeldNotice } from "../status/held-notice";
+import { RunQuestions } from "../status/held-notice";
 import { type Lane, lanesOf, useLanes } from "../status/lanes/lanes";
 import { Timeline, type Track } from "../status/lanes/timeline";
 import { INTO } from "../status/level-places";
 import { runEndText, runLabel, useRunStatus } from "../status/progress";
 import { useProgress } from "../status/progress-inside";
+import { RestList } from "../status/rest-list";
 import { useUnsure } from "../status/silence";
 import { StateLabel } from "../status/state-label";
 import { withWaits } from "../status/waits";
@@ -286,7 +287,8 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
       })}
       <main className={style.page}>
         <div className={style.why}>
-          <HeldNotice run={newest} />
+          <RunQuestions run={newest} />
+          <RestList run={newest} />
           <FailureCauses runner={runner} run={newest} onShow={show} />
         </div>
         <section className={style.canvas} aria-label="Graph of the run">

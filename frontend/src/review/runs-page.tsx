@@ -14,7 +14,7 @@ import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { type MouseEvent, useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { errorText } from "../api/http";
-import { CONDUCTED } from "../api/led-runs";
+import { CONDUCTED, enginesOf as robotsOf } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
 import {
@@ -350,7 +350,7 @@ function enginesOf(runs: readonly ListedRun[], chosen: string): string[] {
     ...new Set([
       "simulator",
       chosen,
-      ...runs.flatMap((run) => (run.robots ? [CONDUCTED] : [run.engine])),
+      ...runs.flatMap((run) => (run.robots ? [CONDUCTED, ...robotsOf(run)] : [run.engine])),
     ]),
   ].filter(Boolean);
 }

@@ -12,6 +12,7 @@ import { useCurrentName } from "../api/people";
 import { heldGraph, type Robot, stopRobot } from "../api/robots";
 import type { Run } from "../api/runs";
 import { runStatus } from "../status/progress";
+import { restLines } from "../status/rests";
 import { StateLabel } from "../status/state-label";
 import { isolated } from "../words/isolated";
 import style from "./robot-runs.module.css";
@@ -68,6 +69,42 @@ function StartedBy({ run }: { run: Run }) {
   return <span className="quiet-xs">started by {isolated(useCurrentName(run.author))}</span>;
 }
 
+/** A led run that carries this robot: it may begin further actions here as long as it goes on. */
+function LedRun({ run, robot }: { run: Run; robot: string }) {
+  const { live, now } = useLive();
+  const rest = restLines(run, now.link === "down").find((each) => each.robot === robot);
+  const further =
+    run.desired === "stopped"
+      ? "it is being stopped, no further action begins here"
+      : run.held
+        ? "further actions begin here once a person lets it go on"
+        : "further actions begin here until it ends";
+  return (
+    <li className={style.line}>
+      {rest && <StateLabel still tone={rest.tone} word={rest.words} />}
+      <span>
+        In{" "}
+        <Link to={`/runs/${run.id}`} className="break-anywhere ink-inherit weight-550">
+          <bdi>{run.graph_name}</bdi>’s run {run.number} (led)
+        </Link>
+        : {further}.
+      </span>
+      <StartedBy run={run} />
+      <span className="flex-1" />
+      <Button
+        size="compact-sm"
+        variant="filled"
+        color="red"
+        leftSection={<IconSquareFilled size={11} aria-hidden />}
+        aria-label={`Stop run ${run.number} on all of its robots`}
+        onClick={() => live?.stop(run.id)}
+      >
+        Stop
+      </Button>
+    </li>
+  );
+}
+
 export function RobotRuns({ robot, onImport }: Props) {
   const { now } = useLive();
   const own = openRuns(now).filter((run) => enginesOf(run).includes(robot.name));
@@ -82,15 +119,19 @@ export function RobotRuns({ robot, onImport }: Props) {
   }
   return (
     <ul className={style.list} aria-label={`What runs on ${isolated(robot.name)}`}>
-      {own.map((run) => (
-        <li key={run.id} className={style.line}>
-          <StateLabel {...runStatus(run, now)} />
-          <Link to={`/runs/${run.id}`} className="break-anywhere ink-inherit weight-550">
-            Run {run.number} of <bdi>{run.graph_name}</bdi>
-          </Link>
-          <StartedBy run={run} />
-        </li>
-      ))}
+      {own.map((run) =>
+        run.robots ? (
+          <LedRun key={run.id} run={run} robot={robot.name} />
+        ) : (
+          <li key={run.id} className={style.line}>
+            <StateLabel {...runStatus(run, now)} />
+            <Link to={`/runs/${run.id}`} className="break-anywhere ink-inherit weight-550">
+              Run {run.number} of <bdi>{run.graph_name}</bdi>
+            </Link>
+            <StartedBy run={run} />
+          </li>
+        ),
+      )}
       {foreign.map(({ held }) => (
         <Foreign
           key={held.graph}

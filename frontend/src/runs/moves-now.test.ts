@@ -116,3 +116,20 @@ test("of a robot of a led run that does not answer nothing is said to move", () 
     ["David", "unknown"],
   ]);
 });
+
+test("of a led run that is stopped, a robot that is proven at rest is told apart from the others", () => {
+  const led = run({
+    robots: { a: "Carol", b: "David" },
+    state: "stopping",
+    desired: "stopped",
+    rests: [
+      { robot: "Carol", state: "proven", since: "1970-01-01T00:00:01Z" },
+      { robot: "David", state: "stopping", stops: true },
+    ],
+  });
+  const [carol, david] = movesNow(live([led]));
+  expect(carol).toMatchObject({ robot: "Carol", kind: "still" });
+  expect(carol?.words).toMatch(/^proven at rest/);
+  expect(david).toMatchObject({ robot: "David", kind: "unknown" });
+  expect(movesNow(live([led], "down"))).toMatchObject([{ kind: "unknown" }, { kind: "unknown" }]);
+});

@@ -14,6 +14,7 @@ import { HoldButton } from "../ui/hold-button";
 import { isolated } from "../words/isolated";
 import style from "./held-notice.module.css";
 import { actionWords } from "./level-places";
+import { OutcomeQuestions } from "./outcome-question";
 
 /** Return what goes on while a run is held, and what nobody knows since its robot does not answer. */
 function movingWords(run: Run, silent: ReadonlySet<string>): string {
@@ -84,7 +85,17 @@ function GoOnButton({ run, since }: { run: Run; since: string }) {
   );
 }
 
-export function HeldNotice({ run }: { run: Run }) {
+/** Whatever a run asks people for: to let it go on, and for outcomes that nothing shows. */
+export function RunQuestions({ run }: { run: Run }) {
+  return (
+    <>
+      <HeldNotice run={run} />
+      <OutcomeQuestions run={run} />
+    </>
+  );
+}
+
+function HeldNotice({ run }: { run: Run }) {
   const may = useMay(run.simulated ? "simulate" : "operate");
   const { now } = useLive();
   const words = heldWords(run, silentRobots(now));

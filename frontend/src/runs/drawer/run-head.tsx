@@ -34,7 +34,7 @@ const ConfirmRestDialog = lazyPart(() =>
 );
 
 /** Offers to end a run by a person's word where no answer of its engine can prove that nothing moves. */
-function ConfirmRestButton({ run }: { run: Run }) {
+export function ConfirmRestButton({ run, robot }: { run: Run; robot?: string }) {
   const may = useMay("operate");
   const [asking, setAsking] = useState<boolean | null>(null);
   if (!may || !needsRestConfirmation(run)) return null;
@@ -48,11 +48,16 @@ function ConfirmRestButton({ run }: { run: Run }) {
         leftSection={<IconEye size={14} aria-hidden />}
         onClick={() => setAsking(true)}
       >
-        I looked …
+        {robot === undefined ? "I looked …" : `I looked at ${isolated(robot)} …`}
       </Button>
       <OverlayBoundary>
         {asking !== null && (
-          <ConfirmRestDialog run={run} opened={asking} onClose={() => setAsking(false)} />
+          <ConfirmRestDialog
+            run={run}
+            robot={robot}
+            opened={asking}
+            onClose={() => setAsking(false)}
+          />
         )}
       </OverlayBoundary>
     </>
@@ -171,7 +176,7 @@ export function RunHead(props: Props) {
             {goes ? "Back to live" : "Back to its end"}
           </Button>
         )}
-        {goes && <ConfirmRestButton key={run.id} run={run} />}
+        {goes && !run.robots && <ConfirmRestButton key={run.id} run={run} />}
         {goes && <PauseButton run={run} />}
         <Ways run={run} />
         {folded !== null && <FoldButton folded={folded} onFold={onFold} />}

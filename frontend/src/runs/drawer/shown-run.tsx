@@ -4,20 +4,23 @@ import { useCallback, useMemo, useState } from "react";
 import { enginesOf } from "../../api/led-runs";
 import { silentRobots } from "../../api/live-socket";
 import { useLive } from "../../api/page-link";
+import { silentRests } from "../../api/run-stop";
 import { currentAlarm, type Run } from "../../api/runs";
 import { serverTimeOf } from "../../clock/server-clock";
 import type { Graph } from "../../graph/model";
-import { HeldNotice } from "../../status/held-notice";
+import { RunQuestions } from "../../status/held-notice";
 import { type Lane, robotsOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
 import { runLabel, type Tone } from "../../status/progress";
+import { RestList } from "../../status/rest-list";
+import { isAtRest } from "../../status/rests";
 import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 import { instant } from "../../ui/times";
 import { movingActions } from "../moves-now";
 import { useSentGraph } from "../sent-graph";
 import style from "./run-drawer.module.css";
-import { RunHead } from "./run-head";
+import { ConfirmRestButton, RunHead } from "./run-head";
 import { ValuesPanel } from "./values-panel";
 
 /** Alarms that the notice of STOP already shows on every page. */
@@ -63,6 +66,19 @@ function RobotTabList({ tabs }: { tabs: readonly RobotTab[] }) {
   );
 }
 
+/** The rest of each robot of a led run; a person who looked at one that cannot tell may say so. */
+function RobotRests({ run }: { run: Run }) {
+  const silent = new Set(silentRests(run).map(({ robot }) => robot));
+  return (
+    <RestList
+      run={run}
+      more={(robot) =>
+        silent.has(robot) && <ConfirmRestButton key={run.id} run={run} robot={robot} />
+      }
+    />
+  );
+}
+
 export function ShownRun(props: ShownRunProps) {
   const { run, going, graph, onChoose, folded, cursor, onSeek } = props;
   const { now } = useLive();
@@ -100,7 +116,8 @@ export function ShownRun(props: ShownRunProps) {
         cursor={cursor}
         onLive={() => onSeek(null)}
       />
-      <HeldNotice run={run} />
+      <RunQuestions run={run} />
+      <RobotRests run={run} />
       {!inLine && (
         <p
           className={style.told}
@@ -245,7 +262,11 @@ export function robotTabs(
       const names = new Set(lanes.filter(({ robot }) => robot === actor).map(({ name }) => name));
       const robot = actor === "" ? "any robot" : actor;
       const unknown = unheard || (Boolean(only.robots) && silent.has(actor));
-      return { id: `${only.id} ${actor}`, robot, run: only, actor, ...said(only, names, unknown) };
+      const words =
+        !unheard && only.desired === "stopped" && !only.ended_at && isAtRest(only, actor)
+          ? ({ tone: "done", words: "at rest" } as const)
+          : said(only, names, unknown);
+      return { id: `${only.id} ${actor}`, robot, run: only, actor, ...words };
     });
   }
   const tabs = runs.map((run) => ({

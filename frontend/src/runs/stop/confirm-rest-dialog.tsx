@@ -7,8 +7,9 @@ import { useState } from "react";
 import { errorText } from "../../api/http";
 import { engineWords } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
-import { confirmRest, newestPieces, type Run } from "../../api/runs";
+import { confirmRest, type Run } from "../../api/runs";
 import { actionWords } from "../../status/level-places";
+import { openRests } from "../../status/rests";
 import { usePendingText } from "../../ui/drafts";
 import { HoldButton } from "../../ui/hold-button";
 import { isolated } from "../../words/isolated";
@@ -19,22 +20,27 @@ const SHORTEST = 3; // characters, as the runner asks for
 
 interface Props {
   run: Run;
+  /** The robot of a led run that was looked at, if that is known. */
+  robot?: string | undefined;
   opened: boolean;
   onClose: () => void;
 }
 
-export function ConfirmRestDialog({ run, opened, onClose }: Props) {
+export function ConfirmRestDialog({ run, robot, opened, onClose }: Props) {
   const { runner } = useLive();
   const [how, setHow] = useState("");
   // A led run is confirmed robot by robot.
-  const pieces = newestPieces(run);
+  const pieces = openRests(run);
   const [chosen, choose] = useState<string | null>(null);
-  const piece = pieces.find((each) => each.run === chosen) ?? pieces[0];
+  const piece =
+    pieces.find((each) => each.piece === chosen) ??
+    pieces.find((each) => each.robot === robot) ??
+    pieces[0];
   const where = piece === undefined ? engineWords(run) : isolated(piece.robot);
   // Never kept for later: these words are about what was seen a moment ago.
   usePendingText(opened ? how : "", null);
   const confirm = useMutation({
-    mutationFn: () => confirmRest(runner ?? "", piece?.run ?? run.id, how.trim()),
+    mutationFn: () => confirmRest(runner ?? "", piece?.piece ?? run.id, how.trim()),
     onSuccess: onClose,
     onError: (error) => notifyFailure("Not confirmed", errorText(error)),
   });
@@ -50,7 +56,7 @@ export function ConfirmRestDialog({ run, opened, onClose }: Props) {
       <Text size="sm">
         Nothing that the engine says can show whether run {run.number} of{" "}
         <bdi>{run.graph_name}</bdi> has come to rest:{" "}
-        {(run.unconfirmed ?? "it does not answer").replace(/\.$/, "")}.
+        {(piece?.why || run.unconfirmed || "it does not answer").replace(/\.$/, "")}.
       </Text>
       <Text size="sm" mt="xs">
         Only somebody who has looked at the robot can end this. Until then nothing is started there.
@@ -59,10 +65,10 @@ export function ConfirmRestDialog({ run, opened, onClose }: Props) {
         <NativeSelect
           mt="md"
           label="Which robot?"
-          value={piece?.run ?? ""}
+          value={piece?.piece ?? ""}
           data={pieces.map((each) => ({
-            value: each.run,
-            label: `${isolated(each.robot)}: ${actionWords(run, each.action)}`,
+            value: each.piece ?? "",
+            label: `${isolated(each.robot)}: ${actionWords(run, each.action ?? "")}`,
           }))}
           onChange={(event) => choose(event.currentTarget.value)}
         />

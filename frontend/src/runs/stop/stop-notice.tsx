@@ -10,6 +10,7 @@ import { needsRestConfirmation } from "../../api/run-stop";
 import type { Run } from "../../api/runs";
 import { serverTimeOf, tick } from "../../clock/server-clock";
 import { HelpLink } from "../../status/help-link";
+import { restLines } from "../../status/rests";
 import { clock, duration, instant, useTick } from "../../ui/times";
 import { useRootMark } from "../../ui/use-root-mark";
 import { useWatched } from "../../ui/watched";
@@ -193,6 +194,30 @@ export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
   return { tone: "loud", stays: true, text };
 }
 
+/**
+ * Return the led runs of which a Stop notice tells robot by robot: those that the newest Stop means,
+ * and all others that are being stopped.
+ */
+export function runsByRobot(now: LiveState, stop: StopRequest | undefined): Run[] {
+  const meant = stop === undefined ? [] : stopTargets(stop, now);
+  const stopping = openRuns(now).filter((run) => run.desired === "stopped");
+  return [...new Set([...meant, ...stopping])].filter((run) => (run.rests ?? []).length > 0);
+}
+
+/** The rest of each robot of a led run: the run as a whole is never better than its worst robot. */
+function RobotLines({ run, unheard, named }: { run: Run; unheard: boolean; named: boolean }) {
+  return (
+    <ul className={style.robots} aria-label={`Rest of each robot of run ${run.number}`}>
+      {restLines(run, unheard).map(({ robot, words }) => (
+        <li key={robot}>
+          {named && `Run ${run.number}, `}
+          <b>{robot}</b>: {words}
+        </li>
+      ))}
+    </ul>
+  );
+}
+
 type ShownNotice = NonNullable<StopNoticeText>;
 
 /**
@@ -278,6 +303,7 @@ export function StopNotice() {
     canAnswer && notice.tone === "loud" && now.link !== "down"
       ? openRuns(now).filter(needsRestConfirmation)
       : [];
+  const byRobot = runsByRobot(now, watching ? last : undefined);
   const hide = notice.stays
     ? { label: "Put aside", run: aside.put }
     : { label: "Hide", run: () => setDismissed(last?.id ?? "") };
@@ -289,6 +315,14 @@ export function StopNotice() {
     >
       <span>
         <span>{notice.text}</span>
+        {byRobot.map((run) => (
+          <RobotLines
+            key={run.id}
+            run={run}
+            unheard={now.link === "down"}
+            named={byRobot.length > 1}
+          />
+        ))}
         {notice.since !== undefined && (
           <span aria-hidden className={style.since}>
             {` ${notice.since}`}

@@ -1,0 +1,109 @@
+/** Asks a person for the outcome of an action of a led run that ended without one. */
+import { TextInput } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
+import { IconHelpCircle, IconMessageCheck } from "@tabler/icons-react";
+import { useMutation } from "@tanstack/react-query";
+import { useId, useState } from "react";
+import { errorText, isOutcomeUnknown } from "../api/http";
+import { useLive } from "../api/page-link";
+import { useMay } from "../api/people";
+import { giveOutcome, type Run, type SaidOutcome } from "../api/runs";
+import { usePendingText } from "../ui/drafts";
+import { HoldButton } from "../ui/hold-button";
+import { Segments } from "../ui/segments";
+import { isolated } from "../words/isolated";
+import style from "./held-notice.module.css";
+import { actionWords } from "./level-places";
+import { askedOutcomes } from "./rests";
+
+const OUTCOMES = [
+  { value: "true", label: "True" },
+  { value: "false", label: "False" },
+  { value: "error", label: "Error" },
+] as const;
+
+function failure(error: unknown) {
+  const message = errorText(error);
+  if (!isOutcomeUnknown(error)) return { color: "red", title: "Not taken", message };
+  return { color: "red", autoClose: false as const, title: "NOT KNOWN whether it counts", message };
+}
+
+function OutcomeForm({ run, action }: { run: Run; action: string }) {
+  const { live, runner, now } = useLive();
+  const [outcome, choose] = useState<SaidOutcome | "">("");
+  const [reason, setReason] = useState("");
+  const id = useId();
+  // Never kept for later: the words are about what was seen a moment ago.
+  usePendingText(reason, null);
+  const give = useMutation({
+    mutationFn: (said: SaidOutcome) => giveOutcome(runner ?? "", run.id, action, said, reason),
+    onSuccess: (fresh) => live?.learn(fresh),
+    onError: (error) => notifications.show(failure(error)),
+  });
+  const words = actionWords(run, action);
+  const ready = outcome !== "" && reason.trim() !== "";
+  const then = run.held
+    ? "Nothing begins before somebody lets the run go on."
+    : "What waits for it begins at once, and robots may move.";
+  return (
+    <div className={style.outcome}>
+      <Segments
+        label={`Outcome of ${words}`}
+        size="xs"
+        data={OUTCOMES}
+        value={outcome as SaidOutcome}
+        onChange={choose}
+      />
+      <TextInput
+        id={id}
+        size="xs"
+        className={style.reason ?? ""}
+        aria-label={`What shows the outcome of ${words}?`}
+        placeholder="What did you see?"
+        maxLength={500}
+        value={reason}
+        onChange={(event) => setReason(event.currentTarget.value)}
+      />
+      <HoldButton
+        size="compact-sm"
+        icon={<IconMessageCheck size={14} aria-hidden />}
+        label={give.isPending ? "Telling …" : "Hold to say so"}
+        name={
+          ready
+            ? `Say that ${words} ended ${outcome}`
+            : `Choose the outcome of ${words} and say what you saw first`
+        }
+        question={`Did ${words} end ${outcome}? ${then}`}
+        disabled={!ready || give.isPending || now.link !== "live"}
+        onHeld={() => outcome !== "" && give.mutate(outcome)}
+      />
+    </div>
+  );
+}
+
+export function OutcomeQuestions({ run }: { run: Run }) {
+  const may = useMay(run.simulated ? "simulate" : "operate");
+  return askedOutcomes(run).map((action) => {
+    const robot = run.actions?.[action]?.robot;
+    const where = robot ? ` on ${isolated(robot)}` : "";
+    return (
+      <section
+        key={`${action} ${run.actions?.[action]?.piece}`}
+        className={style.notice}
+        aria-label={`Outcome of ${actionWords(run, action)}`}
+      >
+        <IconHelpCircle size={17} aria-hidden />
+        <p role="alert">
+          <b>
+            {actionWords(run, action)}
+            {where} has ended, and nothing shows its outcome.
+          </b>{" "}
+          {may
+            ? "Look, and say what it was. Your word is recorded as said by you, not as observed."
+            : "Operators can say what it was."}
+        </p>
+        {may && <OutcomeForm run={run} action={action} />}
+      </section>
+    );
+  });
+}

@@ -1,0 +1,93 @@
+/** Says in words for each robot of a led run how far its rest is proven. */
+import { type Run, silentRests } from "../api/run-stop";
+import type { RunnerApi } from "../api/schema/runner";
+import { clock, instant } from "../ui/times";
+import { isolated } from "../words/isolated";
+import { actionWords } from "./level-places";
+import type { Tone } from "./progress";
+
+export type RobotRest = RunnerApi["RobotRestShown"];
+
+export interface RestLine {
+  readonly robot: string;
+  readonly tone: Tone;
+  readonly words: string;
+}
+
+/** States in which nothing of the run goes on there, as far as its events tell. */
+const RESTS: ReadonlySet<RobotRest["state"]> = new Set(["unused", "proven", "seen", "unsent"]);
+
+/**
+ * Return the robots of a led run that are not known to rest, those about which only a person can
+ * tell first.
+ */
+export function openRests(run: Run): RobotRest[] {
+  const silent = new Set(silentRests(run));
+  const others = (run.rests ?? []).filter((rest) => !RESTS.has(rest.state) && !silent.has(rest));
+  return [...silent, ...others].filter(({ piece }) => piece);
+}
+
+const sentence = (text: string) => text.replace(/\.$/, "");
+
+function wordsOf(rest: RobotRest, run: Run): Pick<RestLine, "tone" | "words"> {
+  const at = instant(rest.since);
+  const time = at === null ? "" : ` at ${clock(at)}`;
+  const since = at === null ? "" : ` since ${clock(at)}`;
+  const action = rest.action ? actionWords(run, rest.action) : "its action";
+  const why = rest.why ? `: ${sentence(rest.why)}` : "";
+  const stops = rest.stops ? "; the stop is repeated" : "";
+  switch (rest.state) {
+    case "unused":
+      return { tone: "idle", words: "nothing was begun there" };
+    case "going":
+      return { tone: "run", words: `${action} goes on` };
+    case "stopping":
+      return { tone: "unknown", words: `rest not proven yet, the stop is repeated${why}` };
+    case "silent":
+      return { tone: "unknown", words: `silent${since}: not known${stops}` };
+    case "unproven":
+      return { tone: "unknown", words: `rest cannot be proven${why}${stops}` };
+    case "proven":
+      return { tone: "done", words: `proven at rest${time}` };
+    case "seen": {
+      const who = rest.by ? `seen at rest by ${isolated(rest.by.name)}` : "seen at rest";
+      return { tone: "stopped", words: `${who}${time}, not proven${why}` };
+    }
+    case "unsent":
+      return { tone: "idle", words: `${action} did not begin there` };
+    default:
+      return { tone: "unknown", words: "not known" };
+  }
+}
+
+/**
+ * Return a line for each robot of a led run, in the order of their names; none for another run.
+ * `unheard`: the runner is not heard, so that only a proof that had come before is known.
+ */
+export function restLines(run: Run, unheard: boolean): RestLine[] {
+  return (run.rests ?? []).map((rest) => {
+    if (unheard && !RESTS.has(rest.state)) {
+      return { robot: rest.robot, tone: "unknown", words: "not known, the runner is not heard" };
+    }
+    return { robot: rest.robot, ...wordsOf(rest, run) };
+  });
+}
+
+/** Return whether it is known of a robot of a led run that nothing of the run goes on there. */
+export function isAtRest(run: Run, robot: string): boolean {
+  const rest = (run.rests ?? []).find((each) => each.robot === robot);
+  return rest !== undefined && RESTS.has(rest.state);
+}
+
+/** Return whether a run waits for something that a person has to say. */
+export function asksPeople(run: Run): boolean {
+  return Boolean(run.held) || askedOutcomes(run).length > 0;
+}
+
+/** Return the actions of a run whose outcome a person has to give, by full name. */
+export function askedOutcomes(run: Run): string[] {
+  if (run.ended_at !== null || run.desired === "stopped") return [];
+  return Object.entries(run.actions ?? {})
+    .filter(([, { asks }]) => asks)
+    .map(([name]) => name);
+}
