@@ -99,7 +99,7 @@ export function OutcomeQuestions({ run }: { run: Run }) {
             {where} has ended, and nothing shows its outcome.
           </b>{" "}
           {may
-            ? "Look, and say what it was. Your word is recorded as said by you, not as observed."
+            ? "What was it? It is kept as said by you, not as observed."
             : "Operators can say what it was."}
         </p>
         {may && <OutcomeForm run={run} action={action} />}

@@ -5,6 +5,7 @@ import {
   IconCheck,
   IconDownload,
   IconFilePencil,
+  IconHandStop,
   IconX,
 } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
@@ -39,8 +40,21 @@ const WAITING: Readonly<Record<string, string>> = {
 /** The package with which a robot shows the outputs of actions. */
 const VALUES_PACKAGE = "/api/values-package.zip";
 
-const SIGNS = { passed: IconCheck, warned: IconAlertTriangle, blocked: IconX } as const;
-const READ = { passed: "Fine", warned: "Note", blocked: "In the way" } as const;
+const SIGNS = {
+  passed: IconCheck,
+  warned: IconAlertTriangle,
+  blocked: IconX,
+  accept: IconHandStop,
+} as const;
+const READ = {
+  passed: "Fine",
+  warned: "Note",
+  blocked: "In the way",
+  accept: "Delays a Stop, to be accepted",
+} as const;
+
+/** What of a led run makes a Stop reach a robot later: a person accepts it, nothing is wrong. */
+const DELAYS: ReadonlySet<string> = new Set(["two-at-once", "stop-across"]);
 
 interface PreflightLineProps {
   item: PreflightItem;
@@ -49,12 +63,13 @@ interface PreflightLineProps {
 }
 
 function Line({ item, look, moment }: PreflightLineProps) {
-  const Sign = SIGNS[item.verdict];
+  const verdict = item.overridable && DELAYS.has(item.code) ? "accept" : item.verdict;
+  const Sign = SIGNS[verdict];
   return (
-    <li className={style.line} data-verdict={item.verdict}>
+    <li className={style.line} data-verdict={verdict}>
       <Sign size={15} stroke={2.4} aria-hidden className={style.sign} />
       <span>
-        <span className="visually-hidden">{READ[item.verdict]}: </span>
+        <span className="visually-hidden">{READ[verdict]}: </span>
         {item.text}
         {item.verdict === "warned" && item.problems.length > 0 && (
           <details className={style.more}>
