@@ -130,6 +130,19 @@ export function useRunSeenAt(run: string): number | undefined {
 }
 
 /**
+ * Return the oldest of the last answers of these robots, by the server's clock; undefined without
+ * robots, and until each of them has answered.
+ */
+export function useOldestAnswerOf(robots: readonly string[]): number | undefined {
+  const { live } = useSyncExternalStore(pageLink.subscribe, pageLink.now);
+  return useSyncExternalStore(live?.subscribeSeen ?? never, () => {
+    const answers = robots.map((robot) => live?.robotAnsweredAt.get(robot) ?? Number.NaN);
+    const oldest = Math.min(...answers);
+    return Number.isFinite(oldest) ? oldest : undefined;
+  });
+}
+
+/**
  * Return when a robot last answered, by the server's clock; answers without a change are counted
  * too.
  */

@@ -2,7 +2,8 @@
 
 import { IconEye, IconPlugConnectedX } from "@tabler/icons-react";
 import { enginesOf } from "../api/led-runs";
-import { useLive, useRunSeenAt } from "../api/page-link";
+import { useLive, useOldestAnswerOf, useRunSeenAt } from "../api/page-link";
+import { SIMULATOR } from "../api/robots";
 import type { Run } from "../api/runs";
 import { serverTimeOf } from "../clock/server-clock";
 import { clock, duration, useNow } from "../ui/times";
@@ -10,9 +11,16 @@ import style from "./connection-status.module.css";
 
 const OLD = 2_500; // ms; a run is looked at each second
 
-/** "proof 0.4 s ago": when the engine itself last showed this run. `whose`: its name stands before. */
+/**
+ * "proof 0.4 s ago": when the engine itself last showed this run; of a led run, when the robot that is
+ * silent for longest last answered. `whose`: its name stands before.
+ */
 function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
-  const seen = useRunSeenAt(run.id);
+  const own = useRunSeenAt(run.id);
+  const oldest = useOldestAnswerOf(
+    run.robots ? enginesOf(run).filter((engine) => engine !== SIMULATOR) : [],
+  );
+  const seen = run.robots ? oldest : own;
   const goes = run.ended_at === null;
   const present = useNow(500, goes);
   if (!goes) return null;
@@ -22,7 +30,11 @@ function LastSeen({ run, whose = false }: { run: Run; whose?: boolean }) {
     <span
       className={style.word}
       data-old={old > OLD || undefined}
-      title="When the engine itself last showed this run"
+      title={
+        run.robots
+          ? "When the robot that is silent for longest last answered"
+          : "When the engine itself last showed this run"
+      }
     >
       <IconEye size={13} aria-hidden /> {whose && <b>{enginesOf(run).join(", ")}</b>} proof{" "}
       {duration(old)} ago
