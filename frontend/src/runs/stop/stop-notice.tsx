@@ -198,7 +198,7 @@ export function unreachableNotice(now: LiveState, at: number): StopNoticeText {
  * Return the led runs of which a Stop notice tells robot by robot: those that the newest Stop means,
  * and all others that are being stopped.
  */
-export function runsByRobot(now: LiveState, stop: StopRequest | undefined): Run[] {
+function runsByRobot(now: LiveState, stop: StopRequest | undefined): Run[] {
   const meant = stop === undefined ? [] : stopTargets(stop, now);
   const stopping = openRuns(now).filter((run) => run.desired === "stopped");
   return [...new Set([...meant, ...stopping])].filter((run) => (run.rests ?? []).length > 0);
