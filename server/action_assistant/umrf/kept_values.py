@@ -5,8 +5,8 @@ action of a piece gets children, the keepers: they take its outputs as inputs, a
 nobody gives one of their required inputs (docs/decisions/114-values-by-a-package.md). Pure.
 """
 
-from collections.abc import Collection, Iterator, Mapping
-from typing import Any, Final
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import Any, Final, TypeAlias
 
 import msgspec
 
@@ -44,6 +44,8 @@ MOST_BYTES: Final = 64 * 1024
 SLOTS: Final[Mapping[str, tuple[int, str]]] = {
     f"A{place}_{kind}": (place, kind) for place in range(PLACES) for kind in sorted(NATIVE)
 }
+#: Arrows that hand values on, each with these outputs and their types.
+Handing: TypeAlias = Sequence[tuple[Relation, dict[str, str]]]
 _TAKEN: Final = frozenset({"run", "stop", "pause", "restart"})  # responses that take values
 
 
@@ -245,20 +247,21 @@ def takes(relation: Relation, outcomes: tuple[Precondition, ...] = PRECONDITIONS
     return any(relation.conditions.answer(outcome) in _TAKEN for outcome in outcomes)
 
 
-def taken_on_false(graph: Graph) -> frozenset[Key]:
+def taken_on_false(graph: Graph, arrows: Handing) -> frozenset[Key]:
     """Return the keys of the actions whose values somebody takes after they have ended with false. The
-    exit of a graph takes those of the actions before it."""
-    arrows = [each for each, _ in handing(graph)]
-    handed = {each.parent for each in arrows}
-    arrows += [each for each in graph.relations if each.child == EXIT and each.parent in handed]
-    return frozenset(each.parent for each in arrows if takes(each, ("on_false",)))
+    exit of a graph takes those of the actions before it. `arrows`: all that hand values on."""
+    handed = {each.parent for each, _ in arrows}
+    taking = [each for each, _ in arrows]
+    taking += [each for each in graph.relations if each.child == EXIT and each.parent in handed]
+    return frozenset(each.parent for each in taking if takes(each, ("on_false",)))
 
 
-def receiving(graph: Graph) -> dict[Key, frozenset[str]]:
-    """Return the flat names of the inputs that an arrow may hand a value to, by key of their action."""
+def receiving(graph: Graph, arrows: Handing) -> dict[Key, frozenset[str]]:
+    """Return the flat names of the inputs that an arrow may hand a value to, by key of their action.
+    `arrows`: all that hand values on."""
     actions = {action.key: action for action in graph.actions if not action.missing}
     found: dict[Key, set[str]] = {}
-    for relation, _ in handing(graph):
+    for relation, _ in arrows:
         parent, child = actions[relation.parent], actions[relation.child]
         inputs = slots_of(child.inputs)
         given = renamed(slots_of(parent.outputs), relation.remap, inputs)

@@ -12,7 +12,7 @@ import msgspec
 from action_assistant.runner.execution.conducted_steps import Step
 from action_assistant.runner.runs.events import PieceEnded
 from action_assistant.runner.start.piece_texts import PieceText
-from action_assistant.umrf.kept_values import named
+from action_assistant.umrf.kept_values import KeptOutput, kept_outputs, named
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.semantics import Returned
 
@@ -32,22 +32,29 @@ class PieceValues:
     def __init__(self, texts: Mapping[str, PieceText], keeping: Collection[str]) -> None:
         self._texts = texts
         self._keeping = frozenset(keeping)
+        self._outputs: dict[str, tuple[KeptOutput, ...]] = {}  # by node, as they are asked for
+        self._kept_parts: dict[str, tuple[str, ...]] = {}
         self._said: set[tuple[str, tuple[str, ...]]] = set()
 
     def text(self, step: Step, piece: str) -> str:
         """Return the text of a piece of this step. `piece`: its id."""
-        keeps = step.engine in self._keeping
-        return self._texts[step.node].for_run(piece, step.call.inputs, keeps=keeps)
+        text = self._texts[step.node]
+        parts = text.parts
+        if self._kept(step):
+            if step.node not in self._kept_parts:
+                self._kept_parts[step.node] = text.kept_parts()
+            parts = self._kept_parts[step.node]
+        return text.for_run(piece, step.call.inputs, parts)
 
     def tells_false_by_rest(self, step: Step) -> bool:
         """Return whether the graph of a step goes on after its action has ended with false, and with
         no other outcome."""
-        return step.engine in self._keeping and self._texts[step.node].taken_on_false
+        return self._texts[step.node].taken_on_false and bool(self._kept(step))
 
     def why_unknown(self, step: Step) -> str:
         """Return why the values that a step hands on are not known, as part of a sentence; "" if they
         are known, or nobody takes them."""
-        if step.run is None or step.engine not in self._keeping:
+        if step.run is None or not self._kept(step):
             return ""
         return step.run.kept.wrong if self._texts[step.node].is_taken else ""
 
@@ -81,16 +88,25 @@ class PieceValues:
         )
         return f"{known} {names}: nothing is handed on from there."
 
+    def _kept(self, step: Step) -> tuple[KeptOutput, ...]:
+        """Return the outputs that keepers of a step take; none on a robot without the package."""
+        if step.engine not in self._keeping:
+            return ()
+        if step.node not in self._outputs:
+            self._outputs[step.node] = kept_outputs(self._texts[step.node].action)
+        return self._outputs[step.node]
+
     def _given(self, step: Step, outcome: Precondition, how: str) -> GivenOutputs:
         text = self._texts[step.node]
         is_shown = outcome == "on_true" or (outcome == "on_false" and text.taken_on_false)
-        if step.run is None or step.engine not in self._keeping or not is_shown:
+        outputs = self._kept(step)
+        if step.run is None or not outputs or not is_shown:
             return GivenOutputs()
-        names = tuple(each.name for each in text.outputs)
+        names = tuple(each.name for each in outputs)
         if how != "shape" or step.run.kept.wrong:
             return GivenOutputs(unset=names if text.is_taken else ())
         kept = step.run.kept.values
-        values = {each.name: kept[each.place] for each in text.outputs if each.place in kept}
+        values = {each.name: kept[each.place] for each in outputs if each.place in kept}
         return GivenOutputs(values, tuple(name for name in names if name not in values))
 
 

@@ -14,44 +14,46 @@ from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import dump, parse_small
 from action_assistant.umrf.kept_values import (
-    KeptOutput,
     as_json,
     handing,
-    kept_outputs,
     receiving,
     taken_on_false,
     with_keepers,
 )
 from action_assistant.umrf.led_subgraphs import Inside, graphs_within
-from action_assistant.umrf.model import Action, Graph, JsonText, Key, Parameter
+from action_assistant.umrf.model import Action, Graph, JsonText, Parameter
 from action_assistant.umrf.parameters import flat_name
 from action_assistant.umrf.pieces import piece_name, piece_of
 
 
 class PieceText(msgspec.Struct, frozen=True, kw_only=True):
-    """The text of a piece, in `parts` between which the id of its run stands; with keepers of the
-    outputs in `kept_parts`, empty if there is nothing to keep. `action`: the one that it sends;
-    `inside`: the graphs inside of it, by name, empty if it stands for none.
+    """The text of a piece, in `parts` between which the id of its run stands. `action`: the one that
+    it sends; `inside`: the graphs inside of it, by name, empty if it stands for none; `piece`: the
+    graph that it says, and `stamp` the ids in it.
 
     `inputs`: the leaves that get a value for each call, by flat name, as JSON without one; in the text
-    their flat name stands in `marks`. `outputs`: those that keepers take. `is_taken`: some arrow hands
-    them on; `taken_on_false`: also after false, see `with_keepers`.
+    their `marks` stand. `is_taken`: some arrow hands the outputs on; `taken_on_false`: also after
+    false.
     """
 
     parts: tuple[str, ...]
     action: Action
+    piece: Graph
+    stamp: codec.Stamp
     inside: dict[str, Graph] = {}
-    kept_parts: tuple[str, ...] = ()
     inputs: dict[str, JsonText] = {}
     marks: dict[str, str] = {}
-    outputs: tuple[KeptOutput, ...] = ()
     is_taken: bool = False
     taken_on_false: bool = False
 
-    def for_run(self, run: str, values: Mapping[str, Any], *, keeps: bool) -> str:
+    def kept_parts(self) -> tuple[str, ...]:
+        """Return the parts of the text with keepers of all outputs, as `with_keepers` adds them."""
+        kept = with_keepers(self.piece, self.action, taken_on_false=self.taken_on_false)
+        return _split(codec.write(kept, self.stamp), self.stamp)
+
+    def for_run(self, run: str, values: Mapping[str, Any], parts: tuple[str, ...]) -> str:
         """Return the text with the id of this run. `values`: those of the inputs, by flat name, as the
-        whole graph has them now; `keeps`: with keepers."""
-        parts = self.kept_parts if keeps and self.kept_parts else self.parts
+        whole graph has them now; `parts`: those of the text, or `kept_parts`."""
         text = run.join(parts)
         if not self.marks:
             return text
@@ -78,70 +80,56 @@ def piece_texts(umrf: str, subgraphs: Sequence[RunSubgraph]) -> dict[str, PieceT
 def texts_of(graph: Graph, inside: Inside, stamp: codec.Stamp) -> dict[str, PieceText]:
     """Return the pieces of a graph, by full name of their action. `stamp`: its run is replaced in each
     text."""
-    inputs, on_false = receiving(graph), taken_on_false(graph)
-    takers = frozenset(each.parent for each, _ in handing(graph))
-    return {
-        action.full_name: _text_of(
-            graph, action, inside, stamp, inputs.get(action.key, frozenset()), takers, on_false
-        )
-        for action in graph.actions
-        if not action.missing
-    }
-
-
-def _text_of(
-    graph: Graph,
-    action: Action,
-    inside: Inside,
-    stamp: codec.Stamp,
-    given: frozenset[str],
-    taken: frozenset[Key],
-    on_false: frozenset[Key],
-) -> PieceText:
-    """Return the text of one piece. `given`: the inputs that other actions give; `taken` and
-    `on_false`: the actions whose outputs others take, and those where they do that after false."""
-    own = {name: inside[name] for name in sorted(graphs_within(action, inside))}
-    visit = (stamp.run or "") if own else ""
-    plain = codec.write(piece_of(graph, action, visit), stamp)
-    open_, leaves, marks = _opened(action, given, plain)
-    piece = piece_of(graph, open_, visit)
-    kept = kept_outputs(action)
-    whole = with_keepers(piece, open_, taken_on_false=action.key in on_false) if kept else None
-    return PieceText(
-        parts=_split(codec.write(piece, stamp), marks, stamp),
-        action=action,
-        inside=own,
-        kept_parts=_split(codec.write(whole, stamp), marks, stamp) if whole is not None else (),
-        inputs=leaves,
-        marks=marks,
-        outputs=kept,
-        is_taken=action.key in taken,
-        taken_on_false=bool(kept) and action.key in on_false,
-    )
-
-
-def _opened(
-    action: Action, given: frozenset[str], text: str
-) -> tuple[Action, dict[str, JsonText], dict[str, str]]:
-    """Return an action with marks in place of the inputs that others give, the leaves without a value,
-    and the marks, by flat name. `text`: no mark is part of it."""
-    leaves: dict[str, JsonText] = {}
-    marks: dict[str, str] = {}
-    inputs: list[Parameter] = []
-    sign = "?"
-    while f"{sign}input " in text:
-        sign += "?"
-    for parameter in action.inputs:
-        leaf, name = parse_small(parameter.text), flat_name(parameter.path)
-        if name not in given or not isinstance(leaf, dict) or name in leaves:
-            inputs.append(parameter)
+    arrows = tuple(handing(graph))
+    inputs, on_false = receiving(graph, arrows), taken_on_false(graph, arrows)
+    taken = frozenset(each.parent for each, _ in arrows)
+    texts: dict[str, PieceText] = {}
+    for action in graph.actions:
+        if action.missing:
             continue
-        leaves[name] = dump({key: value for key, value in leaf.items() if key != "pvf_value"})
-        marks[name] = f'"{sign}input {len(leaves)}{sign}"'
-        inputs.append(Parameter(parameter.path, marks[name]))
-    return msgspec.structs.replace(action, inputs=tuple(inputs)), leaves, marks
+        own = {name: inside[name] for name in sorted(graphs_within(action, inside))}
+        visit = (stamp.run or "") if own else ""
+        given = inputs.get(action.key, frozenset())
+        leaves, marks, piece, text = _marked(graph, action, visit, stamp, given)
+        texts[action.full_name] = PieceText(
+            parts=_split(text, stamp),
+            action=action,
+            piece=piece,
+            stamp=stamp,
+            inside=own,
+            inputs=leaves,
+            marks=marks,
+            is_taken=action.key in taken,
+            taken_on_false=action.key in on_false,
+        )
+    return texts
 
 
-def _split(text: str, marks: Mapping[str, str], stamp: codec.Stamp) -> tuple[str, ...]:
-    assert all(text.count(mark) == 1 for mark in marks.values())
+def _marked(
+    graph: Graph, action: Action, visit: str, stamp: codec.Stamp, given: frozenset[str]
+) -> tuple[dict[str, JsonText], dict[str, str], Graph, str]:
+    """Return the leaves of the `given` inputs without a value, and the marks in their places, by flat
+    name; the piece with the marks, and its text. No mark is in another place of the text."""
+    sign = "?"
+    while True:
+        leaves: dict[str, JsonText] = {}
+        marks: dict[str, str] = {}
+        inputs: list[Parameter] = []
+        for parameter in action.inputs:
+            leaf, name = parse_small(parameter.text), flat_name(parameter.path)
+            if name not in given or not isinstance(leaf, dict) or name in leaves:
+                inputs.append(parameter)
+                continue
+            leaves[name] = dump({key: value for key, value in leaf.items() if key != "pvf_value"})
+            marks[name] = f'"{sign}input {len(leaves)}{sign}"'
+            inputs.append(Parameter(parameter.path, marks[name]))
+        opened = msgspec.structs.replace(action, inputs=tuple(inputs)) if marks else action
+        piece = piece_of(graph, opened, visit)
+        text = codec.write(piece, stamp)
+        if all(text.count(mark) == 1 for mark in marks.values()):
+            return leaves, marks, piece, text
+        sign += "?"
+
+
+def _split(text: str, stamp: codec.Stamp) -> tuple[str, ...]:
     return tuple(text.split(stamp.run)) if stamp.run else (text,)
