@@ -56,6 +56,8 @@ LISTED: Final = {
     "action-assistant serve --index-folder": "needs the folders of two robots",
     "action-assistant serve --data": "needs a data folder that no server has: tests start hundreds",
     "action-assistant stop --all --server": "speaks to another computer",
+    "action-assistant run meet --robots": "needs two robots that may be led: tests/ros leads some",
+    "action-assistant runs go-on": "needs a led run that is held: tests/ros leads some",
     "action-assistant simulate-robot": "needs rclpy: tests/ros and the browser start it",
     ".venv-ros/bin/action-assistant simulate-robot": "needs rclpy: tests/ros and the browser start it",
 }
