@@ -98,11 +98,17 @@ class RobotProcess:
     """A robot as people start one: `simulate-robot`."""
 
     def __init__(
-        self, domain: int, folder: Path, script: dict[str, Any], *more: str, name: str = "David"
+        self,
+        domain: int,
+        folder: Path,
+        script: dict[str, Any],
+        *more: str,
+        name: str = "David",
+        wrapper: tuple[str, ...] = (),
     ) -> None:
         file = folder / "script.json"
         file.write_bytes(msgspec.json.encode({"behaviours": script}))
-        command = [sys.executable, "-m", "action_assistant", "simulate-robot", name]
+        command = [*wrapper, sys.executable, "-m", "action_assistant", "simulate-robot", name]
         self._process = subprocess.Popen(
             [*command, "--domain", str(domain), "--script", str(file), *more],
             stdout=subprocess.PIPE,

@@ -1,0 +1,138 @@
+"""Three emulated robots are led over a network that delays and loses messages, with gaps of seconds.
+
+`TEST_LONG` runs it, as root with /dev/net/tun; `TEST_ROUGH_S` is for how long (default 60),
+`TEST_ROUGH` the delay in ms, the share of lost frames and the longest gap in seconds (default 20 0.05 4).
+"""
+
+import os
+import subprocess
+import sys
+import time
+from collections import Counter
+from contextlib import ExitStack
+from pathlib import Path
+
+import anyio
+import pytest
+
+pytest.importorskip(
+    "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
+)
+
+from action_assistant.errors import Refused
+from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.links.port import Registration
+from action_assistant.runner.links.ros2.availability import ros2_reach
+from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import PieceBegan, PieceEnded, Published
+from action_assistant.runner.runs.views import time as as_text
+from action_assistant.runner.start.admission import GoOnRequest
+from ros.led_engines import ACCEPTED, PLAYERS, as_led, clock_us, watch
+from ros.robots import RobotProcess
+from runner.harness import ANN, BEN, MemoryJournal, at_once
+
+SECONDS = float(os.environ.get("TEST_ROUGH_S", "60"))
+ROUGH = os.environ.get("TEST_ROUGH", "20 0.05 4").split()
+ROBOTS = os.environ.get("ROUGH_NETWORK", "")  # inside: the process whose network robots enter
+SCRIPT = {
+    "OxWork_0": [{"never": True}],
+    "OxWork_1": [{"after_s": 0.15}],
+    "OxWork_2": [{"after_s": 0.15, "result": "on_false"}],
+}
+
+pytestmark = [pytest.mark.long, pytest.mark.timeout(0)]
+
+
+def test_led_runs_over_a_rough_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    if not ROBOTS:
+        if os.geteuid() != 0 or not Path("/dev/net/tun").exists():
+            pytest.skip("it needs root and /dev/net/tun")
+        program = Path(__file__).with_name("rough_network.py")
+        inside = [sys.executable, "-m", "pytest", "-q", "-s", "-m", "long", __file__]
+        done = subprocess.run([sys.executable, str(program), *ROUGH, *inside], check=False)
+        assert done.returncode == 0
+        return
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    monkeypatch.setenv("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+    count: Counter[str] = Counter()
+    failed: list[str] = []
+    proven: list[float] = []
+    names = {name: 30 + n for n, name in enumerate(PLAYERS.values())}
+
+    async def lead(control: ExecutionService, journal: MemoryJournal, until: float) -> None:
+        run = (
+            await control.start(as_led(watch("watch"), lost="wait", override=ACCEPTED), ANN)
+        ).run.id
+        count["runs"] += 1
+        last = time.monotonic() + 15
+        while time.monotonic() < min(last, until) and run in control.open:
+            held = control.open[run].run.held
+            if held is not None:
+                count["held"] += 1
+                try:
+                    await control.go_on(run, GoOnRequest(as_text(held.at)), BEN)
+                    count["went on"] += 1
+                except Refused:
+                    await anyio.sleep(1)
+            await anyio.sleep(0.1)
+        pressed = time.monotonic()
+        if run in control.open:
+            await control.stop(run, BEN)
+        with anyio.move_on_after(60):
+            while run in control.open:  # noqa: ASYNC110
+                await anyio.sleep(0.02)
+        if run in control.open:
+            failed.append(f"{run} cannot be stopped: {control.open[run].run}")
+            return
+        proven.append(time.monotonic() - pressed)
+        await anyio.sleep(0.5)
+        told = journal.told(run)
+        for each in told:
+            if isinstance(each, PieceBegan):
+                left = sum(isinstance(one, Published) for one in journal.told(each.piece))
+                count["pieces"] += left
+                if left > 1:
+                    failed.append(f"{each.piece} left {left} times")
+            if isinstance(each, PieceEnded) and each.outcome != "on_stopped":
+                count["outcomes"] += 1
+                if each.outcome != ("on_false" if each.node == "OxWork_2" else "on_true"):
+                    failed.append(f"{each.node} ended {each.outcome}")
+        count[f"ended {journal.history(run).state}"] += 1
+
+    async def main() -> None:
+        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": "30"})
+        assert not isinstance(reach, str), reach
+        robots, journal = Robots(reach=reach), MemoryJournal()
+        try:
+            async with ExecutionService.opened(
+                journal, robots, clock_us=clock_us, run_in_worker=at_once
+            ) as control:
+                for name, domain in names.items():
+                    await control.register(Registration(name=name, domain=domain, led=True), ANN)
+                until = time.monotonic() + SECONDS
+                while time.monotonic() < until:
+                    try:
+                        await lead(control, journal, until)
+                    except Refused as refused:
+                        count["start refused"] += 1
+                        last.append(refused.detail)
+                        await anyio.sleep(1)
+        finally:
+            with anyio.CancelScope(shield=True):
+                await reach.aclose()
+
+    last: list[str] = []
+    with ExitStack() as opened:
+        for name, domain in names.items():
+            enters = ("nsenter", "--target", ROBOTS, "--net")
+            process = RobotProcess(
+                domain, tmp_path, SCRIPT, "--quirk", "loss=0", name=name, wrapper=enters
+            )
+            opened.callback(process.end)
+        anyio.run(main)
+    proven.sort()
+    sys.stdout.write(f"\n{dict(count)} {last[-1:]}\n")
+    assert proven, "no run was led"
+    sys.stdout.write(f"Stop proven: n={len(proven)} median={proven[len(proven) // 2]:.2f} s ")
+    sys.stdout.write(f"max={proven[-1]:.2f} s\n")
+    assert failed == []
