@@ -139,10 +139,13 @@ soak: setup ## tests that take longer than CI may, by the thousand (ARGS="kills 
 	@test -n "$(ARGS)" || { $(BIN)/pip install --quiet atheris && $(BIN)/python tests/fuzz/soak_umrf.py 300; }
 
 .PHONY: soak-ros
-soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops
+soak-ros: ros ## the same over real rclpy: 200 histories, hundreds of stops, led runs
 	TEST_ROS_HISTORIES=200 TEST_ROS_AT_ONCE=4 TEST_STOP_CLICKS=50 $(BARE) $(ROS)/python -m pytest -q -s \
 		--timeout=0 tests/ros/test_false_confirmations.py tests/ros/test_stop_latency.py
-	TEST_LONG=1 $(BARE) $(ROS)/python -m pytest -q -m long tests/ros
+	TEST_LED_GRAPHS=235 TEST_LED_FAULTS=5 TEST_STOP_CLICKS=100 $(BARE) $(ROS)/python -m pytest -q -s \
+		--timeout=0 tests/ros/test_conducted.py tests/ros/test_led_runner_faults.py \
+		tests/ros/test_led_stop_latency.py
+	TEST_LONG=1 $(BARE) $(ROS)/python -m pytest -q -s -m long tests/ros
 
 .PHONY: containers
 containers: setup ## build the images and drive docker-compose.yml with podman, as root on Debian (ARGS="-k proxy")
