@@ -55,7 +55,7 @@ export interface RunnerApi {
      * @description One action over all these runs. `levels`: the actions around it, outermost first; `name`: its
      *     own; `action`: the name that the engine of its newest run used. Durations: seconds over the
      *     `timed` ended visits, null if not known exactly; `spans`: bounds of all. `unknown`: visits of
-     *     unknown result. `at_least`: there may have been more `visits`, which nobody saw.
+     *     unknown result; `said`: results that persons gave by word, which are in no other count. `at_least`: there may have been more `visits`, which nobody saw.
      */
     ActionStatistics: {
         action: string;
@@ -66,6 +66,9 @@ export interface RunnerApi {
         visits: number;
         at_least: boolean;
         results: {
+            [key: string]: number;
+        };
+        said: {
             [key: string]: number;
         };
         unknown: number;

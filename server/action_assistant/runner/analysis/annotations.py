@@ -5,7 +5,7 @@ of these streams.
 """
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Annotated, Any, ClassVar, Final
 
 import msgspec
@@ -29,9 +29,11 @@ from action_assistant.umrf.model import Graph
 _PREFIX: Final = "about/"
 _WORDS: Final = 20_000  # characters of a run that are searched
 #: Raise it when the sum of a run changes: older sums are made again then.
-FIGURES: Final = 6
+FIGURES: Final = 7
 #: Key beside the results of an action in the table: its number of visits is a lower bound.
 AT_LEAST: Final = "at_least"
+#: Key beside them: the results that persons gave by word, which nothing showed.
+SAID: Final = "said"
 _TOOK: Final = 100  # durations kept per action and run
 
 Label = Annotated[str, msgspec.Meta(min_length=1, max_length=60, pattern=r"^\S(.*\S)?$")]
@@ -57,14 +59,15 @@ class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
 
 class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The sum of one action of a run that is over. `visits`: how often it ran, with `at_least`
-    perhaps more often. `results`: the number of visits by known result; `inferred`: visits that
-    nobody saw; `spans`: durations of ended visits, at most the newest hundred. `took`: lower
+    perhaps more often. `results`: the number of visits by known result, without those whose result a
+    person gave by word, which are in `said`; `inferred`: visits that nobody saw; `spans`: durations of ended visits, at most the newest hundred. `took`: lower
     bounds in microseconds, from older versions."""
 
     aid: str | None = None
     visits: int = 0
     at_least: bool = False
     results: dict[str, int] = {}
+    said: dict[str, int] = {}
     inferred: int = 0
     took: tuple[int, ...] = ()
     spans: tuple[DurationBounds, ...] = ()
@@ -142,21 +145,27 @@ def sum_of(run: Run, graph: Graph | None, at: int, said: Iterable[str] = ()) -> 
     )
     searched = "\n".join(dict.fromkeys(text for text in texts if text))[:_WORDS]
     counts = visit_counts(run)
-    actions = {name: _sum(each, counts[name]) for name, each in run.actions.items()}
+    actions = {
+        name: _sum(each, counts[name], {word.visit for word in run.said.get(name, ())})
+        for name, each in run.actions.items()
+    }
     return SummedUp(at, actions, searched, cause, of_run(run), FIGURES)
 
 
-def _sum(action: ActionRun, count: VisitCount) -> ActionSum:
+def _sum(action: ActionRun, count: VisitCount, by_word: Set[int]) -> ActionSum:
     results: dict[str, int] = {}
-    for visit in action.visits:
+    said: dict[str, int] = {}
+    for number, visit in enumerate(action.visits, action.older + 1):
         if visit.result is not None:
-            results[visit.result] = results.get(visit.result, 0) + 1
+            known = said if number in by_word else results
+            known[visit.result] = known.get(visit.result, 0) + 1
     spans = [took for visit in action.visits if (took := of_visit(visit)) is not None]
     return ActionSum(
         aid=action.aid,
         visits=count.least,
         at_least=count.at_least,
         results=results,
+        said=said,
         inferred=sum(visit.how == "inferred" for visit in action.visits) + count.least - count.seen,
         spans=tuple(spans[-_TOOK:]),
     )
@@ -197,7 +206,9 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
             "action": name,
             "aid": each.aid,
             "visits": each.visits,
-            "results": each.results | ({AT_LEAST: 1} if each.at_least else {}),
+            "results": each.results
+            | ({AT_LEAST: 1} if each.at_least else {})
+            | ({SAID: each.said} if each.said else {}),
             "inferred": each.inferred,
             "took": [[each.least, each.most] for each in _spans(each)],
         }

@@ -528,6 +528,8 @@ def _outcome_text(shown: views.VisitShown | None, run: Run) -> str:
     if shown.until is None:
         goes = "still going on" if run.end is None else "no end seen"
         return f"{goes} {where}"
+    if shown.said is not msgspec.UNSET and shown.result is not None:
+        return f"{shown.result} {where}, by the word of {shown.said.by.name}"
     match shown.result:
         case None:
             return f"ended with an unknown result {where}"

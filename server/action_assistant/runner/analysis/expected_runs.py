@@ -120,9 +120,13 @@ def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
             continue
         if action.older:
             doubts.append(Doubt(name, f"Its first {action.older} visits are not kept singly."))
-        said = iter(_spread(action))
+        messages = iter(_spread(action))
         behaviours[name] = [
-            _behaviour(name, visit, next(said, ""), doubts) for visit in action.visits
+            _behaviour(name, visit, next(messages, ""), doubts) for visit in action.visits
+        ]
+        doubts += [
+            Doubt(name, f"Its result is the word of {each.by.name}; nothing showed it.")
+            for each in run.said.get(name, ())
         ]
     if fault is not None:
         name, how = fault

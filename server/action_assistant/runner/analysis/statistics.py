@@ -7,7 +7,7 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Row, Select, select, union_all
 
-from action_assistant.runner.analysis.annotations import AT_LEAST
+from action_assistant.runner.analysis.annotations import AT_LEAST, SAID
 from action_assistant.runner.analysis.levels import LevelPlace, places
 from action_assistant.runner.runs.durations import DurationBounds, at_rank, duration_bounds
 from action_assistant.runner.runs.queries import on_engine
@@ -43,7 +43,7 @@ class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
     """One action over all these runs. `levels`: the actions around it, outermost first; `name`: its
     own; `action`: the name that the engine of its newest run used. Durations: seconds over the
     `timed` ended visits, null if not known exactly; `spans`: bounds of all. `unknown`: visits of
-    unknown result. `at_least`: there may have been more `visits`, which nobody saw."""
+    unknown result; `said`: results that persons gave by word, which are in no other count. `at_least`: there may have been more `visits`, which nobody saw."""
 
     action: str
     levels: tuple[str, ...]
@@ -53,6 +53,7 @@ class ActionStatistics(msgspec.Struct, frozen=True, kw_only=True):
     visits: int
     at_least: bool = False
     results: dict[str, int]
+    said: dict[str, int] = {}
     unknown: int
     inferred: int
     timed: int
@@ -169,6 +170,11 @@ def _action(place: LevelPlace, rows: Sequence[Row[Any]]) -> ActionStatistics:
         for outcome in _OUTCOMES
         if (total := sum(row.results.get(outcome, 0) for row in rows))
     }
+    said = {
+        outcome: total
+        for outcome in _OUTCOMES
+        if (total := sum(row.results.get(SAID, {}).get(outcome, 0) for row in rows))
+    }
     visits = sum(row.visits for row in rows)
     return ActionStatistics(
         action=rows[0].action,
@@ -179,7 +185,8 @@ def _action(place: LevelPlace, rows: Sequence[Row[Any]]) -> ActionStatistics:
         visits=visits,
         at_least=any(row.results.get(AT_LEAST) for row in rows),
         results=results,
-        unknown=visits - sum(results.values()),
+        said=said,
+        unknown=visits - sum(results.values()) - sum(said.values()),
         inferred=sum(row.inferred for row in rows),
         timed=len(took),
         p50=_exact(spans.p50),
@@ -217,7 +224,9 @@ def _never_taken(
         if parent is None or parent.visits == 0 or arrow.child not in names:
             continue
         outcomes = _outcomes(arrow)
-        if not outcomes or any(parent.results.get(each) for each in outcomes):
+        if not outcomes or any(
+            parent.results.get(each) or parent.said.get(each) for each in outcomes
+        ):
             continue
         if parent.unknown == 0 and not parent.at_least:
             found.append(NeverTaken(parent.action, names[arrow.child], outcomes))

@@ -396,7 +396,7 @@ def _piece_ended(run: Run, event: PieceEnded) -> Run:
         {name: shortened(text) for name, text in event.outputs.items()} or None,
     )
     run = replace(run, actions=run.actions | {event.node: action})
-    if event.by is not None:
+    if event.by is not None and action.call == event.call and action.visits:
         visit = action.older + len(action.visits)
         word = Said(visit=visit, by=event.by, at=event.at, reason=event.reason)
         words = (*run.said.get(event.node, ()), word)[-KEPT:]

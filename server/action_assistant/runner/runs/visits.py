@@ -250,9 +250,13 @@ def after_piece(
     action: ActionRun, call: int, state: str, visit: Visit | None, at: int
 ) -> ActionRun:
     """Return an action of a conducted run after its robot showed another state of the call with this
-    number. `visit`: that call, None as long as nothing of it was seen."""
+    number. `visit`: that call, None as long as nothing of it was seen. A known outcome stays, unless the
+    action is seen to go on."""
     visits, older = action.visits, action.older
     if visit is not None and action.call == call:
+        last = visits[-1]
+        if last.result is not None and visit.result is None and state not in ACTIVE:
+            visit = replace(visit, result=last.result, how=last.how, outputs=last.outputs)
         visits = _and(visits[:-1], visit)
     elif visit is not None:
         visits, older = _kept(visits, older, visit)
@@ -273,13 +277,13 @@ def after_outcome(
     action: ActionRun, call: int, outcome: str, how: How, outputs: dict[str, str] | None = None
 ) -> ActionRun:
     """Return an action of a conducted run after the call with this number has an outcome. `how`: by
-    an answer of its robot, or else; `outputs`: the values that the answer showed, as texts for
+    an answer of its robot, which shows the visit also where it was too short to be seen going, or
+    else; `outputs`: the values that the answer showed, as texts for
     people."""
     if action.call != call or not action.visits:  # nothing of it was ever seen
         return action
-    last = action.visits[-1]
-    known = how if last.how == "observed" else last.how
-    ended = replace(last, result=_OUTCOMES.get(outcome), how=known, outputs=outputs)
+    result = _OUTCOMES.get(outcome)
+    ended = replace(action.visits[-1], result=result, how=how, outputs=outputs)
     return replace(action, visits=_and(action.visits[:-1], ended))
 
 
