@@ -43,7 +43,16 @@ from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.semantics import Behaviour, Call, Engine, GraphRefused, Script
 from action_assistant.umrf.semantics.values import MISSING, slots_of
 from runner.execution.test_conducted_courses import ACCEPTED, LedRobot, drawn, played, with_values
-from runner.harness import ANN, BEN, MemoryJournal, at_once, clock_us, order, run_in_virtual_time
+from runner.harness import (
+    ANN,
+    BEN,
+    MemoryJournal,
+    at_once,
+    clock_us,
+    order,
+    run_in_virtual_time,
+    stand_still,
+)
 from support.doses import examples
 
 ROBOTS = {"A": "Ann", "B": "Bob", "C": "Cy"}
@@ -56,8 +65,9 @@ STEPS = [
 class Story:
     """One conducted run, what happens to it, and what must hold all the while."""
 
-    def __init__(self, seed: int, *, values: bool = False) -> None:
+    def __init__(self, seed: int, *, values: bool = False, stalls: bool = False) -> None:
         self.chance = random.Random(seed)
+        self.stalls = random.Random(f"stalls {seed}") if stalls else None
         self.seed = seed
         self.graph, self.calls = with_values(*drawn(seed), seed) if values else drawn(seed)
         self.counted: dict[str, int] = defaultdict(int)
@@ -165,6 +175,8 @@ class Story:
         match step:
             case "wait":
                 await anyio.sleep(self.chance.choice([0.01, 0.3, 1.0, 4.0]))
+                if self.stalls is not None and self.stalls.random() < 0.4:
+                    stand_still(self.stalls.choice([1.5, 2.5, 3.5, 8.0]))
             case "silent":
                 robot.silent = True
                 await anyio.sleep(self.chance.choice([0.5, 4.0, 12.0]))
@@ -353,13 +365,13 @@ def foreign() -> Graph:
     return Graph(name="theirs", actions=graph.actions[:1], relations=graph.relations[:1])
 
 
-def lived(seed: int, *, values: bool = False) -> str:
-    """Live through one story in virtual time."""
+def lived(seed: int, *, values: bool = False, stalls: bool = False) -> str:
+    """Live through one story in virtual time. `stalls`: the runner's process also stands still."""
     found = ""
 
     async def main() -> None:
         nonlocal found
-        story = Story(seed, values=values)
+        story = Story(seed, values=values, stalls=stalls)
         found = await story.live()
         story.hold()
 
@@ -376,9 +388,9 @@ def test_values_are_those_of_the_code_whatever_happens(seed: int) -> None:
 
 @pytest.mark.timeout(0)
 @settings(max_examples=examples(8), deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(seed=st.integers(0, 2**32))
-def test_a_led_run_stays_safe_whatever_happens(seed: int) -> None:
-    lived(seed)
+@given(seed=st.integers(0, 2**32), stalls=st.booleans())
+def test_a_led_run_stays_safe_whatever_happens(seed: int, stalls: bool) -> None:
+    lived(seed, stalls=stalls)
 
 
 def test_a_clock_that_is_set_back_between_two_runners_leaves_the_run_stoppable() -> None:
