@@ -90,6 +90,7 @@ from action_assistant.umrf.semantics import Returned
 
 log: Final = logging.getLogger(__name__)
 
+_STORED_S: Final = 5.0  # for which a piece waits for the journal; later it needs a person
 _MOST_ENGINES: Final = 3  # that are begun for one run after the first
 _UNSET_S: Final = 1.0  # a piece whose action has ended and whose graph goes on lacks an output
 _FOREIGN: Final = frozenset(
@@ -421,10 +422,15 @@ class Conductor:
         """Send the piece of a step once the gate is open and its robot may begin it; do what the
         starter has chosen if it may not."""
         await self._gate.wait()
-        await self._run.stored()  # nothing begins while its causes are not in the journal
-        for recorder in tuple(self._unstored):
-            await recorder.flushed()
-            self._unstored.discard(recorder)
+        try:  # nothing begins while its causes are not in the journal
+            with anyio.fail_after(_STORED_S):
+                await self._run.stored()
+                for recorder in tuple(self._unstored):
+                    await recorder.flushed()
+                    self._unstored.discard(recorder)
+        except TimeoutError:
+            self._trouble(step, "unstored", f"Nothing could be stored for {_STORED_S:.0f} s.")
+            return
         robot = self._robots.reachable(step.engine)
         try:
             cleared = await self._look.before_piece(robot, self._first)
