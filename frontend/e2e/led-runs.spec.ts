@@ -65,6 +65,32 @@ test("a robot is led only after somebody has switched that on", async () => {
   await expect(david.getByText("Led step by step")).toBeVisible();
 });
 
+test("a robot that cannot show what it gives is refused, and the package for that is offered", async () => {
+  const drive = { name: "Drive", instance_id: 0 };
+  const look = { name: "Look", instance_id: 0 };
+  const place = { place: { pvf_type: "string" } };
+  const driving = { ...drive, type: "sync", actor: "Carrier", output_parameters: place };
+  const looking = { ...look, type: "sync", actor: "Scout", input_parameters: place };
+  const actions = [
+    { ...driving, parents: [], children: [look] },
+    { ...looking, parents: [drive], children: [] },
+  ];
+  const file = { graph_name: "drive_there", graph_entry: [drive], graph_exit: [look], actions };
+  const { id } = await post<{ id: string }>("/api/graphs", file, product.url);
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${id}`);
+  await saved(page);
+  await page.getByRole("button", { name: "Choose where to start" }).click();
+  await dialog(page).getByRole("combobox", { name: "Robot for Carrier" }).selectOption("Carol");
+  await dialog(page).getByRole("combobox", { name: "Robot for Scout" }).selectOption("David");
+  const looked = dialog(page).getByRole("list", { name: /Looked at on .*Carol/ });
+  await expect(looked).toContainText("Drive_0 hands “place” to Look_0", { timeout: 15_000 });
+  const loads = page.waitForEvent("download");
+  await looked.getByRole("link", { name: "The package zz_keep_values" }).click();
+  expect((await loads).suggestedFilename()).toBe("zz_keep_values.zip");
+  await page.keyboard.press("Escape");
+});
+
 test("a led run passes from one robot to the other, and Stop ends it", async () => {
   const { page } = ada;
   await page.goto(`${product.url}/graphs/${graph}`);

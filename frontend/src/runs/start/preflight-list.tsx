@@ -89,13 +89,15 @@ function Line({ item, look, moment }: PreflightLineProps) {
         )}
         <InsideRemedies item={item} look={look} {...moment} />
         {item.code === "values" && item.verdict === "blocked" && (
-          <a
-            className={style.remedy}
-            href={serverPath(VALUES_PACKAGE)}
-            download="zz_keep_values.zip"
-          >
-            <IconDownload size={14} aria-hidden /> The package zz_keep_values (ZIP)
-          </a>
+          <span className={style.remedies}>
+            <a
+              className={style.remedy}
+              href={serverPath(VALUES_PACKAGE)}
+              download="zz_keep_values.zip"
+            >
+              <IconDownload size={14} aria-hidden /> The package zz_keep_values (ZIP)
+            </a>
+          </span>
         )}
       </span>
     </li>
