@@ -56,10 +56,19 @@ class Line(NamedTuple):
 
 
 class Engines:
-    """Real engines by robot, each on a domain of its own, and what the code of their actions did."""
+    """Real engines by robot, each on a domain of its own, and what the code of their actions did.
+    `rate`: their options about indexing."""
 
-    def __init__(self, folder: Path, domain: int, count: int = 2) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        domain: int,
+        count: int = 2,
+        *,
+        rate: tuple[str, ...] = ("--indexing-rate", "0"),
+    ) -> None:
         self.folder = folder
+        self.rate = rate
         self.domain = domain
         self.names = {name: domain + n for n, name in enumerate([*PLAYERS.values()][:count])}
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
@@ -77,7 +86,7 @@ class Engines:
     def start(self, name: str) -> None:
         """Start the engine of a robot."""
         command = [sys.executable, str(PROGRAM), name, str(self.names[name])]
-        command += ["--indexing-rate", "0", "--truth", str(self.folder / f"truth-{name}")]
+        command += [*self.rate, "--truth", str(self.folder / f"truth-{name}")]
         with (self.folder / f"engine-{name}.log").open("a") as log:
             self.processes[name] = subprocess.Popen(command, stdout=log, stderr=log)
 

@@ -24,8 +24,9 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
+from action_assistant.errors import Refused
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.runs.events import PieceEnded
+from action_assistant.runner.runs.events import Override, PieceEnded
 from action_assistant.umrf.model import Parameter, Relation
 from ros.led_engines import ALWAYS, Engines, as_led, over, relay
 from runner.harness import ANN, BEN, MemoryJournal
@@ -183,3 +184,24 @@ def test_no_code_runs_after_a_stop_was_proven(tmp_path: Path) -> None:
     took.sort()
     sys.stdout.write(f"\nproven after: median {took[len(took) // 2]:.2f} s, max {took[-1]:.2f} s\n")
     assert late == []
+
+
+@pytest.mark.parametrize("rate", [(), ("--indexing-rate", "1")])
+def test_an_engine_that_indexes_while_it_runs_is_not_led(
+    tmp_path: Path, rate: tuple[str, ...]
+) -> None:
+    engines = Engines(tmp_path, DOMAIN, rate=rate)
+
+    async def main() -> None:
+        async with engines.led() as (control, _):
+            request = as_led(
+                relay("refused", [(0.1, "on_true"), (0.1, "on_true")]),
+                override=Override(("indexing",), "I say that it does not."),
+            )
+            with pytest.raises(Refused) as why:
+                await control.start(request, ANN)
+            assert "The engine of Ann indexes again and again" in why.value.detail
+            assert "The engine of Bob indexes again and again" in why.value.detail
+
+    anyio.run(main)
+    assert engines.lines() == []
