@@ -52,10 +52,10 @@ def check(
     """
     subject = Subject(graph, facts)
     check_structure(subject)
-    check_flow(subject, set(graphs or ()) - set(library or ()))
+    flow = check_flow(subject, set(graphs or ()) - set(library or ()))
     check_values(subject, library, graphs or {})
     inside = check_subgraphs(subject, graphs or {}, library or {}, resolution)
-    check_actors(subject, inside)
+    check_actors(subject, inside, flow)
     check_scenarios(subject)
     return sorted(subject.problems, key=rank)
 

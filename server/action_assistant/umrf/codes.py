@@ -168,8 +168,10 @@ CODES: Final[dict[str, Code]] = {
     "values-across-robots": Code("hazard", _WARNING, "an arrow that hands an output to an action of another actor", "a runner that leads the robots can hand values on only with the package `zz_keep_values`"),
     "two-at-once": Code("hazard", _WARNING, "two actions of one actor that may run at the same time", "on a robot that is led, a Stop reaches the second one up to 5 s later"),
     "loaded-anew": Code("hazard", _WARNING, "an action that may run more than once", "on a robot that is led, it is loaded anew each time and forgets what it remembers"),
-    "spontaneous-across": Code("hazard", _WARNING, "a spontaneous action that leads to an action of another actor", "a runner that leads the robots cannot stop what comes after it at each of its ends"),
-    "stop-across": Code("hazard", _WARNING, "an arrow that stops an action of another actor", "the stop is a message of the runner that leads the robots, and does not come without it"),
+    "spontaneous-across": Code("hazard", _WARNING, "a spontaneous action in a graph of several actors", "a led start refuses the graph: a runner cannot stop what comes after the action at each of its ends"),
+    "pause-across": Code("hazard", _WARNING, "an arrow that pauses an action, in a graph of several actors", "a led start refuses the graph"),
+    "values-across": Code("hazard", _WARNING, "an arrow that hands an output to an action of the same actor, in a graph of several", "a robot that is led needs the package `zz_keep_values`"),
+    "stop-across": Code("hazard", _WARNING, "an arrow that stops an action, in a graph of several actors", "the stop is a message of the runner that leads the robots, and does not come without it"),
     "subgraph-across": Code("hazard", _WARNING, "a sub-graph whose actions several actors perform", "a runner that leads the robots sends a sub-graph to one robot and refuses this one; one graph without graphs inside can be led"),
     # The rest
     "instance-id-cut": Code("other", _WARNING, "a number with decimals", "the engine cuts them"),
@@ -213,9 +215,9 @@ REFUSED_ALONE: Final = frozenset({"actors"})
 
 #: The order of possible hazards: the engine dies or blocks, the graph cannot be stopped, it never ends.
 _WORST: Final = ("H4", "H5", "H12", "H8", "H14")
-#: Warnings that apply to nearly every graph, since they come with the engine's own defaults. They are reported once, after
-#: all others, and not counted, so that people read the other warnings.
-QUIET: Final = frozenset({"H3"})
+#: Warnings that apply to nearly every graph, since they come with the engine's own defaults or with values. They are
+#: reported once, after all others, and not counted, so that people read the other warnings.
+QUIET: Final = frozenset({"H3", "values-across"})
 
 
 def rank(problem: Problem) -> tuple[Severity, int]:

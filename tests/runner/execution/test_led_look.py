@@ -15,8 +15,9 @@ from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest, GroupRequest, WordRequest
 from action_assistant.runner.start.preflight import Item
+from action_assistant.umrf.model import Conditions
 from runner.execution.test_conductor import Lab, led, refused, shared
-from runner.harness import ANN, BEN, ended, engine, sequence, until, virtual
+from runner.harness import ANN, BEN, ended, engine, order, sequence, two_ends, until, virtual
 
 #: A rule of a later version, which is broken.
 CLOSED = Item(code="later", verdict="blocked", text="The baton of this robot is elsewhere.")
@@ -192,3 +193,66 @@ def led_alone(robot: str) -> Any:
     """A start of a graph that one robot is handed over."""
     request = led(sequence("alone", 1))
     return msgspec.structs.replace(request, engine=robot, robots={})
+
+
+@virtual
+async def test_two_actors_on_one_robot_are_two_at_once_and_two_on_two_robots_are_not() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    graph = shared(two_ends("task"), "Scout", "Carrier")
+    ends = Override(("H12",), "I look.")
+
+    def cast(**robots: str) -> Any:
+        return order(graph, engine="conducted", robots=robots, override=ends)
+
+    async with lab.runner() as control:
+        why = await refused(control, cast(Scout="David", Carrier="David"))
+        assert "Work_0 may run at the same time as Work_1, both on David." in why
+        for robots in ({"Scout": "David", "Carrier": "Carol"}, {"Scout": "David"}):
+            run = (await control.start(cast(**{"Carrier": "simulator"} | robots), ANN)).run.id
+            assert await ended(control, run) == "finished"
+        run = (await control.start(cast(Scout="simulator", Carrier="simulator"), ANN)).run.id
+        assert await ended(control, run) == "finished"
+
+
+@virtual
+async def test_a_stop_arrow_within_one_robot_has_to_be_accepted_too() -> None:
+    lab = Lab({"*": [{"after_s": 1}]})
+    stop = Conditions(on_true="stop", on_false="stop", on_error="stop")
+    line = shared(sequence("task", 2), "Scout")
+    one, two = (each.key for each in line.actions)
+    relations = tuple(
+        msgspec.structs.replace(each, conditions=stop)
+        if (each.parent, each.child) == (one, two)
+        else each
+        for each in line.relations
+    )
+    async with lab.runner() as control:
+        request = order(
+            msgspec.structs.replace(line, relations=relations),
+            engine="conducted",
+            robots={"Scout": "David"},
+        )
+        assert "Work_0 on David stops Work_1 on David" in await refused(control, request)
+
+
+@virtual
+async def test_the_look_before_a_start_says_which_robots_move() -> None:
+    lab = Lab()
+    graph = shared(sequence("task", 3), "Scout", "Carrier")
+    async with lab.runner() as control:
+        for robots, words in (
+            (
+                ("David", "simulator"),
+                "David (2 actions) may begin to move at any time until the run ends. The "
+                "simulator plays 1 other action and moves nothing.",
+            ),
+            (("David", "Carol"), "Carol (1 action), David (2 actions) may begin to move"),
+            (("simulator", "simulator"), "Only the simulator plays: nothing moves."),
+        ):
+            cast = dict(zip(("Scout", "Carrier"), robots, strict=True))
+            request = order(graph, engine="conducted", robots=cast)
+            same = ("umrf", "version", "digest", "robots", "graph")
+            fields = {each: getattr(request, each) for each in same}
+            first = (await control.look(GroupRequest(**fields, engines=("conducted",))))[0]
+            (item,) = (each for each in first.items if each.code == "moves")
+            assert words in item.text

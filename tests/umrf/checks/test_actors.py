@@ -10,10 +10,12 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from action_assistant.umrf.check import blocking, check
+from action_assistant.umrf.checks.actors import led_problems
 from action_assistant.umrf.courses.expected import check_expected
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
 from action_assistant.umrf.model import Conditions, Graph, Problem
+from action_assistant.umrf.problem_kinds import kind_of
 from action_assistant.umrf.semantics import Behaviour, Script, simulate
 from action_assistant.umrf.semantics.steps import steps_of
 from support.doses import examples
@@ -24,7 +26,7 @@ from umrf.semantics.traces import graph_of, optional
 
 KINDS = {
     "actors", "synchroniser", "values-across-robots", "two-at-once", "loaded-anew",
-    "spontaneous-across", "stop-across", "subgraph-across",
+    "spontaneous-across", "stop-across", "subgraph-across", "pause-across", "values-across",
 }  # fmt: skip
 TEXT = leaf("string")
 STOPS = Conditions("stop", "stop", "ignore", "ignore")
@@ -158,6 +160,65 @@ def test_a_spontaneous_action_that_leads_to_another_actor_is_named() -> None:
     assert told(alone) == []
 
 
+def test_what_a_led_start_would_refuse_or_needs_is_said_and_forbids_no_other_start() -> None:
+    """In a graph of several actors, also within one of them; a graph of one is handed over."""
+    pause = Conditions("run", "pause", "ignore", "ignore")
+    graph = graph_of("entry>A", "A>B", "B>C", "C>exit", AB=pause)
+    graph = with_values(
+        graph, A=({}, {"p": TEXT}), B=({"p": TEXT}, {"q": TEXT}), C=({"q": TEXT}, {})
+    )
+    graph = changed(graph, "C", type="spontaneous")
+    shared = graph_of("D>exit", "entry>D").actions[0]
+    shared = replace(shared, actor="Scout")
+    for each in (graph, owned(graph, A="Carrier", B="Carrier", C="Carrier")):
+        assert told(each) == []
+        several = replace(each, actions=(*each.actions, shared))
+        if each is graph:  # beside one that is named, actions without an actor are no second one
+            assert told(several) == []
+            continue
+        assert told(several) == [
+            ("actors", ""),
+            ("loaded-anew", "C"),
+            ("pause-across", "A>B"),
+            ("spontaneous-across", "C"),
+            ("values-across", "A>B"),
+        ]
+        problems = check(several)
+        assert {p.code for p in blocking(problems)} & KINDS == {"actors"}
+        (pauses,) = (p for p in problems if p.code == "pause-across")
+        assert pauses.message.startswith("A_0 pauses B_0.")
+        (alone,) = (p for p in problems if p.code == "spontaneous-across")
+        assert "C_0 of Carrier is spontaneous: it begins again by itself" in alone.message
+        (values,) = (p for p in problems if p.code == "values-across")
+        assert "A_0 hands p to B_0" in values.message
+        assert "1 more arrow of this kind" in values.message
+        assert [place.relation for place in values.also] == ["B>C"]
+        assert kind_of(values) == "note"
+
+
+def test_led_robots_are_named_and_two_actors_on_one_of_them_are_one() -> None:
+    fork = graph_of("entry>A", "entry>B", "A>C", "B>D", "C>exit", "D>exit", CD=STOPS)
+    found = led_problems(owned(fork, A="David", B="David", C="Carol", D="Carol"), PINNED)
+    texts = {p.message for p in found if p.code == "two-at-once"}
+    assert any(
+        "A_0 may run at the same time as B_0" in each and "on David" in each for each in texts
+    )
+    stop = graph_of("entry>A", "A>B", "A>exit", AB=STOPS)
+    for actors, words in (
+        ({"A": "David", "B": "David"}, "A_0 on David stops B_0 on David"),
+        ({"A": "", "B": "David"}, "A_0 in the simulator stops B_0 on David"),
+    ):
+        (problem,) = (
+            p for p in led_problems(owned(stop, **actors), PINNED) if p.code == "stop-across"
+        )
+        assert words in problem.message
+    loop = led_problems(owned(LOOP, A="Carol", B=""), PINNED)
+    assert [p.code for p in loop] == ["loaded-anew"]
+    assert "On Carol it is loaded anew" in loop[0].message
+    assert led_problems(owned(fork, A="", B="", C="", D=""), PINNED) == []
+    assert led_problems(owned(stop, A="David", B=""), PINNED) == []
+
+
 def test_an_action_that_never_runs_is_told_nothing_of() -> None:
     graph = graph_of("entry>A", "A>exit", "B>C", "C>B", "B>A", BA=STOPS)
     graph = owned(optional(graph, "B>A"), A="Carrier", B="Scout", C="Scout")
@@ -192,7 +253,8 @@ def test_an_arrow_to_a_sub_graph_leads_to_the_actor_of_its_first_action() -> Non
     outer = with_values(outer, A=({}, {"p": TEXT}), S=({"p": TEXT}, {}))
     sub = with_values(inner("entry>X", "X>Y", "Y>exit"), X=({"p": TEXT}, {}))
     sub = owned(sub, X="Carrier", Y="Scout")
-    assert told(owned(outer, A="Carrier"), sub) == [("actors", ""), ("subgraph-across", "S")]
+    found = told(owned(outer, A="Carrier"), sub)
+    assert found == [("actors", ""), ("subgraph-across", "S"), ("values-across", "A>S")]
     found = told(owned(outer, A="Scout"), sub)
     assert found == [("actors", ""), ("subgraph-across", "S"), ("values-across-robots", "A>S")]
 
@@ -329,5 +391,5 @@ def test_a_graph_of_many_spontaneous_actions_is_looked_at_for_a_moment_only() ->
     kinds = (replace(a, type="spontaneous", actor=f"R{n % 3}") for n, a in enumerate(graph.actions))
     found = check(replace(graph, actions=tuple(kinds)))
     across = [p for p in found if p.code == "spontaneous-across"]
-    assert len(across) == 299
+    assert len(across) == 300
     assert max(len(problem.also) for problem in found if problem.code in KINDS) == 20

@@ -143,6 +143,12 @@ def test_starting_on_a_robot_takes_an_operator(product: Product) -> None:
             simulated = {**start, "engine": "simulator"}
             answer = client.post("/api/runs", json=simulated, headers=browser(product, role))
             assert (answer.status_code == 403) is not allowed(role, "simulate")
+            needs: dict[str, Permission] = {"simulator": "simulate", "rover": "operate"}
+            for carrier, needed in needs.items():
+                robots = {"Scout": "simulator", "Carrier": carrier}
+                led = {**start, "engine": "conducted", "robots": robots}
+                answer = client.post("/api/runs", json=led, headers=browser(product, role))
+                assert (answer.status_code == 403) is not allowed(role, needed)
 
 
 @pytest.mark.parametrize("role", ROLES)

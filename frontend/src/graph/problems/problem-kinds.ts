@@ -60,7 +60,7 @@ const MISTAKES: ReadonlySet<string> = new Set([
 ]);
 
 /** Warnings about the engine's own defaults: shown once and not counted, so that other warnings are read. */
-const QUIET: ReadonlySet<string> = new Set(["H3"]);
+const QUIET: ReadonlySet<string> = new Set(["H3", "values-across"]);
 
 /** An input to which the check asks for a value: its path; null for any other problem. */
 export function inputOf({ code, where }: CheckedProblem): string | null {

@@ -34,7 +34,7 @@ from action_assistant.runner.api.live import (
 from action_assistant.runner.api.review import json_of
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import ModifyRequest, RestRequest
-from action_assistant.runner.links.port import SIMULATOR
+from action_assistant.runner.execution.start_checks import engines_of
 from action_assistant.runner.review.stored_runs import HistoryEvent, StoredRuns
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import Author
@@ -93,7 +93,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def start(request: _Asking) -> Response[views.RunShown]:
         async with body_of(request, services.body_limit) as body:
             start_request = read_request(body)
-            if start_request.engine != SIMULATOR:
+            if engines_of(start_request):
                 require(request, "operate")
             started = await services.control.start(start_request, author_of(request))
         return Response(

@@ -17,8 +17,8 @@ from action_assistant.runner.links.port import Answer, NoAnswer, NotSent
 from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author, Requested
-from action_assistant.runner.start.indexing import IndexingWords, indexing_item
-from action_assistant.runner.start.preflight import Item, is_blocking, led_item
+from action_assistant.runner.start.led_items import IndexingWords, indexing_item, led_item
+from action_assistant.runner.start.preflight import Item, is_blocking
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 
 _GET_S: Final = 2.0  # within which a robot has to answer before a piece leaves

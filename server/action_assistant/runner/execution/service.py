@@ -45,7 +45,7 @@ from action_assistant.runner.start.admission import (
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import StopOrder
-from action_assistant.runner.start.indexing import IndexingWords
+from action_assistant.runner.start.led_items import IndexingWords
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.umrf.files.codec import Unreadable

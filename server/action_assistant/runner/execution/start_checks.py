@@ -37,7 +37,7 @@ from action_assistant.runner.start.admission import (
     prepared_pieces,
 )
 from action_assistant.runner.start.approvals import Approvals
-from action_assistant.runner.start.indexing import CODE as INDEXING
+from action_assistant.runner.start.led_items import INDEXING, led_item, led_items
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.check import forbids_start
@@ -180,7 +180,7 @@ class StartChecks:
         Raise Conflict, with the reasons of all robots, if a stage refuses it."""
         _require_plain(request)
         ready = await self._run_in_worker(prepared_pieces, request, CONDUCTED_FACTS, random_id())
-        items = preflight.led_items(ready)
+        items = led_items(ready)
         overridden = request.override.codes if request.override else ()
         preflight.require_clear(items, overridden)
         parts = [
@@ -388,7 +388,7 @@ class StartChecks:
             item = preflight.refusal_item(_code_of(refused), refused)
             return [preflight.with_verdict(CONDUCTED, [item])]
         whole = ready.whole
-        items = [preflight.graph_item(whole), *preflight.led_items(ready)]
+        items = [preflight.graph_item(whole), *led_items(ready)]
         found = [preflight.with_verdict(CONDUCTED, items, whole.digest, whole.tree_digest)]
         for name in engines_of(request):
             try:
@@ -491,7 +491,7 @@ def _require_plain(request: StartRequest) -> None:
 
 def require_led(robot: KnownEngine) -> None:
     """Raise Conflict unless the owner of a robot allows runs that the runner leads step by step."""
-    item = preflight.led_item(robot.registration)
+    item = led_item(robot.registration)
     if item.verdict == "blocked":
         raise Conflict(item.text, where={"path": "/robots", "item": item.code})
 

@@ -337,9 +337,8 @@ def prepared_pieces(
     _check_robots(request.robots, performers(graph, inside))
     hindering = (*subgraph_obstacles(graph, inside, request.robots), *obstacles(graph))
     if hindering:
-        more = f" (and {len(hindering) - 1} more)" if len(hindering) > 1 else ""
         raise Conflict(
-            f"{hindering[0].text}{more}",
+            _in_words(hindering),
             where={"path": "/umrf", "obstacles": msgspec.to_builtins(hindering[:_MOST_SHOWN])},
         )
     played = players(graph, inside, request.robots)
@@ -382,6 +381,17 @@ def _part_of(
     )
 
 
+def _in_words(hindering: Sequence[Obstacle]) -> str:
+    """Return the first obstacle of each kind, with how many more there are of that kind."""
+    by_code: dict[str, list[Obstacle]] = {}
+    for each in hindering:
+        by_code.setdefault(each.code, []).append(each)
+    return " ".join(
+        f"{alike[0].text}{f' (and {len(alike) - 1} more)' if len(alike) > 1 else ''}"
+        for alike in by_code.values()
+    )
+
+
 def _check_robots(robots: Mapping[str, str], actors: Collection[str]) -> None:
     """Raise BadInput unless exactly the actors of the graph have a robot."""
     for actor in sorted(actors):
@@ -395,10 +405,12 @@ def _check_robots(robots: Mapping[str, str], actors: Collection[str]) -> None:
 
 
 def _placed_on(graph: Graph, played: Mapping[str, str]) -> Graph:
-    """Return the graph with the robot of each action as its actor. `played`: the robots by full
-    name; two actors on one robot become one, and a sub-graph has one."""
+    """Return the graph with the robot of each action as its actor, "" for the simulator, which moves
+    nothing. `played`: the robots by full name; two actors on one robot become one, and a sub-graph
+    has one."""
+    robots = {name: robot if robot != SIMULATOR else "" for name, robot in played.items()}
     placed = tuple(
-        msgspec.structs.replace(each, actor=played.get(each.full_name, each.actor))
+        msgspec.structs.replace(each, actor=robots.get(each.full_name, each.actor))
         for each in graph.actions
     )
     return msgspec.structs.replace(graph, actions=placed)

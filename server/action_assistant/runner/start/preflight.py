@@ -27,11 +27,11 @@ from action_assistant.runner.index_folders.comparison import (
 )
 from action_assistant.runner.index_folders.scan import IndexedFiles, scanned, shown_path
 from action_assistant.runner.links.observations import Snapshot, failed_in
-from action_assistant.runner.links.port import Answer, Registration, Standing
+from action_assistant.runner.links.port import Answer, Standing
 from action_assistant.runner.robots.engine import EngineIndex, foreign_graphs
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import graphs_in
-from action_assistant.runner.start.admission import Admitted, Prepared, PreparedPieces
+from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.runner.start.built_libraries import older_libraries
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.check import check, forbids_start, is_final
@@ -50,14 +50,7 @@ _INDEX_CODES: Final = frozenset(
 )
 #: Codes that cannot be overridden: the engine refuses such a graph in any case.
 _NEVER_TAKEN: Final = frozenset({"recursion", "subgraph-twice"})
-#: What leading a graph step by step means: by code of its problems, whether a person has to accept it, and
-#: what the start does then.
-_LED: Final[tuple[tuple[str, Verdict, str], ...]] = (
-    ("two-at-once", "blocked", "Accept that, or let one robot do one thing at a time."),
-    ("stop-across", "blocked", ""),
-    ("loaded-anew", "warned", ""),
-)
-_SHOWN: Final = 20  # problems of one item
+SHOWN: Final = 20  # problems of one item
 _NAMED: Final = 3  # names in one sentence
 
 
@@ -154,14 +147,14 @@ def graph_item(admitted: Admitted | Prepared) -> Item:
     """Return the item of the preflight list for the graph itself: passed, or warned if it has loud
     warnings or problems that were overridden. The graph was admitted, so the item is never a
     refusal."""
-    overridden = tuple(filter(forbids_start, admitted.problems))[:_SHOWN]
-    warned = tuple(each for each in admitted.problems if not forbids_start(each))[:_SHOWN]
+    overridden = tuple(filter(forbids_start, admitted.problems))[:SHOWN]
+    warned = tuple(each for each in admitted.problems if not forbids_start(each))[:SHOWN]
     if overridden:
         text = f"{len(overridden)} certain problems are overridden."
         return Item(code="graph", verdict="warned", text=text, problems=(*overridden, *warned))
     loud = sum(each.code not in QUIET for each in warned)
     if loud:
-        text = f"No certain hazard; {_count(loud, 'possible one')}."
+        text = f"No certain hazard; {counted(loud, 'possible one')}."
         return Item(code="graph", verdict="warned", text=text, problems=warned)
     if warned:
         text = "No hazard is known but that of every bypass on this engine."
@@ -210,37 +203,6 @@ def _is_only_loading(run: Run) -> bool:
     loading."""
     is_known = run.unknown_since is None and not run.lost and not run.unconfirmed
     return bool(run.loading) and is_known and not run.active
-
-
-def led_items(ready: PreparedPieces) -> tuple[Item, ...]:
-    """Return the items about a graph that is led step by step: they warn of what differs from handing
-    it over as a whole."""
-    found: list[Item] = []
-    for code, verdict, text in _LED:
-        problems = tuple(each for each in ready.problems if each.code == code)
-        if problems:
-            more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-            said = (f"{problems[0].message}{more}", text, ready.remedies.get(code, ""))
-            found.append(
-                Item(
-                    code=code,
-                    verdict=verdict,
-                    text=" ".join(filter(None, said)),
-                    codes=(code,) if verdict == "blocked" else (),
-                    overridable=verdict == "blocked",
-                    problems=problems[:_SHOWN],
-                )
-            )
-    return tuple(found)
-
-
-def led_item(robot: Registration) -> Item:
-    """Return the item that says whether the owner of a robot allows runs that the runner leads."""
-    if robot.led:
-        text = f"The owner of {robot.name} allows led runs."
-        return Item(code="led", verdict="passed", text=text)
-    text = f"Led runs are off for {robot.name}: its owner can switch them on in its registration."
-    return Item(code="led", verdict="blocked", text=text)
 
 
 def answer_item(view: EngineView) -> Item:
@@ -344,7 +306,7 @@ def _actions(view: EngineView, graph: Graph) -> Item:
         if each.code in _INDEX_CODES and (each.where.aid is None or each.where.aid in own)
     )
     if not problems:
-        text = f"{view.name} knows all {_count(len(own), 'action')}, with the same parameters."
+        text = f"{view.name} knows all {counted(len(own), 'action')}, with the same parameters."
         return Item(code="actions", verdict="passed", text=text)
     more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
     codes = {each.code for each in problems}
@@ -354,7 +316,7 @@ def _actions(view: EngineView, graph: Graph) -> Item:
         text=f"{view.name} would refuse the graph: {problems[0].message}{more}",
         codes=tuple(sorted(codes)),
         overridable=not codes & _NEVER_TAKEN,
-        problems=problems[:_SHOWN],
+        problems=problems[:SHOWN],
     )
 
 
@@ -472,7 +434,7 @@ def _others(view: EngineView) -> Item:
     others = view.standing.others
     if others == 0:
         return Item(code="others", verdict="passed", text="Nobody else can start something there.")
-    who = _count(others, "other program")
+    who = counted(others, "other program")
     text = f"{who} can publish starts to {view.name}: what runs there may change at any moment."
     return Item(code="others", verdict="blocked", text=text, codes=("others",), overridable=True)
 
@@ -674,15 +636,15 @@ def course_items(found: CheckedCourses) -> tuple[Item, ...]:
     other = [each for each in courses if each.same is False]
     unknown = sum(each.same is None for each in courses)
     if not other and not unknown:
-        text = f"It goes as expected: {_count(len(courses), 'expected course')}."
+        text = f"It goes as expected: {counted(len(courses), 'expected course')}."
         return (Item(code="courses", verdict="passed", text=text),)
     sentences = [f"{each.name}: {each.why}" for each in other[:_NAMED]]
     if len(other) > _NAMED:
         sentences.append(f"{len(other) - _NAMED} more go another way.")
     if unknown:
-        sentences.append(f"{_count(unknown, 'expected course')} could not be looked at in time.")
+        sentences.append(f"{counted(unknown, 'expected course')} could not be looked at in time.")
     if other:
-        total = _count(len(courses), "expected course")
+        total = counted(len(courses), "expected course")
         sentences.insert(0, f"It does not go as expected, in {len(other)} of {total}.")
     return (Item(code="courses", verdict="warned", text=" ".join(sentences)),)
 
@@ -693,5 +655,6 @@ def unknown_courses_item(why: str) -> Item:
     return Item(code="courses", verdict="warned", text=text)
 
 
-def _count(number: int, what: str) -> str:
+def counted(number: int, what: str) -> str:
+    """Return a number with what is counted, in the plural unless it is 1."""
     return f"{number} {what}{'' if number == 1 else 's'}"

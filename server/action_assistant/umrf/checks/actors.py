@@ -11,7 +11,7 @@ from typing import Final, NamedTuple, TypeAlias
 import msgspec
 
 from action_assistant.umrf.checks.concurrency import Concurrency
-from action_assistant.umrf.checks.flow import Reachability
+from action_assistant.umrf.checks.flow import Flow, follow
 from action_assistant.umrf.checks.places import Subject, joined, more
 from action_assistant.umrf.checks.subgraphs import Resolution, SubGraphs, at_action, place_inside
 from action_assistant.umrf.components import Mask, nodes_in, reachable
@@ -38,6 +38,7 @@ _INSIDE: Final = 20
 _DEEPEST: Final = 32
 _NAMED: Final = 3  # names in one sentence
 _ALSO: Final = 20  # further places of one problem
+_ON_LED: Final = "on a robot that is led, "
 
 _Reports: TypeAlias = Mapping[Key, set[Precondition]]
 
@@ -55,12 +56,13 @@ class _Actors(NamedTuple):
 _ByKey: TypeAlias = Mapping[Key, _Actors]
 
 
-def check_actors(subject: Subject, graphs: SubGraphs) -> None:
+def check_actors(subject: Subject, graphs: SubGraphs, flow: Flow | None = None) -> None:
     """Report what a graph with several actors means on robots. A graph has several actors if its
     actions and those of its sub-graphs, at any depth, name more than one.
 
-    `graphs`: the sub-graphs of this graph, which have been checked. Nothing is reported for the
-    simulator, which performs the actions of all actors.
+    `graphs`: the sub-graphs of this graph, which have been checked; `flow`: that of this graph, if it
+    was followed already. Nothing is reported for the simulator, which performs the actions of all
+    actors.
     """
     everywhere = (subject.graph, *(graphs.by_name[name] for name in graphs.found))
     named = {a.actor for graph in everywhere for a in graph.actions if not a.missing} - {""}
@@ -82,46 +84,134 @@ def check_actors(subject: Subject, graphs: SubGraphs) -> None:
         "runner can lead several robots through it, step by step."
     )
     subject.report("actors", "warning", message)
-    _LedGraph(graphs).check(subject, "", 0)
+    _LedGraph(graphs).check(subject, "", 0, flow)
 
 
 def led_problems(graph: Graph, facts: EngineFacts) -> list[Problem]:
-    """Return what leading a graph step by step means, with the robot of each action as its actor. The
-    graph has no sub-graphs; it may have only one robot."""
+    """Return what leading a graph step by step means, with the robot of each action as its actor, ""
+    for the simulator. The graph may have only one robot. What its sub-graphs mean is not returned."""
     subject = Subject(graph, facts)
-    _LedGraph(SubGraphs({}, (), Resolution())).check(subject, "", 0)
+    _LedGraph(SubGraphs({}, (), Resolution()), is_cast=True).check(subject, "", 0)
     return subject.problems
 
 
 class _LedGraph:
-    """Checks a graph and its sub-graphs as a runner would lead them, one action after the other."""
+    """Checks a graph and its sub-graphs as a runner would lead them, one action after the other.
+    `is_cast`: the actors are the robots of a start, "" being the simulator, which moves nothing."""
 
-    def __init__(self, graphs: SubGraphs) -> None:
+    def __init__(self, graphs: SubGraphs, *, is_cast: bool = False) -> None:
         self._graphs = graphs
+        self._is_cast = is_cast
         self._actors: dict[str, _Actors] = {}
         self._found: dict[tuple[str, str], tuple[PlaceInside, ...]] = {}  # by name and actor around
         for name in graphs.found:  # the innermost graphs first
             self._actors[name] = self._of_graph(graphs.by_name[name])
 
-    def check(self, subject: Subject, around: str, depth: int) -> None:
+    def check(self, subject: Subject, around: str, depth: int, flow: Flow | None = None) -> None:
         """Report the problems of one graph. `around`: the actor of the action for which the graph
-        stands; `depth`: the number of graphs around it."""
+        stands; `depth`: the number of graphs around it; `flow`: that of the graph, if it is known."""
         actors_of = {a.key: self._of_action(a, around) for a in subject.real}
-        flow = Reachability(subject)
-        concurrency = Concurrency(subject, flow.runs, flow.reports)
-        for relation in sorted(subject.sound, key=subject.place):
-            is_end = relation.parent == ENTRY or relation.child == EXIT
-            if not is_end and not relation.listing:
-                _check_arrow(subject, relation, actors_of, flow.reports)
-        _check_at_once(subject, actors_of, flow.runs, concurrency)
-        _check_repeated(subject, flow.runs, self._actors)
-        _check_spontaneous(subject, actors_of, flow.runs)
+        reachability, concurrency = flow or follow(subject)
+        reports, runs = reachability.reports, reachability.runs
+        arrows = [
+            relation
+            for relation in sorted(subject.sound, key=subject.place)
+            if relation.parent != ENTRY and relation.child != EXIT and not relation.listing
+        ]
+        for relation in arrows:
+            self._check_stop(subject, relation, actors_of, reports)
+        self._check_at_once(subject, actors_of, runs, concurrency)
+        self._check_repeated(subject, actors_of, runs)
+        if self._is_cast:  # what a start refuses is not among what it asks people about
+            return
+        _check_values(subject, arrows, actors_of, reports)
+        _check_pauses(subject, arrows)
+        _check_spontaneous(subject, actors_of, runs)
         for action in subject.real:
             every = actors_of[action.key].every
             if len(every) > 1 and depth == 0:
                 _report_shared(subject, action, every)
             if len(every) > 1 and depth < _DEEPEST:
                 self._check_inside(subject, action, action.actor or around, depth)
+
+    def _check_stop(
+        self, subject: Subject, relation: Relation, actors_of: _ByKey, reports: _Reports
+    ) -> None:
+        """Report an arrow that stops an action: for a robot that is led it is a message of the
+        runner."""
+        child = actors_of[relation.child]
+        if "stop" not in _answers(relation, reports) or (self._is_cast and child.every == {""}):
+            return
+        one = self._named(subject, relation.parent, actors_of)
+        other = self._named(subject, relation.child, actors_of)
+        message = (
+            f"{one} stops {other}. On robots this is a message of the runner that leads them: without "
+            "the runner or its network it does not come."
+        )
+        subject.report("stop-across", "warning", message, relation=relation, member="/conditions")
+
+    def _named(self, subject: Subject, key: Key, actors_of: _ByKey) -> str:
+        if not self._is_cast:
+            return _with_actor(subject, key, actors_of[key].every)
+        robots = sorted(actors_of[key].every - {""})
+        return (
+            f"{subject.name(key)} {f'on {joined(set(robots))}' if robots else 'in the simulator'}"
+        )
+
+    def _check_at_once(
+        self,
+        subject: Subject,
+        actors_of: _ByKey,
+        runs: Container[Key],
+        concurrency: Concurrency,
+    ) -> None:
+        """Report each action that may run at the same time as later ones of its actor. If too many
+        pairs of actions may run at once to be known, only the first action of each actor is
+        reported."""
+        place = {action.key: number for number, action in enumerate(subject.real)}
+        members: dict[str, list[Key]] = {}
+        for action in subject.real:
+            for actor in sorted(actors_of[action.key].every) if action.key in runs else ():
+                members.setdefault(actor, []).append(action.key)
+        for actor, keys in members.items():
+            if self._is_cast and not actor:
+                continue
+            left = set(keys)
+            for key in keys if concurrency.known else keys[:1]:
+                left.discard(key)
+                beside = sorted(left & concurrency.beside(key), key=place.__getitem__)
+                if not beside:
+                    continue
+                names = joined({subject.name(each) for each in beside[:_NAMED]})
+                whose = f"both of {actor}" if actor else "both without an actor"
+                whose, where = (f"both on {actor}", "") if self._is_cast else (whose, _ON_LED)
+                message = (
+                    f"{subject.name(key)} may run at the same time as {names}, {whose}. An engine stops "
+                    f"one graph after the other: {where}a Stop reaches the second action up to 5 s later."
+                    f"{more(len(beside) - _NAMED, 'action', 'actions')}"
+                )
+                also = [subject.actions[each] for each in beside[:_ALSO]]
+                subject.report(
+                    "two-at-once", "warning", message, action=subject.actions[key], also=also
+                )
+
+    def _check_repeated(self, subject: Subject, actors_of: _ByKey, runs: Container[Key]) -> None:
+        """Report the actions that can run more than once, but no sub-graphs: an engine loads their
+        actions anew in any case."""
+        graph = msgspec.structs.replace(subject.graph, relations=tuple(subject.sound))
+        again = repeated(graph)
+        for action in subject.real:
+            if action.key not in again or action.key not in runs or action.name in self._actors:
+                continue
+            robot = joined(set(actors_of[action.key].every)) if self._is_cast else ""
+            if self._is_cast and not robot:
+                continue
+            where = f"On {robot}" if robot else "On a robot that is led"
+            message = (
+                f"{action.full_name} may run more than once. {where} it is loaded anew each time: what "
+                "it remembers in itself is forgotten."
+            )
+            subject.report("loaded-anew", "warning", message, action=action)
 
     def _check_inside(self, subject: Subject, action: Action, actor: str, depth: int) -> None:
         """Report the problems of a sub-graph of several actors at the action that stands for it."""
@@ -167,31 +257,56 @@ def _report_shared(subject: Subject, action: Action, every: frozenset[str]) -> N
     subject.report("subgraph-across", "warning", message, action=action, member="/name")
 
 
-def _check_arrow(
-    subject: Subject, relation: Relation, actors_of: _ByKey, reports: _Reports
-) -> None:
-    """Report an arrow that stops an action of another actor, or hands values to one."""
-    parent, child = actors_of[relation.parent], actors_of[relation.child]
+def _answers(relation: Relation, reports: _Reports) -> set[str]:
+    """Return the responses that the outcomes of the parent can really cause."""
     reported = reports.get(relation.parent, set())
-    answers = {
-        relation.conditions.answer(outcome) for outcome in PRECONDITIONS if outcome in reported
-    }
-    one = _with_actor(subject, relation.parent, parent.every)
-    other = _with_actor(subject, relation.child, child.every)
-    if "stop" in answers and len(parent.last | child.every) > 1:
+    return {relation.conditions.answer(outcome) for outcome in PRECONDITIONS if outcome in reported}
+
+
+def _check_values(
+    subject: Subject, arrows: Iterable[Relation], actors_of: _ByKey, reports: _Reports
+) -> None:
+    """Report each arrow that hands values to an action of another actor, and once all those that hand
+    them to one of the same actor."""
+    own: list[Relation] = []
+    for relation in arrows:
+        if _answers(relation, reports) <= {"ignore", "bypass"}:
+            continue
+        values = _handed_over(subject, relation)
+        parent, child = actors_of[relation.parent], actors_of[relation.child]
+        if not values:
+            continue
+        if len(parent.last | child.first) < 2:
+            own.append(relation)
+            continue
         message = (
-            f"{one} stops {other}. On robots this is a message of the runner that leads them: without "
-            "the runner or its network it does not come."
-        )
-        subject.report("stop-across", "warning", message, relation=relation, member="/conditions")
-    if answers <= {"ignore", "bypass"} or len(parent.last | child.first) < 2:
-        return
-    if values := _handed_over(subject, relation):
-        message = (
-            f"{one} hands {joined(values)} to {other}. A runner that leads the robots can hand values from "
-            f"one to another only where the first one has the package {KEEPER_PACKAGE}."
+            f"{_with_actor(subject, relation.parent, parent.every)} hands {joined(values)} to "
+            f"{_with_actor(subject, relation.child, child.every)}. A runner that leads the robots can hand "
+            f"values from one to another only where the first one has the package {KEEPER_PACKAGE}."
         )
         subject.report("values-across-robots", "warning", message, relation=relation)
+    if own:
+        first = own[0]
+        message = (
+            f"{subject.name(first.parent)} hands {joined(_handed_over(subject, first))} to "
+            f"{subject.name(first.child)}. A robot that is led can hand values from one action to the "
+            f"next only where it has the package {KEEPER_PACKAGE}."
+            f"{more(len(own) - 1, 'arrow', 'arrows')}"
+        )
+        subject.report("values-across", "warning", message, relation=first, also=own[1:_ALSO])
+
+
+def _check_pauses(subject: Subject, arrows: Iterable[Relation]) -> None:
+    """Report each arrow that pauses an action."""
+    for relation in arrows:
+        if "pause" in map(relation.conditions.answer, PRECONDITIONS):
+            message = (
+                f"{subject.name(relation.parent)} pauses {subject.name(relation.child)}. A robot that is "
+                "led can only begin and stop an action, so a led start of this graph is refused."
+            )
+            subject.report(
+                "pause-across", "warning", message, relation=relation, member="/conditions"
+            )
 
 
 def _handed_over(subject: Subject, relation: Relation) -> set[str]:
@@ -204,54 +319,10 @@ def _handed_over(subject: Subject, relation: Relation) -> set[str]:
         return set()
 
 
-def _check_at_once(
-    subject: Subject, actors_of: _ByKey, runs: Container[Key], concurrency: Concurrency
-) -> None:
-    """Report each action that may run at the same time as later ones of its actor. If too many pairs
-    of actions may run at once to be known, only the first action of each actor is reported."""
-    place = {action.key: number for number, action in enumerate(subject.real)}
-    members: dict[str, list[Key]] = {}
-    for action in subject.real:
-        for actor in sorted(actors_of[action.key].every) if action.key in runs else ():
-            members.setdefault(actor, []).append(action.key)
-    for actor, keys in members.items():
-        left = set(keys)
-        for key in keys if concurrency.known else keys[:1]:
-            left.discard(key)
-            beside = sorted(left & concurrency.beside(key), key=place.__getitem__)
-            if not beside:
-                continue
-            names = joined({subject.name(each) for each in beside[:_NAMED]})
-            whose = f"both of {actor}" if actor else "both without an actor"
-            message = (
-                f"{subject.name(key)} may run at the same time as {names}, {whose}. An engine stops one "
-                "graph after the other: on a robot that is led, a Stop reaches the second action up to "
-                f"5 s later.{more(len(beside) - _NAMED, 'action', 'actions')}"
-            )
-            also = [subject.actions[each] for each in beside[:_ALSO]]
-            subject.report(
-                "two-at-once", "warning", message, action=subject.actions[key], also=also
-            )
-
-
-def _check_repeated(subject: Subject, runs: Container[Key], nested: Container[str]) -> None:
-    """Report the actions that can run more than once. `nested`: names of sub-graphs, whose actions
-    an engine loads anew in any case."""
-    graph = msgspec.structs.replace(subject.graph, relations=tuple(subject.sound))
-    again = repeated(graph)
-    for action in subject.real:
-        if action.key in again and action.key in runs and action.name not in nested:
-            message = (
-                f"{action.full_name} may run more than once. On a robot that is led it is loaded anew each "
-                "time: what it remembers in itself is forgotten."
-            )
-            subject.report("loaded-anew", "warning", message, action=action)
-
-
 def _check_spontaneous(subject: Subject, actors_of: _ByKey, runs: Container[Key]) -> None:
-    """Report spontaneous actions from which arrows lead to actions of other actors."""
+    """Report spontaneous actions, with the actions of other actors to which arrows lead from them."""
     place = {action.key: number for number, action in enumerate(subject.real)}
-    lively = [a for a in subject.real if a.type == "spontaneous" and a.key in runs]
+    lively = [a for a in subject.real if a.type == "spontaneous"]
     after = reachable(
         [
             [place[r.child] for r in subject.outgoing.get(key, []) if r.child != EXIT]
@@ -265,15 +336,16 @@ def _check_spontaneous(subject: Subject, actors_of: _ByKey, runs: Container[Key]
     for action in lively:
         own = actors_of[action.key].every
         same = alike[own] if len(own) == 1 else 1 << place[action.key]
-        others = after[place[action.key]] & ~same
-        if not others:
-            continue
+        others = after[place[action.key]] & ~same if action.key in runs else 0
         first = [subject.real[number] for number in islice(nodes_in(others), _ALSO)]
         message = (
             f"{_with_actor(subject, action.key, own)} is spontaneous: each time it ends, all that comes "
             f"after it is stopped, also {joined({each.full_name for each in first[:_NAMED]})} of another "
-            "actor. A runner that leads the robots cannot do that."
+            "actor. A runner that leads the robots cannot do that, so a led start is refused."
             f"{more(others.bit_count() - _NAMED, 'action', 'actions')}"
+            if others
+            else f"{_with_actor(subject, action.key, own)} is spontaneous: it begins again by itself. A "
+            "runner that leads the robots cannot do that, so a led start is refused."
         )
         subject.report(
             "spontaneous-across", "warning", message, action=action, member="/type", also=first

@@ -5,6 +5,7 @@ See docs/umrf-and-the-engine.md 2.3, 2.9 and 2.10; H2, H3, H5, H8 and H9.
 
 from collections import deque
 from collections.abc import Callable, Collection, Container, Mapping
+from typing import NamedTuple
 
 from action_assistant.umrf.checks.concurrency import Concurrency
 from action_assistant.umrf.checks.overlaps import (
@@ -110,21 +111,34 @@ def loops(
     ]
 
 
-def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> None:
-    """Report all problems of the graph's flow from entry to exit. `nested`: names of actions that
-    are sub-graphs."""
+class Flow(NamedTuple):
+    """The ways that a graph can take: which actions can run, and which at the same time."""
+
+    reachability: "Reachability"
+    concurrency: Concurrency
+
+
+def follow(subject: Subject) -> Flow:
+    """Follow a graph from its entry."""
+    reachability = Reachability(subject)
+    return Flow(reachability, Concurrency(subject, reachability.runs, reachability.reports))
+
+
+def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> Flow | None:
+    """Report all problems of the graph's flow from entry to exit, and return the flow; None for a
+    graph without actions or without a way in. `nested`: names of actions that are sub-graphs."""
     _check_sides(subject)
     if not subject.real:
         subject.report(
             "empty", "warning", "The graph has no actions; it ends as soon as it starts."
         )
-        return
+        return None
     if not subject.outgoing.get(ENTRY):
         message = "No action is connected to the entry: the graph is HALTED as soon as it starts."
         subject.report("no-entry", "error", message, member="/graph_entry")
-        return
-    reachability = Reachability(subject)
-    concurrency = Concurrency(subject, reachability.runs, reachability.reports)
+        return None
+    flow = follow(subject)
+    reachability, concurrency = flow
     _check_bypasses(subject, reachability)
     check_responses(subject, reachability.reports, concurrency, nested)
     check_loading(subject, reachability.reports, concurrency, nested)
@@ -134,6 +148,7 @@ def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> None:
     check_instant_loops(subject, reachability.runs, reachability.reports)
     check_endless(subject, reachability.reports, concurrency)
     check_stragglers(subject, reachability.reports, concurrency)
+    return flow
 
 
 def _check_sides(subject: Subject) -> None:
