@@ -31,12 +31,12 @@ function Said({ thread, message, color }: SaidProps) {
         {initials(message.author.name || "Guest")}
       </span>
       <div className="fill">
-        <p className={style.who}>
+        <p className="m-0 ink2 text-75">
           <b className="ink">{message.author.name || "Guest"}</b> {ago(message.at, now)}
           {message.author.id === person.id && mayEdit && (
             <button
               type="button"
-              className={style.unsay}
+              className={`${style.unsay} finger`}
               onClick={() => deleteMessage(doc, thread, message.id)}
             >
               Delete
@@ -96,7 +96,7 @@ export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
             }}
           />
         ) : (
-          <div className={style.buttons}>
+          <div className={`${style.buttons} fingers`}>
             <Button size="compact-sm" onClick={() => setAnswering(true)}>
               Answer
             </Button>

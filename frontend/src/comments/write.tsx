@@ -34,7 +34,7 @@ export function Write(props: WriteProps) {
   };
   return (
     <form
-      className={style.write}
+      className={`${style.write} fingers`}
       onSubmit={(event) => {
         event.preventDefault();
         say();

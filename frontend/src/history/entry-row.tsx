@@ -85,7 +85,7 @@ const mayRevert = ({ from_seq, changes }: HistoryEntry): boolean =>
 function WaysBack({ entry, now, busy, onRevert, onRestore }: Props) {
   const at = timeRange(entry);
   return (
-    <div className={style.ways}>
+    <div className={`${style.ways} fingers`}>
       {mayRevert(entry) && (
         <Button
           size="compact-sm"

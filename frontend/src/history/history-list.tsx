@@ -61,7 +61,7 @@ function Row({ entry, id, seq, mayEdit, now }: EntryProps) {
   };
   return (
     <li className={style.entry}>
-      <p className={style.line}>
+      <p className="m-0 flex justify-between gap-75">
         <span>
           <bdi className="weight-600">{authorName(entry.author)}</bdi> {doneWords(entry)}
         </span>
@@ -69,7 +69,7 @@ function Row({ entry, id, seq, mayEdit, now }: EntryProps) {
           {when}
         </time>
       </p>
-      <div className={style.buttons}>
+      <div className={`${style.buttons} fingers`}>
         {before !== null && (
           <Button
             size="compact-sm"

@@ -64,7 +64,7 @@ function Older({ timeline }: { timeline: Timeline }) {
     return () => seen.disconnect();
   }, []);
   return (
-    <div ref={end} className={style.older}>
+    <div ref={end} className={`${style.older} fingers`}>
       <Button
         size="compact-sm"
         variant="subtle"

@@ -100,7 +100,7 @@ export function PastBar({ drawn, wanted, show, side, onSide }: Props) {
   const goTo = (at: number) => lookAt({ ...place, at: Math.min(Math.max(1, at), newest) });
   return (
     <section
-      className={style.bar}
+      className={`${style.bar} fingers`}
       aria-label="The past"
       data-past
       data-at={compared.here ? place.at : undefined}

@@ -39,7 +39,7 @@ export function PastWays({ versions }: { versions: readonly Version[] }) {
   const index = versions.findIndex((each) => each.seq === at);
   const called = index < 0 ? `change ${at}` : `v${versions.length - index}`;
   return (
-    <div className={style.ways}>
+    <div className={`${style.ways} fingers`}>
       {at < seq && (
         <Button
           fullWidth

@@ -80,7 +80,7 @@ function Ways(props: Props) {
   const { listed, isNow, mayEdit, busy, link, onCompare, onCopy, onRestore } = props;
   const button = { size: "compact-sm", variant: "default" } as const;
   return (
-    <div className={style.ways}>
+    <div className={`${style.ways} fingers`}>
       {!isNow && (
         <Button
           {...button}
@@ -129,7 +129,12 @@ export function VersionItem(props: Props) {
   const { label, note, digest, author, at } = version;
   return (
     <li className={style.version} data-chosen={chosen || undefined} data-version={number}>
-      <button type="button" className={style.choose} aria-pressed={chosen} onClick={onChoose}>
+      <button
+        type="button"
+        className={`${style.choose} finger`}
+        aria-pressed={chosen}
+        onClick={onChoose}
+      >
         <b className={style.number}>{number}</b>
         {label !== "" && <bdi className={style.label}>{label}</bdi>}
       </button>

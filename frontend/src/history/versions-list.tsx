@@ -152,7 +152,7 @@ function Fields({ onPublished, onClose }: FieldsProps) {
       />
       {obstacle === null && <CoursesAt graph={id} seq={seq} />}
       {(refused || obstacle) && <p role={refused ? "alert" : "status"}>{refused || obstacle}</p>}
-      <div className={style.buttons}>
+      <div className={`${style.buttons} fingers`}>
         <Button size="compact-sm" variant="default" onClick={cancel}>
           Cancel
         </Button>
@@ -177,7 +177,7 @@ function PublishForm() {
   if (!mayGoBack) return null;
   if (open) return <Fields onPublished={setPublished} onClose={() => setOpen(false)} />;
   return (
-    <div className={style.publish}>
+    <div className={`${style.publish} fingers`}>
       <Button
         fullWidth
         size="compact-sm"

@@ -24,7 +24,7 @@ function BlameRow({ of, blame, color }: BlameRowProps) {
     <li className="border-bottom">
       <button
         type="button"
-        className={style.blame}
+        className={`${style.blame} finger`}
         aria-expanded={open}
         onClick={() => setOpen(!open)}
       >

@@ -52,7 +52,7 @@ function Row({ graph, kind, now }: { graph: GraphSummary; kind: Kind; now: numbe
           {graph.name || "Untitled"}
           {graph.draft_of && `, draft “${isolated(graph.draft_of.name)}”`}
         </bdi>
-        <span className={style.sub}>
+        <span className="quiet-12">
           {[
             ...(kind === "graph" ? [actionsOf(graph)] : []),
             ...(at === null ? [] : [`deleted ${ago(at, now)}`]),
@@ -80,7 +80,7 @@ function List({ kind }: { kind: Kind }) {
   const graphs = byDeletion(deleted.data ?? []);
   if (deleted.isPending) return <Skeleton height={40} />;
   if (deleted.isError) return <p role="alert">{errorText(deleted.error)}</p>;
-  if (graphs.length === 0) return <p className={style.none}>Nothing is deleted.</p>;
+  if (graphs.length === 0) return <p className="quiet-12">Nothing is deleted.</p>;
   return (
     <ul className="list-reset">
       {graphs.map((graph) => (

@@ -140,7 +140,7 @@ export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
               <button
                 key={each}
                 type="button"
-                className={style.pick}
+                className={`${style.pick} finger`}
                 aria-pressed={wish.label === each}
                 onClick={() => setLabel(wish.label === each ? null : each)}
               >

@@ -39,7 +39,7 @@ function OtherRobots({ of }: { of: Key }) {
     <button
       key={id}
       type="button"
-      className={style.hand}
+      className={`${style.hand} finger`}
       title={handOverLabel(hand)}
       onClick={() => select([id])}
     >

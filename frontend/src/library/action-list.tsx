@@ -84,7 +84,7 @@ const Row = memo(function Row({ listed, base, current }: ActionRowProps) {
       aria-current={current ? "page" : undefined}
       data-row
     >
-      <span className={style.name}>
+      <span className="row gap-35 weight-600">
         <bdi className="flex-1 truncate">{name || "Without a name"}</bdi>
         {older > 0 && (
           <span className="inline-flex flex-none ink-warn" title={`Older parameters in ${older}`}>
@@ -165,7 +165,7 @@ function Filters({ robots, filter, onFilter }: FilterProps) {
         <button
           key={value}
           type="button"
-          className={style.filter}
+          className={`${style.filter} finger`}
           aria-pressed={value === filter}
           onClick={() => onFilter(value)}
         >
@@ -178,7 +178,7 @@ function Filters({ robots, filter, onFilter }: FilterProps) {
 
 function Tools({ onNew, onImport }: { onNew: () => void; onImport: () => void }) {
   return (
-    <div className={style.tools}>
+    <div className={`${style.tools} fingers`}>
       <Button leftSection={<IconPlus size={15} aria-hidden />} onClick={onNew}>
         New action
       </Button>
@@ -232,7 +232,7 @@ export function ActionList({ actions, robots, current, onNew, onImport, foot }: 
         )}
         {mayEdit && fresh !== "" && !exact && (
           <button type="button" className={style.row} data-row onClick={() => onNew(fresh)}>
-            <span className={style.name}>
+            <span className="row gap-35 weight-600">
               <IconPlus size={13} aria-hidden /> New action “{fresh}”
             </span>
           </button>

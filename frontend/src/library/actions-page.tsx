@@ -181,7 +181,7 @@ export function ActionsPage(props: Props) {
               component={Link}
               to="/actions"
               variant="subtle"
-              className={style.back ?? ""}
+              className={`${style.back} finger`}
               leftSection={<IconArrowLeft size={16} aria-hidden />}
             >
               All actions

@@ -98,7 +98,7 @@ function About(props: Pick<Props, "row" | "progress" | "robots"> & { name: strin
           <StateLabel tone={progress.tone} word={progress.word} {...durationLabel(progress)} />
         )}
       </span>
-      <span className={style.sub}>
+      <span className="truncate ink2 text-13">
         {action.missing && "named by an arrow, but not there"}
         {!action.missing && robots.size > 0 && (
           <b

@@ -19,7 +19,7 @@ export const RobotFilter = memo(function Robots() {
         <button
           key={name}
           type="button"
-          className={style.robot}
+          className={`${style.robot} finger`}
           aria-pressed={lit === name}
           data-dim={(lit !== null && lit !== name) || undefined}
           onClick={() => store.robot.set(lit === name ? null : name)}

@@ -83,7 +83,7 @@ export function FollowFrame() {
   if (leader === undefined) return null;
   return (
     <div className={style.frame} style={colored(checkedColor(leader.color))}>
-      <span className={style.followed} role="status">
+      <span className={`${style.followed} fingers`} role="status">
         Following <Name of={leader} />
         <button type="button" onClick={() => follow(null)}>
           Stop following<kbd aria-hidden>Esc</kbd>

@@ -49,7 +49,7 @@ function Line({ cause, inside, onShow }: CauseLineProps) {
       <span>
         {sentence}
         {inside && (
-          <button type="button" className={style.into} onClick={show}>
+          <button type="button" className={`${style.into} finger`} onClick={show}>
             Show it inside
           </button>
         )}

@@ -141,7 +141,7 @@ function Rows({ runs, chosen, onChoose }: RowsProps) {
   const going = runs.some((run) => !hasEnded(run));
   const now = useNow(going ? 1000 : 30_000);
   return (
-    <div className={style.frame}>
+    <div className="border bg-panel rounded-card shadow scroll-x">
       <table className={style.table}>
         <thead>
           <tr>

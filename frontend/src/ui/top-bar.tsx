@@ -125,7 +125,7 @@ export function TopBar({ crumbs, status, actions, account, start }: Props) {
       </nav>
       <div className={style.status}>{status}</div>
       <div className={style.actions}>{actions}</div>
-      <div className={style.account}>{account}</div>
+      <div className="row flex-none gap-50">{account}</div>
       {start && <div className={style.actions}>{start}</div>}
     </header>
   );

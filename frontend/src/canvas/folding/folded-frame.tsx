@@ -2,6 +2,7 @@
 
 import { Handle, type NodeProps, Position } from "@xyflow/react";
 import { memo, use } from "react";
+import { toneColor } from "../../status/state-label";
 import { counted } from "../../words/counted";
 import { ProblemBadge } from "../marks/problem-marks";
 import { FoldButton, FoldFrameContext } from "../notes/note-buttons";
@@ -33,7 +34,7 @@ function States({ states }: Pick<FrameBlock, "states">) {
       {states.map(({ word, tone, count }, i) => (
         <span key={word}>
           {i > 0 && " · "}
-          <span data-tone={tone}>
+          <span data-tone={tone} style={tone === "idle" ? {} : { color: toneColor[tone] }}>
             {STATE_LETTER[tone] && <span aria-hidden>{STATE_LETTER[tone]} </span>}
             {count} {word}
           </span>

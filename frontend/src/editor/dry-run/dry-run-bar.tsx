@@ -181,7 +181,7 @@ function Choices({ context, run }: { context: EditorContext; run: DryRun }) {
           className={style.choice ?? ""}
           disabled={run.busy}
           leftSection={<OutcomeSign outcome={outcome} />}
-          rightSection={<span className={style.digit}>{i + 1}</span>}
+          rightSection={<span className="no-finger ink3 text-11 weight-500">{i + 1}</span>}
           style={{ color: outcomeColor[outcome] }}
           onClick={() => run.choose(outcome, action.key)}
         >

@@ -67,7 +67,7 @@ const STEPS: Record<string, number> = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: 
 /** Return the content and style of an outcome's button, with the digit that chooses it. */
 const faceOf = (outcome: Precondition, i: number) => ({
   leftSection: <OutcomeSign outcome={outcome} />,
-  rightSection: <span className={style.digit}>{i + 1}</span>,
+  rightSection: <span className="no-finger ink3 text-11 weight-500">{i + 1}</span>,
   style: { color: outcomeColor[outcome] },
   children: outcomeWord[outcome],
 });

@@ -129,7 +129,7 @@ export function ContextMenu({ context, screen, onClose }: Props) {
       </Menu.Target>
       <Menu.Dropdown
         ref={box}
-        className={style.menu ?? ""}
+        className={`${style.menu} fingers`}
         onContextMenu={(event) => event.preventDefault()}
       >
         {groups.map((group, i) => (

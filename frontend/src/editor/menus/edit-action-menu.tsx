@@ -43,7 +43,7 @@ export function EditActionMenu({ button }: { button: ReactElement }) {
   return (
     <Menu position="top-start" width={290} opened={opened} onChange={setOpened}>
       <Menu.Target>{button}</Menu.Target>
-      <Menu.Dropdown className={style.menu ?? ""}>
+      <Menu.Dropdown className={`${style.menu} fingers`}>
         <ActionItems />
       </Menu.Dropdown>
     </Menu>

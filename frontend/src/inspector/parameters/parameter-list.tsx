@@ -43,7 +43,7 @@ interface AddProps {
 
 function Suggestion({ name, why }: { name: string; why: string | undefined }) {
   return (
-    <span className={style.suggestion}>
+    <span className="stack break-anywhere">
       {name} <small className="ink2">{why}</small>
     </span>
   );
