@@ -1,6 +1,7 @@
 /** Edits that are kept on this device and cannot be sent: this person's and others'. They can be applied, discarded or saved as a file. */
 
 import { Button, Checkbox, Group, Modal, Text } from "@mantine/core";
+import { useMutation } from "@tanstack/react-query";
 import { useMemo, useState } from "react";
 import { type ChangedField, changesOf, type GraphChange, onlyChanges } from "../graph/changes";
 import { type Maps, mapsFrom, mapsOf } from "../graph/document-keys";
@@ -249,13 +250,15 @@ interface AnswersProps {
 function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
   const { state } = useLink();
   const [dropping, setDropping] = useState(false);
-  const { busy, trouble, work } = useWork();
+  const work = useMutation({ mutationFn: (edit: () => Promise<unknown>) => edit() });
+  // After a success the dialog closes by itself.
+  const busy = work.isPending || work.isSuccess;
   const { difference } = choice.stranded;
   return (
     <>
-      {trouble !== null && (
+      {work.error !== null && (
         <p className={style.trouble} role="alert">
-          That did not work: {trouble}. Your changes are still here.
+          That did not work: {work.error.message}. Your changes are still here.
         </p>
       )}
       <div className={style.answers}>
@@ -263,7 +266,7 @@ function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
         <span className={style.space} />
         <Button onClick={onLater}>Decide later</Button>
         {dropping ? (
-          <Button color="red" disabled={busy} onClick={() => work(() => choice.drop())}>
+          <Button color="red" disabled={busy} onClick={() => work.mutate(() => choice.drop())}>
             Discard for good
           </Button>
         ) : (
@@ -276,30 +279,13 @@ function Answers({ choice, taken, some, onLater, onSave }: AnswersProps) {
           data-autofocus
           loading={busy}
           disabled={taken.length === 0 || state !== "live"}
-          onClick={() => work(() => choice.apply(onlyChanges(difference, taken)))}
+          onClick={() => work.mutate(() => choice.apply(onlyChanges(difference, taken)))}
         >
           Apply {some}
         </Button>
       </div>
     </>
   );
-}
-
-/** Runs work that may fail, with its state. On success the dialog closes by itself. */
-function useWork() {
-  const [busy, setBusy] = useState(false);
-  const [trouble, setTrouble] = useState<string | null>(null);
-  const work = async (editAction: () => Promise<unknown>) => {
-    setBusy(true);
-    setTrouble(null);
-    try {
-      await editAction();
-    } catch (error) {
-      setBusy(false);
-      setTrouble(error instanceof Error ? error.message : String(error));
-    }
-  };
-  return { busy, trouble, work };
 }
 
 /** Shows edits that the server did not take. `onLater`: closes it; a notice on the page reopens it. */

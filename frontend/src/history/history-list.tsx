@@ -5,7 +5,7 @@
 import { Button, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconRestore } from "@tabler/icons-react";
-import { useQueryClient } from "@tanstack/react-query";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { authorName } from "../api/graphs";
 import {
@@ -44,21 +44,15 @@ interface EntryProps extends Props {
 function Row({ entry, id, seq, mayEdit, now }: EntryProps) {
   const client = useQueryClient();
   const [open, setOpen] = useState(false);
-  const [busy, setBusy] = useState(false);
   const at = instant(entry.until);
   const before = momentBefore(entry);
   const when = at === null ? "" : `${day(at, now)} ${clock(at)}`;
-  const goBack = async () => {
-    setBusy(true);
-    try {
-      await restoreMoment(id, entry.seq);
-    } catch (error) {
-      notifications.show({ color: "red", title: "Not restored", message: errorText(error) });
-    } finally {
-      await refreshHistory(client, id);
-      setBusy(false);
-    }
-  };
+  const goBack = useMutation({
+    mutationFn: () => restoreMoment(id, entry.seq),
+    onError: (error) =>
+      notifications.show({ color: "red", title: "Not restored", message: errorText(error) }),
+    onSettled: () => refreshHistory(client, id),
+  });
   return (
     <li className={style.entry}>
       <p className="m-0 flex justify-between gap-75">
@@ -84,9 +78,9 @@ function Row({ entry, id, seq, mayEdit, now }: EntryProps) {
           <Button
             size="compact-sm"
             variant="subtle"
-            loading={busy}
+            loading={goBack.isPending}
             leftSection={<IconRestore size={14} aria-hidden />}
-            onClick={() => void goBack()}
+            onClick={() => goBack.mutate()}
           >
             Make it so again<span className="visually-hidden"> as on {when}</span>
           </Button>

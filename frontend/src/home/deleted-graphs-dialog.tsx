@@ -2,8 +2,7 @@
 import { Button, Modal, Skeleton } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconRestore } from "@tabler/icons-react";
-import { useQueryClient } from "@tanstack/react-query";
-import { useState } from "react";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
 import {
   type GraphSummary,
   recoverGraph,
@@ -32,19 +31,13 @@ type Kind = "graph" | "action";
 function Row({ graph, kind, now }: { graph: GraphSummary; kind: Kind; now: number }) {
   const client = useQueryClient();
   const mayEdit = useMay("edit");
-  const [busy, setBusy] = useState(false);
   const at = instant(graph.deleted_at ?? null);
-  const bringBack = async () => {
-    setBusy(true);
-    try {
-      await recoverGraph(graph.id);
-    } catch (error) {
-      notifications.show({ color: "red", title: "Not brought back", message: errorText(error) });
-    } finally {
-      await Promise.all([refreshGraphs(client), refreshLibrary(client)]);
-      setBusy(false);
-    }
-  };
+  const bringBack = useMutation({
+    mutationFn: () => recoverGraph(graph.id),
+    onError: (error) =>
+      notifications.show({ color: "red", title: "Not brought back", message: errorText(error) }),
+    onSettled: () => Promise.all([refreshGraphs(client), refreshLibrary(client)]),
+  });
   return (
     <li className={style.row}>
       <span className="fill">
@@ -62,8 +55,8 @@ function Row({ graph, kind, now }: { graph: GraphSummary; kind: Kind; now: numbe
       {mayEdit && (
         <Button
           leftSection={<IconRestore size={15} aria-hidden />}
-          disabled={busy}
-          onClick={() => void bringBack()}
+          disabled={bringBack.isPending}
+          onClick={() => bringBack.mutate()}
         >
           Bring back<span className="visually-hidden"> {graph.name || "Untitled"}</span>
         </Button>

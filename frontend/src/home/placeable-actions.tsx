@@ -5,8 +5,8 @@
 import { Button } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconInfoCircle } from "@tabler/icons-react";
-import { useQueryClient } from "@tanstack/react-query";
-import { memo, useDeferredValue, useMemo, useState } from "react";
+import { useMutation, useQueryClient } from "@tanstack/react-query";
+import { memo, useDeferredValue, useMemo } from "react";
 import { refreshLibrary } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
@@ -43,22 +43,21 @@ const fits = (search: string, template: NewAction): boolean =>
 function RobotRow({ has, onPlace }: { has: RobotAction; onPlace: Place }) {
   const client = useQueryClient();
   const { runner } = useLive();
-  const [busy, setBusy] = useState(false);
-  const take = async () => {
-    setBusy(true);
-    try {
-      await takeFromRobot(runner, has);
-    } catch (error) {
-      notifications.show({ color: "red", title: "Not taken over", message: errorText(error) });
-    } finally {
-      await refreshLibrary(client);
-      setBusy(false);
-    }
-  };
+  const take = useMutation({
+    mutationFn: () => takeFromRobot(runner, has),
+    onError: (error) =>
+      notifications.show({ color: "red", title: "Not taken over", message: errorText(error) }),
+    onSettled: () => refreshLibrary(client),
+  });
   return (
     <div className={style.onRobot}>
       <ActionRow known={bare(robotTemplate(has.action))} onPlace={onPlace} />
-      <Button size="compact-xs" variant="subtle" loading={busy} onClick={() => void take()}>
+      <Button
+        size="compact-xs"
+        variant="subtle"
+        loading={take.isPending}
+        onClick={() => take.mutate()}
+      >
         Take over
         <span className="visually-hidden">
           {" "}

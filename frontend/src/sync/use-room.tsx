@@ -345,7 +345,7 @@ export function useUndo(): { readonly canUndo: boolean; readonly canRedo: boolea
   const [can, setCan] = useState({ canUndo: false, canRedo: false });
   useEffect(() => {
     const look = () => setCan({ canUndo: undo.canUndo(), canRedo: undo.canRedo() });
-    const events = ["stack-item-added", "stack-item-popped", "stack-cleared"] as const;
+    const events = ["stack-item-added", "stack-item-popped"] as const;
     for (const event of events) undo.on(event, look);
     look();
     return () => {

@@ -52,7 +52,6 @@ export class UndoHistory extends ObservableV2<{
   "stack-item-added": (event: StepEvent) => void;
   "stack-item-updated": (event: StepEvent) => void;
   "stack-item-popped": (event: StepEvent) => void;
-  "stack-cleared": () => void;
 }> {
   /** Edits that follow one another faster than this, ms, are one step. */
   captureTimeout = 0;
@@ -92,13 +91,6 @@ export class UndoHistory extends ObservableV2<{
   /** Makes the step again that was undone last. */
   redo(): UndoStep | null {
     return this.takeBack(this.redoStack, this.undoStack, "redo");
-  }
-
-  clear(): void {
-    this.undoStack.length = 0;
-    this.redoStack.length = 0;
-    this.states.clear();
-    this.emit("stack-cleared", []);
   }
 
   override destroy(): void {
