@@ -1,20 +1,29 @@
 /** The page of actions: the list at the left and the selected action beside it; a phone shows one of the two. */
 import { Button, Group, Modal, Skeleton, TextInput } from "@mantine/core";
+import { notifications } from "@mantine/notifications";
 import { IconAlertTriangle, IconArrowLeft, IconBolt } from "@tabler/icons-react";
+import { useQueryClient } from "@tanstack/react-query";
 import { useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
-import { errorText } from "../api/http";
-import { type LibraryAction, useLibrary } from "../api/library";
+import { deleteGraph, type GraphSummary, refreshLibrary } from "../api/graphs";
+import { errorText, Refusal } from "../api/http";
+import { createAction, type LibraryAction, useLibrary } from "../api/library";
+import { useLive } from "../api/page-link";
 import { DeletedGraphs } from "../home/deleted-graphs";
-import { type RobotsKnowledge, useRobotsKnowledge } from "../home/robot-actions";
+import {
+  type RobotAction,
+  type RobotsKnowledge,
+  takeFromRobot,
+  useRobotsKnowledge,
+} from "../home/robot-actions";
 import { Empty } from "../ui/empty";
 import { useIsPhone } from "../ui/hooks";
+import { isolated } from "../words/isolated";
 import { ActionList } from "./action-list";
 import style from "./actions-page.module.css";
 import { addressOf, type ListedAction, listedActions } from "./listing";
 import { type BarSlots, OpenAction } from "./open-action";
 import { UnlistedAction } from "./unlisted-action";
-import { useNewActions } from "./use-new-actions";
 
 interface NewActionProps {
   /** The suggested name; null while the dialog is closed. */
@@ -181,7 +190,7 @@ export function ActionsPage(props: Props) {
               component={Link}
               to="/actions"
               variant="subtle"
-              className={`${style.back} finger`}
+              className={style.back ?? ""}
               leftSection={<IconArrowLeft size={16} aria-hidden />}
             >
               All actions
@@ -205,4 +214,64 @@ export function ActionsPage(props: Props) {
       />
     </main>
   );
+}
+
+/** Return whether the server refused a name that is taken. */
+function isTaken(error: unknown): boolean {
+  return error instanceof Refusal && error.details.status === 409;
+}
+
+/** Return the functions that add and delete actions, with their state. */
+function useNewActions() {
+  const client = useQueryClient();
+  const { runner } = useLive();
+  const [, go] = useLocation();
+  const [busy, setBusy] = useState(false);
+  const [wrong, setWrong] = useState("");
+  /** Makes and opens an action. Returns the reason for a failure, or an empty text. */
+  const make = async (work: () => Promise<GraphSummary>, editing: boolean): Promise<string> => {
+    setBusy(true);
+    try {
+      const { id } = await work();
+      await refreshLibrary(client);
+      go(`/actions/${id}${editing ? "?edit" : ""}`);
+      return "";
+    } catch (error) {
+      return isTaken(error) ? "The library has an action of this name." : errorText(error);
+    } finally {
+      setBusy(false);
+    }
+  };
+  const told = async (work: () => Promise<GraphSummary>) => {
+    const message = await make(work, false);
+    if (message !== "") notifications.show({ color: "red", title: "Not added", message });
+  };
+  const ask = async (name: string): Promise<boolean> => {
+    const reason = await make(() => createAction(name), true);
+    setWrong(reason);
+    return reason === "";
+  };
+  const remove = async (id: string, name: string) => {
+    try {
+      await deleteGraph(id);
+      notifications.show({
+        title: `${isolated(name)} is deleted from the library`,
+        message: "Graphs that use it do not change. You can restore it below the list.",
+      });
+      go("/actions");
+    } catch (error) {
+      notifications.show({ color: "red", title: "Not deleted", message: errorText(error) });
+    } finally {
+      await refreshLibrary(client);
+    }
+  };
+  return {
+    busy,
+    wrong,
+    make: ask,
+    add: (name: string) => void told(() => createAction(name, true)),
+    take: (has: RobotAction) => void told(() => takeFromRobot(runner, has)),
+    remove: (id: string, name: string) => void remove(id, name),
+    forget: () => setWrong(""),
+  };
 }

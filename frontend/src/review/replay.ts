@@ -1,4 +1,7 @@
-/** The cursor of a replay: where it stands, whether it plays, and the run as it was known there. */
+/**
+ * The cursor of a replay: where it stands, whether it plays, and the run as it was known there; and
+ * the way from there to a dry-run that begins at that moment.
+ */
 import { useQueryClient } from "@tanstack/react-query";
 import {
   type Dispatch,
@@ -13,6 +16,7 @@ import {
 import { type ActionFrame, type Frame, type Replay, useReplayData } from "../api/review";
 import type { ActionRun, Run } from "../api/runs";
 import { tick } from "../clock/server-clock";
+import { visitBegin } from "../status/progress";
 import { instant } from "../ui/times";
 
 export const REPLAY_SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16] as const;
@@ -294,4 +298,31 @@ export function chapterAt(chapters: Replay["chapters"], time: number): number {
     if ((instant(chapter.at) ?? 0) <= time) after = chapter.after;
   }
   return after;
+}
+
+/**
+ * ms after the start: where the replay stands, `at`; at the end of a run its last action had just
+ * begun. Null while nothing has begun.
+ */
+export function dryRunMoment(run: Run, at: number | null): number | null {
+  const start = instant(run.started_at);
+  if (start === null) return null;
+  if (at !== null) return Math.max(0, Math.round(at - start));
+  const begun = Object.values(run.actions ?? {}).flatMap(({ visits }) =>
+    visits.map((visit) => visitBegin(visit) ?? start),
+  );
+  return begun.length === 0 ? null : Math.max(0, Math.round(Math.max(...begun) - start));
+}
+
+export function dryRunUrl(graph: string, run: string, moment: number): string {
+  const query = new URLSearchParams({ rehearse: run, t: String(moment) });
+  return `/graphs/${graph}?${query}`;
+}
+
+/** The moment of a run that an address asks for; null where it asks for none. */
+export function askedDryRun(search: string): { run: string; t: number } | null {
+  const query = new URLSearchParams(search);
+  const run = query.get("rehearse");
+  const t = Number(query.get("t") ?? "");
+  return run !== null && run !== "" && Number.isFinite(t) && t >= 0 ? { run, t } : null;
 }

@@ -12,7 +12,7 @@ import { Link } from "wouter";
 import { exportUrl } from "../api/review";
 import type { Run } from "../api/runs";
 import { stopwatch } from "../ui/times";
-import { dryRunMoment, dryRunUrl } from "./dry-run-link";
+import { dryRunMoment, dryRunUrl } from "./replay";
 import { type RepeatActions, RunMenu } from "./run-menu";
 import style from "./run-page.module.css";
 

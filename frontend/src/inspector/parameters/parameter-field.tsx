@@ -1,15 +1,26 @@
 /** One parameter: what it is called, its value or what gives it, and what else it is. */
-import { ActionIcon } from "@mantine/core";
-import { IconAdjustments, IconLock } from "@tabler/icons-react";
+import { ActionIcon, Button, Group, Switch } from "@mantine/core";
+import { IconAdjustments, IconLock, IconTrash } from "@tabler/icons-react";
 import { type ReactNode, use, useState } from "react";
 import { useEditorContext } from "../../edit-actions/editor-context";
 import type { ParameterSide } from "../../graph/document-keys";
-import { setParameter } from "../../graph/edit";
+import { removeParameter, renameParameter, setParameter } from "../../graph/edit";
 import { pathWords } from "../../graph/field-words";
-import type { Action, Parameter } from "../../graph/model";
+import type { Action, Key, Parameter } from "../../graph/model";
 import { type InputGiver, readValue, takenGivers } from "../../graph/parameters/data-flow";
+import { pathFrom, taken } from "../../graph/parameters/names";
 import { outputChoices } from "../../graph/parameters/output-choices";
-import type { ParameterValue } from "../../graph/parameters/values";
+import {
+  allowedLines,
+  type ParameterValue,
+  parameterValueOf,
+  TYPES,
+  withAllowed,
+  withLock,
+  withRequired,
+  withType,
+} from "../../graph/parameters/values";
+import { DraftChoice, DraftInput } from "../../ui/draft-input";
 import { Tooltip } from "../../ui/tooltip";
 import { isolated } from "../../words/isolated";
 import { useInLibrary } from "../fields/view-only";
@@ -17,7 +28,6 @@ import style from "../inspector.module.css";
 import { DataFlowContext, GiverChips, useDataLights } from "./data-flow";
 import flowStyle from "./data-flow.module.css";
 import { OutputPicker } from "./output-picker";
-import { ParameterSettings } from "./parameter-settings";
 import { ParameterInput } from "./parameter-value";
 
 interface Props {
@@ -184,5 +194,91 @@ export function ParameterField({ action, side, parameter, name }: Props) {
         />
       )}
     </div>
+  );
+}
+
+interface SettingsProps {
+  owner: Key;
+  side: ParameterSide;
+  parameter: Parameter;
+  others: readonly Parameter[];
+  onClose: () => void;
+}
+
+function ParameterSettings({ owner, side, parameter, others, onClose }: SettingsProps) {
+  const { doc } = useEditorContext();
+  const field = parameterValueOf(parameter.text);
+  const name = pathWords(parameter.path);
+  const write = (change: (now: string) => string) =>
+    setParameter(doc, owner, side, parameter.path, change);
+  return (
+    <section className={style.adding} aria-label={`What the parameter ${isolated(name)} is`}>
+      <DraftInput
+        label="Name"
+        value={name}
+        onLeaving
+        check={(draft) => taken(others, pathFrom(draft))}
+        onCommit={(draft) => renameParameter(doc, owner, side, parameter.path, pathFrom(draft))}
+      />
+      <DraftChoice
+        label="Type"
+        data={TYPES}
+        value={field.type ?? ""}
+        onCommit={(type) => type.trim() === "" || write((now) => withType(now, type.trim()))}
+      />
+      {field.native !== null && (
+        <DraftInput
+          label="Allowed values, one on each line"
+          lines
+          value={allowedLines(field)}
+          placeholder="anything"
+          check={(draft) => {
+            const result = withAllowed(parameter.text, draft);
+            return "wrong" in result ? result.wrong : null;
+          }}
+          onCommit={(draft) =>
+            write((now) => {
+              const result = withAllowed(now, draft);
+              return "ok" in result && result.ok !== null ? result.ok : now;
+            })
+          }
+        />
+      )}
+      <Switch
+        label="Required"
+        description="The action does not run without a value"
+        checked={field.required}
+        onChange={(event) => {
+          const required = event.currentTarget.checked;
+          write((now) => withRequired(now, required));
+        }}
+      />
+      {side === "in" && (
+        <Switch
+          label="Locked"
+          description="Outputs of other actions never replace the value"
+          checked={field.locked}
+          onChange={(event) => {
+            const locked = event.currentTarget.checked;
+            write((now) => withLock(now, locked));
+          }}
+        />
+      )}
+      <Group gap="xs">
+        <Button size="compact-sm" disabled={false} onClick={onClose}>
+          Close
+        </Button>
+        <Button
+          size="compact-sm"
+          variant="subtle"
+          color="red"
+          leftSection={<IconTrash size={13} aria-hidden />}
+          aria-label={`Remove the parameter ${isolated(name)}`}
+          onClick={() => removeParameter(doc, owner, side, parameter.path)}
+        >
+          Remove
+        </Button>
+      </Group>
+    </section>
   );
 }

@@ -53,7 +53,7 @@ const READ = {
   accept: "Delays a Stop, to be accepted",
 } as const;
 
-/** What of a led run makes a Stop reach a robot later: a person accepts it, nothing is wrong. */
+/** Items of a led run that make a Stop reach a robot later: a person accepts them, nothing is wrong. */
 const DELAYS: ReadonlySet<string> = new Set(["two-at-once", "stop-across"]);
 
 interface PreflightLineProps {

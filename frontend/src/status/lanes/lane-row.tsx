@@ -24,7 +24,7 @@ interface Props {
   silentSince: number | null;
   selected: boolean;
   onPick: ((lane: Lane) => void) | undefined;
-  /** How long after another robot's action the newest visit began, in words; "" if that is not known. */
+  /** The time from another robot's action to the begin of the newest visit, in words; "" if unknown. */
   waited: string;
   /** True if its inner lanes are shown, false if hidden; null if it has none. */
   opened: boolean | null;

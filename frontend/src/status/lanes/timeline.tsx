@@ -27,8 +27,7 @@ import {
   WHOLE_WAY,
   wholeSpan,
 } from "./axis";
-import { HandOverLines } from "./hand-over-lines";
-import { type HandOver, handOversOf, handOverWords } from "./hand-overs";
+import { type HandOver, HandOverLines, handOversOf, handOverWords } from "./hand-overs";
 import { AllLevels, LaneRow, type OpenLanes, useOpenLanes } from "./lane-row";
 import { type Lane, openLanes, robotsOf } from "./lanes";
 import style from "./timeline.module.css";

@@ -1,8 +1,12 @@
-/** The times between the end of an action and the begin of another robot's that waited for it. Pure. */
+/** Times between the end of an action and the begin of another robot's that waited for it, as lines between lanes. */
+
+import { type RefObject, useLayoutEffect, useState } from "react";
 import type { Run, Visit } from "../../api/runs";
 import { instant } from "../../ui/times";
 import { boundsText } from "../durations";
+import { shareOf, type TimeAxis } from "./axis";
 import type { Lane } from "./lanes";
+import style from "./timeline.module.css";
 
 /** One hand-over between two robots: what began after what had ended, by names of lanes. */
 export interface HandOver {
@@ -10,7 +14,7 @@ export interface HandOver {
   readonly to: string;
   /** The action that was waited for, with its robot. */
   readonly words: string;
-  /** When the one was seen to have ended, and the other one to have begun, ms. */
+  /** Times at which the one was seen to have ended, and the other one to have begun, ms. */
   readonly ended: number;
   readonly began: number;
   /** Bounds of the time between both, ms. */
@@ -85,4 +89,59 @@ export function handOverTime({ least, most }: Pick<HandOver, "least" | "most">):
 
 export function handOverWords(over: HandOver): string {
   return `began ${handOverTime(over)} after ${over.words} had ended`;
+}
+
+interface Props {
+  overs: readonly HandOver[];
+  axis: TimeAxis;
+  /** The list of lanes, whose rows are measured. */
+  list: RefObject<HTMLElement | null>;
+  /** Changes with the rows that are shown. */
+  rows: string;
+}
+
+/** Return the middle of each row, px from the top of the list. */
+function useMiddles(list: Props["list"], rows: string): ReadonlyMap<string, number> {
+  const [middles, setMiddles] = useState<ReadonlyMap<string, number>>(new Map());
+  // biome-ignore lint/correctness/useExhaustiveDependencies: measured again when other rows are shown
+  useLayoutEffect(() => {
+    const box = list.current;
+    if (box === null) return;
+    const found = box.querySelectorAll<HTMLElement>("[data-lane]");
+    const middle = (row: HTMLElement) => row.offsetTop + row.offsetHeight / 2;
+    setMiddles(new Map([...found].map((row) => [row.dataset.lane ?? "", middle(row)])));
+  }, [list, rows]);
+  return middles;
+}
+
+export function HandOverLines({ overs, axis, list, rows }: Props) {
+  const middles = useMiddles(list, rows);
+  const newest = new Map(overs.map((over) => [over.to, over]));
+  return (
+    <li className={style.handOvers} aria-hidden>
+      {overs.map((over) => {
+        const [from, to] = [middles.get(over.from), middles.get(over.to)];
+        if (from === undefined || to === undefined) return null;
+        const [left, right] = [shareOf(axis, over.ended), shareOf(axis, over.began)];
+        return (
+          <i
+            key={`${over.to} ${over.began}`}
+            className={style.handOver}
+            data-up={to < from || undefined}
+            title={handOverWords(over)}
+            style={{
+              left: `${left * 100}%`,
+              width: `${(right - left) * 100}%`,
+              top: Math.min(from, to),
+              height: Math.abs(to - from),
+            }}
+          >
+            {newest.get(over.to) === over && (
+              <b data-side={right < 0.5 ? "right" : "left"}>{handOverTime(over)}</b>
+            )}
+          </i>
+        );
+      })}
+    </li>
+  );
 }
