@@ -145,7 +145,15 @@ class Scene:
         start = client.post("/api/runs", content=body(as_led(watch("watch"), override=ACCEPTED)))
         assert start.status_code == 201, start.text
         self.run = start.json()["id"]
-        until("the robots do not take turns", lambda: len(begun.times()) > 4)
+        deadline = time.monotonic() + 30
+        while len(begun.times()) <= 4:
+            dead = begun.engines.dead() if begun.engines is not None else []
+            assert time.monotonic() < deadline, (
+                dead,
+                self.shown()["alarms"],
+                self.shown()["state"],
+            )
+            time.sleep(0.05)
 
     def _answering(self) -> bool:
         robots = self.client.get("/api/robots").json()
@@ -167,7 +175,10 @@ class Scene:
         """Let it go on, and see that robots take turns again."""
         at = time.time()
         since = {"since": self.shown()["held"]["since"]}
-        self.client.post(f"/api/runs/{self.run}/go_on", json=since).raise_for_status()
+        way, deadline = f"/api/runs/{self.run}/go_on", time.monotonic() + 15
+        while not (answer := self.client.post(way, json=since)).is_success:
+            assert time.monotonic() < deadline, answer.text  # a robot may be late to answer
+            time.sleep(0.5)
         until("nothing goes on", lambda: len(self.begun.since(at)) > 3)
 
     def stop(self) -> str:
