@@ -132,8 +132,9 @@ def draft(event: Marked | SummedUp | RunArchived) -> Draft:
 
 
 def sum_of(run: Run, graph: Graph | None, at: int, said: Iterable[str] = ()) -> SummedUp:
-    """Return the sum of a run. `graph`: the graph that was sent, None if it cannot be read; `at`:
-    the time of the sum in microseconds UTC; `said`: the texts of its events."""
+    """Return the summary of a run: its cause, times and figures, and the text that searches read.
+    `graph`: the graph that was sent, None if it cannot be read; `at`: the time of the summary in
+    microseconds UTC; `said`: the texts of the run's events."""
     found = causes(run, graph)[:1]
     cause = cause_sentence(found[0], run) if found else ""
     texts = itertools.chain(

@@ -182,8 +182,8 @@ def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
 
 
 def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
-    """Return whether people would see a difference of an action; the time at which it was last seen
-    is none."""
+    """Return whether people would see a difference between two states of an action. A new time at
+    which it was last seen is no difference."""
     if before is None:
         return True
     return before is not after and (

@@ -418,8 +418,8 @@ async def _umrf(services: RunnerServices, text: str) -> Response[bytes]:
 
 
 def canonical(text: str) -> bytes:
-    """Write a graph so that it can be imported. Raises NotFound when it cannot be read at all. For
-    workers."""
+    """Return the graph of a UMRF text in the form that imports read, in UTF-8. Raise NotFound if
+    the text cannot be read. For workers."""
     try:
         graph = codec.read(text).graph
     except codec.Unreadable as wrong:

@@ -334,8 +334,9 @@ class RestNews:
         self._told: dict[str, PieceRest] = {}  # by piece
 
     def show(self, piece: Run, *, asks: bool = False) -> None:
-        """Tell what has changed about the rest of a piece. `asks`: it has ended without an outcome; a
-        person is asked for that until the piece moves again."""
+        """Tell how far it is proven that a piece is at rest, if that has changed since the last
+        time. `asks`: the piece has ended without an outcome, and a person is asked for the outcome
+        until the piece moves again."""
         known = self._told.get(piece.id)
         asks = asks or (piece.end is not None and known is not None and known.asks)
         now = rest_of(piece, self._clock_us(), asks=asks)

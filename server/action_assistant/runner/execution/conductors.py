@@ -111,8 +111,9 @@ class Conductors:
         self._runs.drive(opened)
 
     async def follow_unread(self, run: Run, seq: int) -> None:
-        """Follow the pieces of a run that an earlier process left and that cannot be led further, since
-        some of its events cannot be read. Raise Unavailable if the journal cannot be read."""
+        """Follow the pieces of a run that an earlier process left, and stop them when Stop is
+        pressed. The run itself cannot be continued, since some of its events cannot be read. `seq`:
+        the number of its last event. Raise Unavailable if the journal cannot be read."""
         log.error("run %s: some of its events cannot be read; its pieces are followed", run.id)
         pieces, lacking = await self._history.pieces(run.id)
         link = UnreadRun(run, lacking, runs=self._runs, clock_us=self._runtime.clock_us)

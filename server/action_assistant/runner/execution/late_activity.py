@@ -145,8 +145,9 @@ class LateActivity:
             self._runs.reopen(*found, self._moves_again(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
-        """Return a run that is not open, and its last seq. Return None when there is no such run, or when an
-        earlier process has recorded that somebody else published its start again."""
+        """Return a run that is not open in this process, and its last seq. Return None if there is
+        no such run, if it cannot be decoded, or if the log of the robot says that somebody else
+        published its start again. Wait while the journal cannot be read."""
         if (closed := self._runs.closed.get(run)) is not None:
             return closed
         while True:

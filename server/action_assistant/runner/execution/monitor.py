@@ -128,8 +128,8 @@ class Monitor:
     # --- what is sent -------------------------------------------------------------------------
 
     def starts(self, umrf: str, process: EngineProcess | None) -> None:
-        """Note that this graph is sent now, to this process; from now on the engine's log may
-        report a refusal."""
+        """Note that the runner sends the start of this graph (UMRF text) now, to this process. From
+        now on a refusal in the engine's log may belong to it."""
         self._start.begins()
         self._threads.starts(process)
         self.sends(umrf)

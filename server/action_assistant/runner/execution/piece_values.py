@@ -52,8 +52,8 @@ class PieceValues:
         return self._texts[step.node].taken_on_false and bool(self._kept(step))
 
     def why_unknown(self, step: Step) -> str:
-        """Return why the values that a step hands on are not known, as part of a sentence; "" if they
-        are known, or nobody takes them."""
+        """Return why the output values of a step are not known, as part of a sentence. Return "" if
+        they are known, or if no other step takes them."""
         if step.run is None or not self._kept(step):
             return ""
         return step.run.kept.wrong if self._texts[step.node].is_taken else ""

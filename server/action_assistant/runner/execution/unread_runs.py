@@ -76,7 +76,8 @@ class UnreadRun:
         return self._leading
 
     def leads(self, leading: Leading) -> None:
-        """Name the run. Call this before its pieces are followed."""
+        """Set `leading`, through which events of the run are shown and recorded. Call this before
+        `follow`."""
         self._leading = leading
 
     def follow(self, piece: Run, seq: int, robots: Robots, *, is_whole: bool) -> None:
@@ -142,7 +143,8 @@ class UnreadRun:
             piece.stop(author, "")
 
     async def stop(self, graph_name: str) -> None:
-        """Stop all pieces; each gets a Stop that is repeated until it is proven."""
+        """Begin to stop all pieces, and return at once. Stop messages are then sent for each piece
+        until it is proven at rest."""
         self.close(self._stopped_by)
 
     async def get(self) -> Answer:

@@ -51,7 +51,8 @@ class GraphOutline(msgspec.Struct, frozen=True):
 
 
 def graph_outline(graph: Graph | GraphOutline) -> GraphOutline:
-    """Return the outline of a graph."""
+    """Return the name of a graph and the keys of its actions, by full name; return an outline
+    unchanged."""
     if isinstance(graph, GraphOutline):
         return graph
     named = {each.full_name: each.key for each in graph.actions if not each.missing}

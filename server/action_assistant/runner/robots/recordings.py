@@ -91,7 +91,8 @@ class Recordings:
         self._waiting.append((robot, answer.at, msgspec.json.encode(line)))
 
     def record_feedback(self, robot: str, feedback: Feedback) -> None:
-        """Record feedback; a message without snapshots is left out."""
+        """Add feedback of a robot to what waits to be stored; ignore a message without
+        snapshots."""
         if feedback.snapshots:
             at = feedback.snapshots[-1].at
             line = FeedbackLine(at, feedback.actor, feedback.snapshots)

@@ -482,8 +482,8 @@ def draft_of(event: StoredKind, author: str = "") -> Draft:
 
 
 def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:
-    """Decode stored events of one stream; one without a kind is of the kind `usual`. Raise
-    msgspec.DecodeError if a body does not match its kind."""
+    """Decode stored events of one stream. `usual`: the kind of events that are stored without one.
+    Raise msgspec.DecodeError if a body does not match its kind."""
     read = _DECODERS[usual].decode
     try:
         return [read(body) if kind is None else decode(kind, body) for body, kind, _ in events]

@@ -193,10 +193,11 @@ def decoded(body: bytes, kind: type[T]) -> T:
 
 
 def admit(request: StartRequest, facts: EngineFacts, *, approved: bool = True) -> Admitted:
-    """Check text, digest, size and problems of a start. Each refusal of the graph itself, except
-    for its size, is a problem that checks also show elsewhere. Unless the graph is `approved`,
-    its digest may be missing. Raise BadInput, NotUmrf, TooLarge or Conflict if the start is
-    refused."""
+    """Check the graphs of a start request, and return them as read. If the start is not `approved`,
+    its digests may be missing. Raise NotUmrf if a text is no UMRF graph, Conflict if a digest
+    differs or a problem forbids the start, TooLarge if the graphs are too large, BadInput for
+    another fault of the request. Except for its size, a graph is refused only for problems that its
+    checks show too."""
     text, reading = read_sent(bytes(request.umrf))
     stamp = codec.stamp_of(text)
     found = digest(reading.graph)

@@ -577,8 +577,9 @@ def _value_items(view: EngineView, handing: Sequence[Obstacle]) -> tuple[Item, .
 
 
 def _library_items(view: EngineView, graph: Graph, prefixes: Sequence[Path]) -> tuple[Item, ...]:
-    """Return the item about action libraries that are older than their sources, if the workspace on
-    this computer has any."""
+    """Return the item about action libraries of the graph that are older than their sources in the
+    workspace on this computer; an empty tuple if none is. `prefixes`: the folders of
+    AMENT_PREFIX_PATH, the nearest first."""
     older = older_libraries(graph, prefixes)
     if not older:
         return ()

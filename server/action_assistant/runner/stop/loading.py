@@ -143,8 +143,9 @@ class LoadingWatch:
                 self._read[graph] = found
 
     def actions(self, shown: Sequence[Snapshot]) -> tuple[LoadingAction, ...]:
-        """Return the actions that may be loading, in a graph and its sub-graphs, none of which
-        moves. In a graph that was not read, these are all actions that have not begun."""
+        """Return the actions that may be loading. `shown`: snapshots of a graph and its sub-graphs,
+        without an active action. If the arrows of a graph are not known, each of its actions that
+        has not begun may be loading."""
         held = {each.graph for each in shown}
         found: list[LoadingAction] = []
         for each in shown:

@@ -80,9 +80,10 @@ class RestProof:
         return asked - self._since >= _long_enough(shown)
 
     def missing(self, parts: Sequence[Snapshot], asked: float) -> bool:
-        """Process one more answer that shows only sub-graphs (`parts`) of a graph, not the graph
-        itself; return whether that has lasted for long enough. An engine does not show a graph
-        at once after its start."""
+        """Process one more answer that lacks a graph but shows its sub-graphs (`parts`). `asked`:
+        the time of the request, in seconds. Return whether the graph has been missing, without an
+        active action in `parts`, for long enough to be proven at rest: an engine does not show a
+        graph at once after its start."""
         if any(each.active for each in parts):
             self._since = None
             return False

@@ -59,8 +59,8 @@ class StopLoop:
         return StopRequested(self._clock_us(), author, stop_id) if is_new else None
 
     def notice(self, run: Run) -> None:
-        """Take over the run as it is now. Send again soon, if the last message could not help but
-        the next one may."""
+        """Note the present state of the run. If the last stop message was in vain and the next one
+        may be of use, have it sent soon."""
         self._run = run
         if self._vain and not _is_vain(run):
             self._news.set()

@@ -69,8 +69,8 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
         return True
 
     def source(self, name: str) -> str:
-        """Return the Python text of an action's behaviour. Raise Unusable if its file cannot be
-        read or is no regular file."""
+        """Return the Python text of an action's behaviour. Raise Unusable if no behaviour can have
+        this name, or if its file cannot be read or is no regular file."""
         file = file_of(name)
         if file is None:
             raise Unusable(f"“{name}” is no name that a behaviour can have.")
@@ -117,8 +117,8 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
 
 
 def file_of(name: str) -> str | None:
-    """Return the file name for an action of this name; None for a name that no action package can
-    have."""
+    """Return the name of the Python file with the behaviour of an action. Return None if no action
+    of an action package can have this name."""
     return None if check_name(name) else f"{snake_case(name)}.py"
 
 

@@ -105,7 +105,8 @@ class Ros2Link:
     # --- commands -----------------------------------------------------------------------------
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start message. Raise NotSent if the message has certainly not left."""
+        """Publish one start message, and call `leaves` right before it leaves. Raise NotSent if the
+        message has certainly not left."""
         domain = self._reachable("start", self._topics.start)
         message = UmrfGraphStart(
             umrf_graph_name=order.graph.name,

@@ -48,7 +48,7 @@ def two_servers(place: str, count: int) -> str:
 
 
 def belonging(servers: tuple[Endpoint, ...], ends: tuple[Endpoint, ...]) -> tuple[Endpoint, ...]:
-    """Return those of `ends` that belong to the processes of these servers."""
+    """Return those of `ends` whose process is also the process of one of the `servers`."""
     processes = {each.process for each in servers}
     return tuple(each for each in ends if each.process in processes)
 
