@@ -95,8 +95,8 @@ def open_to_others(data: Path) -> list[Path]:
 
 
 def holds_nothing_else(data: Path) -> bool:
-    """Return whether the data folder holds only our files. Otherwise its rights are left to its
-    owner."""
+    """Return whether the data folder holds only our files. If it holds others, the permissions of
+    the folder are left as they are."""
     return all(_OURS.fullmatch(entry.name) for entry in data.iterdir())
 
 

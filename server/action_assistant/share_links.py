@@ -122,7 +122,8 @@ def _drawn(link: str) -> str:
 
 
 def _opener(trust: ssl.SSLContext | None) -> urllib.request.OpenerDirector:
-    """Return an opener for our own processes that uses no proxy, which would see the token."""
+    """Return an opener for the URLs of our own processes. It uses no proxy, since a proxy would see
+    the token."""
     return urllib.request.build_opener(
         urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=trust)
     )

@@ -111,7 +111,8 @@ def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "http
 
 
 def sentence(answer: "httpx.Response") -> str:
-    """Return the text of a refusal, with its place."""
+    """Return title and detail of a refusal in one line, with the place in the request if it names
+    one. If the body is no such refusal, return the URL and the status code."""
     try:
         problem = answer.json()
         place = (problem.get("where") or {}).get("path", "")

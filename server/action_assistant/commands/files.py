@@ -173,8 +173,9 @@ def _verdict(
 
 
 def _as_sub_graph(problem: Problem) -> Problem:
-    """Make H7 a warning: the file may be a sub-graph that gets its values from outside, though
-    starting it by itself is refused."""
+    """Make the problem H7 (an entry action lacks a required value) a warning, and return others as
+    they are: the file may be a sub-graph that gets its values from outside, though starting it by
+    itself is refused."""
     if problem.code != "H7":
         return problem
     message = problem.message.removesuffix(" (As a sub-graph it may get one.)")
@@ -183,7 +184,9 @@ def _as_sub_graph(problem: Problem) -> Problem:
 
 
 def _given(paths: Sequence[Path]) -> dict[str, Graph]:
-    """Return the graphs of several files by name, since one may be a sub-graph of another."""
+    """Return the graphs of several files by graph name, since one may be a sub-graph of another.
+    Files that cannot be read as a graph are skipped; of several graphs of one name, the first
+    counts. Raise CannotStart if a file cannot be opened."""
     found: dict[str, Graph] = {}
     for path in paths:
         try:

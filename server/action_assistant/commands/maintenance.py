@@ -164,8 +164,9 @@ def _strange(journal: "_KnownJournal") -> list[str]:
 
 
 async def _head(journal: Journal, branch: Branch, position: int, data: Path) -> heads.LogHead:
-    """Return the head of a whole log after the event at this position. Raise OSError or Refused if
-    an archive cannot be read."""
+    """Return the head of the log of a branch after the event at `position`: a digest of the heads
+    of all its streams then, also of archived ones. Raise OSError or Refused if an archive cannot be
+    read."""
     from action_assistant.runner.archives import archive_file
 
     folder = settings.keep(data).folder

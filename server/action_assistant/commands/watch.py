@@ -336,8 +336,8 @@ class QuietSocket(HttpxWebsocket):
             self._end(error)
 
     async def recv(self) -> bytes:
-        """Return the next message, and keep the error that ends the connection, which the provider
-        drops."""
+        """Return the next message, after the graph has heard it. An error is stored as the end of
+        the connection before it is raised, since the provider that calls this drops it."""
         try:
             message: bytes = await super().recv()
             self._graph.hear(message)

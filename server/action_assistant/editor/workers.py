@@ -54,6 +54,7 @@ class EditorWorkers:
 
 
 def encoded(kind: type[T], answer: bytes) -> T:
-    """Return JSON that a worker wrote of a value of this kind, for a route that answers such a value: it is sent
-    as it is, so that the event loop neither decodes nor encodes it. Only the type checker takes it for a `kind`."""
+    """Return the JSON that a worker wrote for a value of the type `kind`, so that a route can send
+    it unchanged: the event loop neither decodes nor encodes it. The result has the type `kind` for
+    the type checker only."""
     return cast("T", msgspec.Raw(answer))

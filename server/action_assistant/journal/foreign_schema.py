@@ -119,8 +119,8 @@ def _may_go(found: SchemaObject, ours: Iterable[SchemaObject]) -> bool:
 
 
 def _revision(connection: sqlite3.Connection, branch: Branch) -> str | None:
-    """Return the stored revision of a journal, or the newest if it has none; None if this version
-    does not know it."""
+    """Return the schema revision that a journal states; the newest one if it states none; None if
+    this version of the program does not know the revision."""
     found: set[object] = set()
     # A view of this name could go on for ever.
     kind = connection.execute("SELECT type FROM sqlite_master WHERE name = ?", [VERSIONS.name])

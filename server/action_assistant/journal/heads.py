@@ -34,8 +34,9 @@ class LogHead(msgspec.Struct, frozen=True):
 async def head_at(
     journal: JournalReader, branch: Branch, position: int, read_kept: ReadKept
 ) -> LogHead:
-    """Return the head of a whole log after the event at this position. Raise OSError or Refused if
-    an archive cannot be read."""
+    """Return the head of the log of a branch after the event at `position`: a digest of the heads
+    of all its streams then. Streams that were archived since are read by `read_kept`. Raise OSError
+    or Refused if an archive cannot be read."""
     return LogHead(
         position, digest_of(branch, position, await heads_at(journal, position, read_kept))
     )

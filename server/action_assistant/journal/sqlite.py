@@ -347,8 +347,8 @@ class Sqlite:
 
 
 def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
-    """Return an engine that uses SQLite's own transactions, also for schema changes, with the write
-    lock taken at BEGIN."""
+    """Return an engine that uses SQLite's own transactions, also for schema changes. They take the
+    write lock at BEGIN, and wait for it for up to `wait` seconds."""
     engine = create_engine(
         f"sqlite:///{path}", poolclass=NullPool, connect_args={"timeout": wait}, **options
     )

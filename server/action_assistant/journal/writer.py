@@ -310,7 +310,8 @@ class Writer:
         return [(None, Unavailable(text), [])] * jobs
 
     def _stored(self, event: Event, chain: bytes) -> bool | None:
-        """Return whether an event is in the log; None if the database cannot be asked in time."""
+        """Return whether an event is in the log, at its position and with the chain hash `chain`.
+        Return None if the database does not answer in time."""
         table = editor_tables.editor_event
         found = select(table.c.chain).where(table.c.position == event.position)
         until = time.monotonic() + self._database.patience

@@ -24,7 +24,8 @@ NAMES: Final = {
 
 
 def log_tables(metadata: MetaData) -> tuple[Table, Table, Table]:
-    """Return the tables `event`, `head` and `snapshot` of a database."""
+    """Define the tables `event`, `head` and `snapshot` of an event log in `metadata`, and return
+    them."""
     event = Table(
         "event",
         metadata,

@@ -70,8 +70,8 @@ def _action(action: Action, reached: set[str]) -> Action:
 def _parameters(
     parameters: tuple[Parameter, ...], reached: set[str] | None
 ) -> tuple[Parameter, ...]:
-    """Return parameters as the engine prints them. `reached` inputs (None: all) lose their
-    value."""
+    """Return parameters as the engine prints them. Parameters whose flat name is in `reached`
+    (None: all) lose their value, since an output of a parent may set it."""
     found: dict[str, Parameter] = {}
     for parameter in parameters:
         leaf = parse_small(parameter.text)

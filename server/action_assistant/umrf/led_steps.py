@@ -90,7 +90,8 @@ def _neighbours(graph: Graph, own: set[Key]) -> Iterator[set[Key]]:
 
 
 def _helps(graph: Graph, chosen: frozenset[Key], code: str, facts: EngineFacts) -> bool:
-    """Return whether a sub-graph of these actions does the same and has not this problem."""
+    """Return whether the graph does the same with the actions `chosen` in a sub-graph, and the
+    action that stands for them has no problem with this code."""
     found = extracted(graph, chosen, _NAME, _KEY, budget=_BUDGET)
     if not isinstance(found, Extracted) or found.differences:
         return False

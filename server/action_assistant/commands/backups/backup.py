@@ -319,7 +319,8 @@ def _taken_away(command: str | None, path: Path) -> OffSite | None:
 
 
 def _first(plan: RegularBackups, every: float) -> float:
-    """Return when the first backup is due: now, unless a recent one exists."""
+    """Return when the first backup is due, in seconds since 1970: `every` seconds after the last
+    backup if that still exists in the folder of the plan, else now; never a time in the past."""
     state = backup_state.backup_state(plan.data)
     last = state.last if state is not None else None
     if last is None or Path(last.file).parent != plan.into or not Path(last.file).exists():

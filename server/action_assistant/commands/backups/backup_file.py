@@ -223,8 +223,9 @@ class Package:
         )
 
     def _parts(self) -> dict[str, tuple[zipfile.ZipInfo, str]]:
-        """Return the zip entry and the SHA-256 of every file of the backup, by name. Raise
-        CannotStart if a part is missing or has an impossible name."""
+        """Return the zip entry of every file of the backup, and the SHA-256 that the backup states
+        for it, by name. Raise CannotStart if a file is missing, has an impossible name, or has not
+        the size that is stated."""
         sizes = {f"{branch}.db": each.bytes for branch, each in self.about.journals.items()}
         digests = {f"{branch}.db": each.sha256 for branch, each in self.about.journals.items()}
         for name, held in self.about.files.items():

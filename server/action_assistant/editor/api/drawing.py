@@ -20,7 +20,8 @@ _SCRIPT: Final = 1_000_000  # bytes of a body that says what to play
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes that read UMRF text for pasting, and that play a graph before it is run."""
+    """Return the routes that read pasted UMRF text, and that compute what a graph would do in a
+    run."""
 
     @post(
         "/api/pieces",

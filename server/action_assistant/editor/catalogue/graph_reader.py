@@ -71,7 +71,8 @@ class GraphReader:
 
     async def _loaded(self, graph: str, seq: int) -> GraphAtSeq:
         """Load the graph after its change `seq` from the log. If that state cannot be read, return
-        the state after the last earlier change that can be read."""
+        the state after the last earlier change that can be read. Raise Unavailable if the log
+        cannot be read."""
         found = await stored(
             self._journal, graph_stream(graph), seq, learn=False, run_in_worker=self._run_in_worker
         )

@@ -98,7 +98,8 @@ def check_unchanged(doc: "Doc[Any]", known: Mapping[int, int], error: Malformed)
 
 
 def clocks(state: bytes) -> dict[int, int]:
-    """Decode a state vector: the next clock of each client."""
+    """Decode a Yjs state vector: the next clock of each client. Raise Malformed if it is cut
+    off."""
     reader = ByteReader(state)
     return {reader.number(): reader.number() for _ in range(reader.number())}
 

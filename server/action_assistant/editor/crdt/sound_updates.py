@@ -97,7 +97,7 @@ def _starts(bodies: Sequence[bytes]) -> list[int]:
 
 
 def check_nothing_is_missing(known: Mapping[int, int], ends: Mapping[int, int]) -> None:
-    """Raise Uncertain if a document lacks structs of its updates. `known`: the next clock of each
-    client in the document; `ends`: the expected one."""
+    """Raise Uncertain if a document lacks Yjs structs that its updates contain. `known`: the next
+    clock of each client in the document; `ends`: the one that the updates lead to."""
     if any(known.get(client, 0) < end for client, end in ends.items()):
         raise Uncertain

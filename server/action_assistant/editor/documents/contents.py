@@ -248,8 +248,8 @@ def shown(state: bytes) -> Fingerprint:
 
 
 def labels_of(graph: Graph) -> tuple[str, ...]:
-    """Return the labels of a graph, by which people sort graphs: `labels` in its `gui_attributes`, which no
-    engine reads."""
+    """Return the labels by which people group graphs: the texts in `labels` of the graph's
+    `gui_attributes`, without blanks around them and each once. No engine reads them."""
     attributes = parse_small(dict(graph.extra).get("gui_attributes", "null"))
     labels = attributes.get("labels") if isinstance(attributes, dict) else None
     texts = [text for text in labels if isinstance(text, str)] if isinstance(labels, list) else []

@@ -128,8 +128,8 @@ class ChangeIndex:
             await anyio.sleep(_PERIOD)
 
     async def _behind(self) -> dict[str, tuple[int, int]]:
-        """Return the graphs whose newest events are not in the index: the newest seq, and the
-        number of missing events."""
+        """Return the graphs whose newest events are not in the index, each with its newest seq and
+        the number of missing events. Return none if the journal cannot be read."""
         stream, newest = editor_head.c.stream, editor_head.c.seq
         indexed = func.coalesce(_head.seq, 0)
         same = stream == graph_stream("") + _head.graph

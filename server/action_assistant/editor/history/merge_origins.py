@@ -66,8 +66,8 @@ async def bring_up(index: ChangeIndex, graph: str, seq: int | None = None) -> in
 
 
 def sources(connection: Connection, graph: str) -> list[tuple[str, int]]:
-    """Return the graphs from which changes were merged or drafted, each with its last change at
-    that time."""
+    """Return the graphs from which changes came into this graph, by a merge or when it was made as
+    a draft, each with the number of its last change that came."""
     return sorted({(graft.source, graft.upto) for graft in grafts_of(connection, graph).values()})
 
 

@@ -49,7 +49,7 @@ def difference(state: bytes, edit: Callable[[Doc[Any]], None]) -> bytes:
 
 
 def first(graph: Graph) -> bytes:
-    """Return the update that makes the document of a graph."""
+    """Return the Yjs update that makes the document of a graph from an empty one."""
     return difference(b"", lambda doc: document.fill(doc, graph))
 
 

@@ -132,9 +132,9 @@ def updating(sight: GraphAtSeq, graph: GraphAtSeq, renames: Renames) -> bytes:
 
 
 def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
-    """Return the update of the library's document that gives an action the parameters of its use in
-    `graph`: of the action `aid`, or of the first use that differs. The library keeps its values.
-    Raise NotFound if the graph has no such use."""
+    """Return the update of a library document (`sight`) that gives its action the parameters of a
+    use in `graph`: of the use with the key `aid`, or, if `aid` is None, of the first use that
+    differs. Values in the library stay. Raise NotFound if the graph has no such use."""
     action = _action_of(sight)
     found = [
         use

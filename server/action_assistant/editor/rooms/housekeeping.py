@@ -64,7 +64,8 @@ class RoomSnapshots:
             await self._store(seq, self._state(seq, replica))
 
     def _state(self, seq: int, replica: Replica) -> bytes:
-        """Return the bytes of a snapshot of the document now, with the updates that wait for earlier ones."""
+        """Return a snapshot of the document as it is now, in bytes, with the updates that wait for
+        earlier ones. Note `seq` as the change up to which a snapshot is stored."""
         self._kept, self._unkept = seq, 0
         return ReplicaState.of(replica)
 

@@ -165,9 +165,9 @@ class _LedGraph:
         runs: Container[Key],
         concurrency: Concurrency,
     ) -> None:
-        """Report each action that may run at the same time as later ones of its actor. If too many
-        pairs of actions may run at once to be known, only the first action of each actor is
-        reported."""
+        """Report each action that may run at the same time as later ones of its actor. `runs`: the
+        keys of the actions that can run. If the graph is too large for `concurrency` to follow it,
+        report only the first action of each actor."""
         place = {action.key: number for number, action in enumerate(subject.real)}
         members: dict[str, list[Key]] = {}
         for action in subject.real:

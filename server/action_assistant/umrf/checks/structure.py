@@ -287,8 +287,9 @@ def refusal_of(value: Json) -> str | None:
 
 
 def _misfit(what: str, none: str, kind: str) -> str:
-    """Return the reason for which a value does not fit its type. The engine reads no value of a
-    type that it does not know."""
+    """Return, as part of a sentence, the reason for which one or several values (`what`) do not fit
+    the type `kind`. `none`: the words before a type of the engine, as “that is no”. The engine
+    reads no value of any other type."""
     if kind in NATIVE:
         return f"{what} {none} {kind}"
     if not kind:

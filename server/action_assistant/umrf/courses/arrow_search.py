@@ -256,8 +256,9 @@ class _Visit(NamedTuple):
 
 
 def _behaviours(visits: Sequence[_Visit], last: int) -> Iterator[Behaviour]:
-    """Yield one behaviour for each run of an action. A run without an end in the search ends with
-    on_true after the step `last`."""
+    """Yield one behaviour for each visit of an action, then the default one for all further visits.
+    A visit whose end the search did not reach ends after the step `last`, with on_true unless it is
+    stopped."""
     for visit in visits:
         if visit.stopped >= 0:
             ended = visit.ended if visit.ended >= 0 else last + 1

@@ -117,8 +117,9 @@ class _Reader:
     # The graph
 
     def read(self, file: dict[str, Json]) -> Tree:
-        """Read the file, and return the graph with the problems, run states and notes about the
-        file."""
+        """Read the file, and return its graph, the problems in it, the states of the graph and its
+        actions, and notes about the file. Never fails: a value that does not fit is kept or
+        reported."""
         extra: Extra = []
         if "graph_name" not in file:
             self.report("graph-name-missing", "", "The graph has no name; the engine refuses it.")

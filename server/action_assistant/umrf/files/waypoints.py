@@ -33,7 +33,8 @@ def waypoints_json(graph: Graph) -> list[Json]:
 
 
 def with_waypoints(graph: Graph, items: Json) -> Graph:
-    """Return the graph with the waypoints of a file. Those that fit no relation are left out."""
+    """Return the graph with the waypoints of its arrows, as its file lists them in `items`.
+    Waypoints that fit no relation are left out, and so is everything if `items` is no list."""
     if not isinstance(items, list):
         return graph
     by_name: dict[_Name, dict[str, JsonText]] = defaultdict(dict)

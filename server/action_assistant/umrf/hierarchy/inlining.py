@@ -320,7 +320,8 @@ def _instead(arrow: JoinedArrow, order: Callable[[Relation], _Order]) -> _Order:
 
 
 def _ranked(arrows: Iterable[_Arrow]) -> Iterator[Relation]:
-    """Yield the relations with new order numbers 0, 1, 2 … at parent and child."""
+    """Yield the relations with new order numbers 0, 1, 2 …: among the relations of their parent in
+    the order of `by_parent`, among those of their child in the order of `by_child`."""
     listed = list(arrows)
     by_parent: dict[Key, list[_Arrow]] = {}
     by_child: dict[Key, list[_Arrow]] = {}

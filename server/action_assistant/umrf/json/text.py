@@ -164,7 +164,7 @@ class _Hooks:
 
 
 def _without_strings(text: str) -> str:
-    """Return the text with its strings replaced by blanks, so that offsets stay."""
+    """Return JSON text with every string replaced by as many blanks, so that offsets stay valid."""
     return _STRING.sub(lambda found: " " * len(found[0]), text)
 
 
@@ -212,7 +212,8 @@ def _too_deep(text: str) -> Unreadable:
 
 
 def _walk(value: Json, path: str = "") -> Iterator[tuple[str, Json]]:
-    """Yield every value with its pointer, outer values first."""
+    """Yield every value in a JSON value, with its JSON pointer below `path`; a value comes before
+    its members."""
     yield path, value
     match value:
         case dict():

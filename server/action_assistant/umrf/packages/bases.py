@@ -65,7 +65,8 @@ class _StoredBase(msgspec.Struct, frozen=True, omit_defaults=True, forbid_unknow
 
 
 def digest(content: bytes) -> str:
-    """Return the hash by which an unfinished file is recognised."""
+    """Return the SHA-256 of a file's content in hexadecimal, by which a later call recognises a
+    file that an interrupted call has written."""
     return hashlib.sha256(content).hexdigest()
 
 

@@ -176,7 +176,8 @@ def check_names(names: Iterable[str]) -> tuple[NameRefusal, ...]:
 
 
 def check_package(package: str) -> tuple[NameRefusal, ...]:
-    """Return the reason against a package of this name; empty if it is possible."""
+    """Return the refusal of a package name, as the only member of a tuple; return an empty tuple if
+    a package can have this name."""
     reason = next(_against_package(package), None)
     return () if reason is None else (NameRefusal(package, reason),)
 

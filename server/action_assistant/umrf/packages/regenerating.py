@@ -95,10 +95,11 @@ class _RegenerationBuilder:
 def regenerated(
     package: str, now: Mapping[str, bytes], there: Mapping[str, bytes], base: GenerationBase | None
 ) -> Regeneration:
-    """Return the changes of a package.
+    """Return how a new generation changes a package: the three-way merge of its files. Nothing is
+    written.
 
     `now`: the result of `package_files`; `there`: the contents of the package at these paths and at
-    those that the base names.
+    those that the base names; `base`: the texts of the last generation, None if there are none.
     """
     # Anybody may have written the base file, so paths that we never generate are ignored.
     settled = (base or GenerationBase()).settled(there)

@@ -61,7 +61,7 @@ class Performer(Protocol):
         """Begin to carry out a call."""
 
     def stop(self, number: int) -> None:
-        """Ask a call to end soon."""
+        """Ask the call with this number to end soon."""
 
     def pause(self, number: int) -> None:
         """Ask a call to pause."""

@@ -181,7 +181,8 @@ def backups_shown(state: BackupState | None) -> BackupsShown | None:
 
 
 def backup_families(state: BackupState | None) -> Iterator[Family]:
-    """Yield the metrics of backups; a metric whose event never happened is left out."""
+    """Yield the metrics of backups. Metrics of events that never happened are left out; without a
+    state these are all."""
     if state is None:
         return
     if (last := state.last) is not None:

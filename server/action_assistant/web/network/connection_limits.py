@@ -27,7 +27,7 @@ class ConcurrencyLimit:
 
     @asynccontextmanager
     async def turn(self, person: str) -> AsyncIterator[None]:
-        """Wait for one of the person's turns, and hold it inside the block."""
+        """Wait until fewer blocks than the limit run for this person, then run the block."""
         turn, waiting = self._turns.get(person, (anyio.Semaphore(self._most), 0))
         self._turns[person] = turn, waiting + 1
         try:

@@ -94,7 +94,8 @@ class MessageReceiver(Protocol):
     """Receives the messages of a socket. Called on the event loop; must not raise."""
 
     def heard(self, message: bytes | None) -> None:
-        """Handle a message; None stands for a text message."""
+        """Handle a binary message; None stands for a text message, whose content is not passed
+        on."""
 
     def may_write(self) -> None:
         """Resume sending, since enough of the written data was sent."""

@@ -44,8 +44,8 @@ def bound(host: str, port: int) -> list[socket.socket]:
 
 
 def _forget_silent_peers(listener: socket.socket) -> None:
-    """Have the kernel drop connections to peers that vanished or read nothing, whose data would
-    wait for ever. Accepted connections inherit this."""
+    """Have the kernel drop a connection whose peer has vanished or reads nothing, since data for it
+    would wait for ever. The connections that the listener accepts inherit this."""
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     options = {"TCP_USER_TIMEOUT": UNHEARD * 1000, "TCP_KEEPIDLE": UNHEARD, "TCP_KEEPINTVL": 5}
     for name, value in options.items():

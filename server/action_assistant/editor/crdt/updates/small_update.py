@@ -99,8 +99,10 @@ def _number(update: bytes, at: int) -> tuple[int, int]:
 def _beside(
     update: bytes, at: int, info: int, needs: dict[int, int]
 ) -> tuple[tuple[int, int], int]:
-    """Read the origins of a struct. Return its left neighbour (or the right one if it has no left
-    one), and the offset after them."""
+    """Read the neighbours of a struct at the offset `at`; the bits of `info` say which of them are
+    written, at least one. Return the left neighbour (or else the right one) as client and clock,
+    and the offset after both. Raise the clocks in `needs` to include both, and raise _NotSmall if a
+    number is too large."""
     beside: tuple[int, int] | None = None
     for side in (0x80, 0x40):
         if info & side:

@@ -95,8 +95,8 @@ def _packed(update: bytes, of: dict[int, _Structs], size: int) -> Iterator[bytes
 
 
 def _in_order(of: dict[int, _Structs]) -> Iterator[int]:
-    """Yield the client of each struct, every struct after those it needs. Raise Malformed for a
-    cycle."""
+    """Yield one client for each struct: it stands for the next struct of this client. Every struct
+    comes after those that it needs. Raise Malformed if structs need each other in a circle."""
     for first in of:
         wanted = [(first, of[first].ends[-1])]  # clients, each up to a clock; the last one first
         while wanted:
