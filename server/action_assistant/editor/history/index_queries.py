@@ -130,8 +130,8 @@ def at(
 
 def latest(connection: Connection, graph: str, seq: int, of: Collection[str]) -> list[LoggedChange]:
     """Return the last change of each key up to the change `seq`, also of keys that no longer exist.
-    Only keys that belong to the owners `of` count: an owner is an action, a relation, a note, a
-    thread or the graph."""
+    Only keys of the owners `of` count; an owner is what a key speaks of, such as an action or a
+    relation (`owner_of`)."""
     owners = sorted(of)
     found: list[LoggedChange] = []
     for start in range(0, len(owners), _OWNERS):

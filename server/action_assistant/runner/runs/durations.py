@@ -36,8 +36,8 @@ def duration_bounds(least: int, most: int | None) -> DurationBounds:
 
 
 def of_visit(visit: Visit) -> DurationBounds | None:
-    """Return the shortest and the longest time that a visit can have taken; None while no end was
-    seen."""
+    """Return the shortest and the longest time that a visit can have taken, in seconds; None while
+    no end was seen."""
     return None if visit.until is None else duration_bounds(visit.least, visit.most)
 
 
