@@ -1,5 +1,6 @@
 """Stops that leave as one message, over real rclpy: none is taken for sent that was not."""
 
+import time
 from collections.abc import Iterator
 
 import anyio
@@ -70,6 +71,19 @@ def test_stops_that_cannot_be_published_are_sent_for_nobody(node: Node) -> None:
 
     anyio.run(main)
     assert sorted(found) == ["Carol", "David"]
+
+
+@pytest.mark.parametrize("jump_s", [-3600, 3600])
+def test_a_message_is_our_own_also_after_a_jump_of_the_clock(
+    node: Node, jump_s: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    out, message = outlets(node), UmrfGraphStop(umrf_graph_name="patrol")
+    anyio.run(lambda: out.stop.send(lambda: message))
+    stamp = out.stop._sent[0].since
+    own, now_ns = time.time_ns, time.time_ns() + jump_s * 10**9
+    monkeypatch.setattr(time, "time_ns", lambda: now_ns)
+    assert out.stop.sent(message, stamp)
+    assert not out.stop.sent(message, own())  # the same, published by somebody else
 
 
 def test_a_stop_that_was_given_up_hits_no_later_run_of_that_name(node: Node) -> None:

@@ -57,10 +57,12 @@ def qos(depth: int) -> QoSProfile:
 
 
 class _SentMessage:
-    """A message of this process and the time in which it was published, in nanoseconds UTC."""
+    """A message of this process and the time in which it was published, in nanoseconds UTC. `sent_at`:
+    the same on a clock that does not jump, in seconds."""
 
     def __init__(self, message: Message) -> None:
         self.message = message
+        self.sent_at = time.monotonic()
         self.since = time.time_ns()
         self.until: int | None = None
 
@@ -91,13 +93,16 @@ class Outlet(Generic[M]):
 
     def sent(self, message: Message, stamp: int | None) -> bool:
         """Return whether a message on this topic was sent by this process: the same text, with a
-        time stamp (nanoseconds UTC) from while this process was publishing it. Called on any
-        thread."""
-        horizon = time.time_ns() - int(_ECHO_S * 1e9)
+        time stamp (nanoseconds UTC) from while this process was publishing it; without a stamp, not
+        long ago. Called on any thread."""
+        horizon = time.monotonic() - _ECHO_S
         return any(
-            mark.since >= horizon
-            and mark.message == message
-            and (stamp is None or mark.since <= stamp <= (mark.until or stamp))
+            mark.message == message
+            and (
+                mark.sent_at >= horizon
+                if stamp is None
+                else mark.since <= stamp <= (mark.until or stamp)
+            )
             for mark in tuple(self._sent)
         )
 
