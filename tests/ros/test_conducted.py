@@ -3,6 +3,7 @@
 `TEST_LED_GRAPHS` is how many random graphs are led (default 2), from the seed `TEST_LED_FROM` on.
 """
 
+import json
 import os
 import random
 import sys
@@ -28,9 +29,10 @@ from action_assistant.runner.links.port import Registration
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override, PieceEnded
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Behaviour, GraphRefused
-from ros.robots import LOSSLESS, robot
+from ros.robots import LOSSLESS, robot, started_by_others
 from runner.execution.test_conducted_courses import (
     Seen,
     as_long_as_seen,
@@ -147,7 +149,7 @@ async def led_through(scene: Led, seed: int, count: Counter[str]) -> None:
 def compared(seed: int, graph: Graph, calls: dict[str, list[Behaviour]], seen: Seen) -> str:
     """Compare a course with that of the whole graph on one engine; return what was found."""
     course = as_seen(seen.course)
-    again, _ = played(graph, calls | as_long_as_seen(course))
+    again, _ = played(graph, calls | as_long_as_seen(course, calls))
     whole, results = course_of(again)
     if any(visit[2] == "on_stopped" for visits in course.values() for visit in visits):
         return "stopped by an arrow"
@@ -175,6 +177,26 @@ def test_a_led_graph_takes_the_course_of_the_whole_graph(domains: list[int]) -> 
     sys.stdout.write(f"\nseeds {FROM} to {FROM + GRAPHS - 1}: {dict(count)}\n")
     assert failed == []
     assert count["outcomes"]
+
+
+def test_a_start_of_others_stops_every_robot_of_a_run(domains: list[int]) -> None:
+    scripts = {"*": {"*": [{"never": True}]}}
+
+    async def main() -> None:
+        async with led(domains, scripts) as (control, journal, _, _):
+            task = shared(sequence("task", 2), "A", "B")
+            robots = {"A": "Ann", "B": "Bob"}
+            asked = order(task, engine="conducted", robots=robots, lost="stop", override=ACCEPTED)
+            run = (await control.start(asked, ANN)).run.id
+            with anyio.fail_after(15):
+                while not control.open[run].run.active:  # noqa: ASYNC110
+                    await anyio.sleep(0.02)
+            theirs = json.loads(codec.write(sequence("theirs", 1)))
+            with started_by_others(domains[0], theirs, "Ann"):
+                assert await over(control, run, 20), journal.history(run)
+            assert (await control.find(run)).state == "stopped"
+
+    anyio.run(main)
 
 
 def test_a_robot_that_never_obeys_delays_no_other_robots_stop(domains: list[int]) -> None:

@@ -78,6 +78,7 @@ class Domain:
         self._clock_us = clock_us
         self._subscribers = Listeners[RosValue]()
         self._waiting = MessageQueue()
+        self._handing: set[asyncio.Task[None]] = set()
         self._leaving = False
         self._clients: dict[str, Client] = {}
         self._context = Context()
@@ -267,10 +268,17 @@ class Domain:
     def _tell(self, value: RosValue) -> None:
         """Queue a value for the event loop; called on the thread of this domain."""
         if self._waiting.add(value):
-            self._to_loop(self._hand_over)
+            self._to_loop(self._begin_to_hand_over)
 
-    def _hand_over(self) -> None:
-        """Pass the queued values to the subscribers, in order; called on the event loop."""
+    def _begin_to_hand_over(self) -> None:
+        """Begin a task that passes the queued values on; called on the event loop. Outside of a task
+        `anyio.current_time`, for one, would raise in a subscriber."""
+        task = self._loop.create_task(self._hand_over())
+        self._handing.add(task)
+        task.add_done_callback(self._handing.discard)
+
+    async def _hand_over(self) -> None:
+        """Pass the queued values to the subscribers, in order."""
         taken = self._waiting.take()
         if taken.dropped:
             log.warning("domain %d: %d messages came too fast", self.number, taken.dropped)
