@@ -88,6 +88,7 @@ CODES: Final[Mapping[str, Severity]] = {
     "shared-memory-apart": "warning",
     "shared-memory-users": "warning",
     "robot-profile": "error",
+    "robot-name": "warning",
     "robot-older": "error",
     "robot-middleware": "error",
     "robot-elsewhere": "error",

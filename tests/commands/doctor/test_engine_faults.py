@@ -1,5 +1,6 @@
 """Engines of registered robots on this computer, by their real command lines."""
 
+import sqlite3
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -7,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from action_assistant.commands.doctor.doctor import engines_index_once
+from action_assistant.commands.doctor.doctor import engines_index_once, robots_have_names
 from action_assistant.commands.doctor.installation import Installation
 
 
@@ -47,3 +48,13 @@ def test_an_engine_of_ours_that_indexes_while_it_runs_is_named(
 
 def test_without_an_engine_nothing_is_told(data: Path) -> None:
     assert told(data) == []
+
+
+def test_a_robot_with_the_name_of_led_runs_is_named(data: Path) -> None:
+    place = Installation(data=data, port=9)
+    assert list(robots_have_names(place)) == []
+    with sqlite3.connect(data / "runner.db") as database:
+        database.execute("update robot set name = 'conducted'")
+    assert [(each.code, each.where) for each in robots_have_names(place)] == [
+        ("robot-name", "conducted")
+    ]

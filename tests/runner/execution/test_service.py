@@ -22,6 +22,7 @@ from runner.harness import (
     until,
     virtual,
 )
+from runner.registered_robots import group
 
 
 @virtual
@@ -144,6 +145,23 @@ async def test_a_field_that_means_nothing_for_the_engine_is_refused_with_its_pla
             await control.start(order(sequence(), engine=name, **given), ANN)
         assert refused.value.where == {"path": f"/{list(given)[-1]}"}
         assert not control.open
+
+
+@virtual
+async def test_a_robot_registered_before_its_name_stood_for_led_runs_goes_on() -> None:
+    robot = Robot(engine())
+    async with Harness({"conducted": robot}).runner() as control:
+        asked = order(sequence(), engine="conducted")
+        plain = (await control.start(asked, ANN)).run
+        await until(lambda: plain.id not in control.open)
+        ended = await control.find(plain.id)
+        assert (ended.state, ended.led, len(robot.starts)) == ("finished", None, 1)
+        assert (await control.start(asked, ANN)).run.id == plain.id
+        look = await control.look(group(sequence(), "conducted"))
+        assert [each.engine for each in look] == ["conducted"]
+        led = order(sequence(), engine="conducted", robots={"": "simulator"})
+        assert (await control.start(led, ANN)).run.led is not None
+        assert len(robot.starts) == 1
 
 
 @virtual

@@ -40,7 +40,7 @@ from action_assistant.runner.links.engine_process import (
     indexing_rate,
     is_engine_node,
 )
-from action_assistant.runner.links.port import Registration
+from action_assistant.runner.links.port import CONDUCTED, Registration
 from action_assistant.runner.links.ros2.checkup import look
 from action_assistant.runner.runs import queries
 from action_assistant.safe_text import one_line
@@ -192,7 +192,9 @@ def _doctor(options: argparse.Namespace) -> int:
 
 def _looked_at(place: Installation, only: str | None) -> Iterator[Diagnostic]:
     # Robots are asked from the start: that waits for the network, the rest for disks.
-    asked: list[Check] = [] if only == "machine" else [robots_answer, engines_index_once]
+    asked: list[Check] = (
+        [] if only == "machine" else [robots_answer, engines_index_once, robots_have_names]
+    )
     robots = examine(place, asked, ROBOTS_S)
     if only != "ros":
         yield from examine(place)
@@ -250,6 +252,17 @@ def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
                 "Start it with --indexing-rate 0, and again after a change of its folder. Only where graphs "
                 "are written into its index while it runs (--index-folder) does it need another rate.",
             )
+
+
+def robots_have_names(place: Installation) -> Iterator[Diagnostic]:
+    """Warn of a robot whose name stands for led runs since it was registered."""
+    if any(each.name == CONDUCTED for each in _registered(place.data)):
+        yield found(
+            "robot-name",
+            CONDUCTED,
+            "Led runs have this name now. A start with this engine means the robot only where it names no robots.",
+            "Register it under another name, which is also its engine's --actor-name, and remove this one.",
+        )
 
 
 def _engines() -> Iterator[tuple[int, list[str]]]:

@@ -101,7 +101,7 @@ class LedStart(msgspec.Struct, frozen=True, kw_only=True):
 
 def engines_of(request: StartRequest) -> tuple[str, ...]:
     """Return the robots that a start is for, in the order of their names."""
-    named = request.robots.values() if request.engine == CONDUCTED else (request.engine,)
+    named = request.robots.values() if request.robots else (request.engine,)
     return tuple(sorted({*named} - {SIMULATOR}))
 
 
@@ -136,7 +136,7 @@ class StartChecks:
     async def accept(self, request: StartRequest, starter: str) -> AcceptedStart:
         """Take a request through all stages that may refuse it. Raise a subclass of Refused if one
         stage does."""
-        if request.engine == CONDUCTED:
+        if self.leads(request.engine, request.robots):
             return await self._accept_conducted(request, starter)
         if request.robots:
             raise BadInput("Only a conducted run has several robots.", where={"path": "/robots"})
@@ -146,6 +146,12 @@ class StartChecks:
         _require_plain(request)
         ready = await self._run_in_worker(prepared, request, robot.facts, random_id())
         return await self._accept_on(robot, request, ready, starter)
+
+    def leads(self, engine: str, robots: Mapping[str, str]) -> bool:
+        """Return whether a start on `engine` is that of a conducted run. `robots`: those that the start
+        names by actor; without any, `conducted` may be a robot that was registered before the name was
+        reserved."""
+        return engine == CONDUCTED and (bool(robots) or CONDUCTED not in self._robots.names)
 
     async def accept_all(
         self, requests: Sequence[StartRequest], starter: str
@@ -360,7 +366,7 @@ class StartChecks:
         """Return the pre-flight of a start on each engine; `starter` is the id of the person who
         would start. A refusal becomes an item of the pre-flight. Nothing is stored, and only a
         get is sent."""
-        if CONDUCTED in group.engines:
+        if any(self.leads(engine, group.robots) for engine in group.engines):
             return await self._look_conducted(group.for_engine(CONDUCTED), starter)
         found: dict[str, Preflight] = {}
         courses: list[Item] = []

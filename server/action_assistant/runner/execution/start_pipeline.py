@@ -26,7 +26,7 @@ from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.start_checks import AcceptedStart, StartChecks, engines_of
-from action_assistant.runner.links.port import CONDUCTED, SIMULATOR, GraphOutline, Order
+from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Order
 from action_assistant.runner.runs.events import Author, Led, Requested
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
@@ -88,7 +88,11 @@ class StartPipeline:
         robot then."""
         stops = self._stops.count
         requests = [group.for_engine(engine) for engine in sorted(group.engines)]
-        if not group.request_id or not {SIMULATOR, CONDUCTED}.isdisjoint(group.engines):
+        is_of_robots = not any(
+            engine == SIMULATOR or self._checks.leads(engine, group.robots)
+            for engine in group.engines
+        )
+        if not group.request_id or not is_of_robots:
             where = "/engines" if group.request_id else "/request_id"
             raise BadInput("A group has a request_id, and robots only.", where={"path": where})
         async with self._claims.once(group.request_id):
