@@ -33,14 +33,14 @@ function wordsOf(rest: RobotRest, run: Run): Pick<RestLine, "tone" | "words"> {
   const at = instant(rest.since);
   const time = at === null ? "" : ` at ${clock(at)}`;
   const since = at === null ? "" : ` since ${clock(at)}`;
-  const action = rest.action ? actionWords(run, rest.action) : "its action";
+  const step = rest.action ? actionWords(run, rest.action) : "its action";
   const why = rest.why ? `: ${sentence(rest.why)}` : "";
   const stops = rest.stops ? "; the stop is repeated" : "";
   switch (rest.state) {
     case "unused":
       return { tone: "idle", words: "nothing was begun there" };
     case "going":
-      return { tone: "run", words: `${action} goes on` };
+      return { tone: "run", words: `${step} goes on` };
     case "stopping":
       return { tone: "unknown", words: `rest not proven yet, the stop is repeated${why}` };
     case "silent":
@@ -50,11 +50,11 @@ function wordsOf(rest: RobotRest, run: Run): Pick<RestLine, "tone" | "words"> {
     case "proven":
       return { tone: "done", words: `proven at rest${time}` };
     case "seen": {
-      const who = rest.by ? `seen at rest by ${isolated(rest.by.name)}` : "seen at rest";
-      return { tone: "stopped", words: `${who}${time}, not proven${why}` };
+      const seen = rest.by ? `seen at rest by ${isolated(rest.by.name)}` : "seen at rest";
+      return { tone: "stopped", words: `${seen}${time}, not proven${why}` };
     }
     case "unsent":
-      return { tone: "idle", words: `${action} did not begin there` };
+      return { tone: "idle", words: `${step} did not begin there` };
     default:
       return { tone: "unknown", words: "not known" };
   }
