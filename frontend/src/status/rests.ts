@@ -33,7 +33,7 @@ function wordsOf(rest: RobotRest, run: Run): Pick<RestLine, "tone" | "words"> {
   const at = instant(rest.since);
   const time = at === null ? "" : ` at ${clock(at)}`;
   const since = at === null ? "" : ` since ${clock(at)}`;
-  const step = rest.action ? actionWords(run, rest.action) : "its action";
+  const step = rest.action ? isolated(actionWords(run, rest.action)) : "its action";
   const why = rest.why ? `: ${sentence(rest.why)}` : "";
   const stops = rest.stops ? "; the stop is repeated" : "";
   switch (rest.state) {
