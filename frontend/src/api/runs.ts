@@ -171,10 +171,8 @@ export type SaidOutcome = RunnerApi["WordRequest"]["outcome"];
 export function giveOutcome(
   runner: string,
   run: string,
-  action: string,
-  outcome: SaidOutcome,
-  reason: string,
+  said: RunnerApi["WordRequest"],
 ): Promise<Run> {
-  const body = { action, outcome, reason: reason.trim() };
+  const body = { ...said, reason: said.reason.trim() };
   return runnerAt(runner).post("/api/runs/{run}/outcome", { path: { run }, body });
 }

@@ -29,6 +29,8 @@ function failure(error: unknown) {
 }
 
 function OutcomeForm({ run, action }: { run: Run; action: string }) {
+  // Of the visit that is asked about: a word that arrives late counts for no later one.
+  const piece = run.actions?.[action]?.piece ?? "";
   const { live, runner, now } = useLive();
   const [outcome, choose] = useState<SaidOutcome | "">("");
   const [reason, setReason] = useState("");
@@ -36,7 +38,8 @@ function OutcomeForm({ run, action }: { run: Run; action: string }) {
   // Never kept for later: the words are about what was seen a moment ago.
   usePendingText(reason, null);
   const give = useMutation({
-    mutationFn: (said: SaidOutcome) => giveOutcome(runner ?? "", run.id, action, said, reason),
+    mutationFn: (said: SaidOutcome) =>
+      giveOutcome(runner ?? "", run.id, { action, outcome: said, reason, piece }),
     onSuccess: (fresh) => live?.learn(fresh),
     onError: (error) => notifications.show(failure(error)),
   });

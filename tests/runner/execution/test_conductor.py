@@ -325,7 +325,13 @@ async def test_the_word_of_a_person_counts_once_rest_is_seen_and_is_not_called_o
             ("Carol", "unused", None),
             ("David", "seen", BEN),
         ]
-        await control.give_outcome(run, word, BEN)
+        earlier = msgspec.structs.replace(word, piece=f"{run}.0")
+        with pytest.raises(Conflict, match="begun again") as stale:
+            await control.give_outcome(run, earlier, BEN)
+        assert stale.value.where == {"path": "/piece"}
+        await control.give_outcome(run, msgspec.structs.replace(word, piece=piece), BEN)
+        with pytest.raises(Conflict, match="known already|no outcome"):
+            await control.give_outcome(run, WordRequest("Work_0", "false", "I looked, too."), ANN)
         await until(lambda: not run_view(control.open[run].run).actions["Work_0"].asks)
         held = control.open[run].run.held
         assert held is not None

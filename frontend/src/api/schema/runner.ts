@@ -1802,13 +1802,16 @@ export interface RunnerApi {
     /**
      * WordRequest
      * @description The outcome of an action in a conducted run by the word of a person, with the reason. `action`:
-     *     its full name.
+     *     its full name; `piece`: the run of its piece that the person has seen, so that the word counts for
+     *     no later visit.
      */
     WordRequest: {
         action: string;
         /** @enum {string} */
         outcome: "error" | "false" | "true";
         reason: string;
+        /** @default  */
+        piece?: string;
     };
     /**
      * WritableGraph

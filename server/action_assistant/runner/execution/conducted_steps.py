@@ -59,11 +59,13 @@ class Leading(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Word(msgspec.Struct, frozen=True, kw_only=True):
-    """The outcome of an action by the word of a person, where no answer tells it."""
+    """The outcome of an action by the word of a person, where no answer tells it. `piece`: the run of
+    the piece that it is about; "" for the newest one."""
 
     outcome: Precondition
     by: Author
     reason: str
+    piece: str = ""
 
 
 class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):

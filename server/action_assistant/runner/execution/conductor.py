@@ -658,17 +658,19 @@ class Conductor:
 
     def give_word(self, node: str, word: Word) -> None:
         """Take the outcome of an action from a person. Raise Conflict unless its robot is proven or
-        was seen at rest and its states tell no outcome."""
+        was seen at rest, its states tell no outcome, and no other word has come before."""
         step = next((each for each in self._steps.values() if each.node == node), None)
         if step is None or step.run is None:
             raise Conflict(f"{node} waits for no outcome.", where={"path": "/action"})
+        if word.piece not in {"", step.run.id}:
+            raise Conflict(f"{node} has begun again since then.", where={"path": "/piece"})
         if step.is_open:
             raise Conflict(
                 f"{node} on {step.engine} is not known to be at rest. Look at the robot, and confirm "
                 "that first.",
                 where={"path": "/action", "run": step.run.id},
             )
-        if "ended" not in step.troubles:
+        if "ended" not in step.troubles or step.word is not None:
             raise Conflict(f"The outcome of {node} is known already.", where={"path": "/action"})
         step.word = word
         step.decided.set()

@@ -266,7 +266,9 @@ class ExecutionService:
         """Take the outcome of an action in a conducted run from a person, where nothing shows it.
         Raise NotFound if there is no such run, Conflict if it is not asked for."""
         opened = await self._movable(run)
-        word = Word(outcome=_OUTCOMES[asked.outcome], by=author, reason=asked.reason)
+        word = Word(
+            outcome=_OUTCOMES[asked.outcome], by=author, reason=asked.reason, piece=asked.piece
+        )
         self._conductors.give_word(run, asked.action, word)
         return opened.run
 

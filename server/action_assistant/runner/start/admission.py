@@ -87,11 +87,13 @@ class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 class WordRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The outcome of an action in a conducted run by the word of a person, with the reason. `action`:
-    its full name."""
+    its full name; `piece`: the run of its piece that the person has seen, so that the word counts for
+    no later visit."""
 
     action: str
     outcome: Literal["true", "false", "error"]
     reason: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
+    piece: str = ""
 
 
 class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
