@@ -197,3 +197,25 @@ def test_two_actors_of_one_robot_are_one_and_of_two_are_refused_with_their_actio
     assert obstacle.code == "subgraph-across"
     assert obstacle.aid == "k"
     assert "Carol (Work_1), David (Work_0)" in obstacle.text
+
+
+def test_levels_that_double_are_read_once_for_each_actor() -> None:
+    """Thirty levels of two hold a thousand million actions."""
+    levels = {f"L{level}": of("", "Scout", name=f"L{level + 1}") for level in range(30)}
+    levels["L30"] = of("", "Carrier")
+    top = Action(key="k", name="L0", actor="David")
+    assert actors_of(top, levels) == {"David", "Scout", "Carrier"}
+    (obstacle,) = subgraph_obstacles(
+        Graph(name="g", actions=(top,), relations=()),
+        levels,
+        {"David": "David", "Scout": "Carol", "Carrier": "Carol"},
+    )
+    assert "Carol (Work_1, Work_0), David (Work_0)." in obstacle.text
+
+
+def test_a_graph_inside_of_itself_has_the_actors_of_its_other_actions() -> None:
+    (loop, other) = of("Scout", "Carrier").actions
+    graph = Graph(
+        name="Sub", actions=(msgspec.structs.replace(loop, name="Sub"), other), relations=()
+    )
+    assert actors_of(Action(key="k", name="Sub"), {"Sub": graph}) == {"Carrier"}

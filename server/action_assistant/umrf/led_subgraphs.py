@@ -30,7 +30,7 @@ Inside: TypeAlias = Mapping[str, Graph]
 _ANY: Final[frozenset[Precondition]] = frozenset(PRECONDITIONS)
 _NONE: Final[frozenset[Precondition]] = frozenset()
 _NAMED: Final = 3  # robots, and actions of each, in one sentence
-_DEEPEST: Final = 32  # levels that are looked into
+_DEEPEST: Final = 32  # levels whose states are read
 _BUDGET: Final = 200_000  # states that are examined for a refusal
 
 
@@ -49,20 +49,24 @@ def actors_of(action: Action, inside: Inside) -> frozenset[str]:
     """Return the actors that carry out an action: its own, or those of the actions inside for which
     it stands. An action inside that names no actor is carried out by the actor of the action around
     it; "" is the actor of those around which none is named."""
-    found = frozenset(each for each, _ in _played(action, inside, "", 0))
+    found = frozenset(each for each, _ in _played(action, inside))
     return found or frozenset({action.actor})
 
 
-def _played(action: Action, inside: Inside, around: str, depth: int) -> Iterator[tuple[str, str]]:
-    """Yield the actor and the full name of each action that is code, from an action inwards."""
-    actor = action.actor or around
-    graph = inside.get(action.name)
-    if graph is None or depth >= _DEEPEST:
-        yield actor, action.full_name
-        return
-    for each in graph.actions:
-        if not each.missing:
-            yield from _played(each, inside, actor, depth + 1)
+def _played(action: Action, inside: Inside) -> Iterator[tuple[str, str]]:
+    """Yield the actor and the full name of each action that is code, from an action inwards. A graph
+    that stands at several positions is read once for each actor around it."""
+    read: set[tuple[str, str]] = set()  # graphs, each with the actor around it
+    left = [(action, "")]
+    while left:
+        each, around = left.pop()
+        actor = each.actor or around
+        graph = inside.get(each.name)
+        if graph is None:
+            yield actor, each.full_name
+        elif (each.name, actor) not in read:
+            read.add((each.name, actor))
+            left += [(child, actor) for child in reversed(graph.actions) if not child.missing]
 
 
 def performers(graph: Graph, inside: Inside) -> frozenset[str]:
@@ -123,11 +127,11 @@ def subgraph_obstacles(
 def _who(action: Action, inside: Inside, robots: Mapping[str, str]) -> str:
     """Return which robot plays which actions inside of an action, for a sentence."""
     names: dict[str, list[str]] = {}
-    for actor, name in _played(action, inside, "", 0):
-        names.setdefault(robots[actor], []).append(name)
+    for robot, name in dict.fromkeys((robots[by], name) for by, name in _played(action, inside)):
+        names.setdefault(robot, []).append(name)
     parts = [
-        f"{robot} ({', '.join(of[:_NAMED])}{' …' if len(of) > _NAMED else ''})"
-        for robot, of in sorted(names.items())
+        f"{robot} ({', '.join(own[:_NAMED])}{' …' if len(own) > _NAMED else ''})"
+        for robot, own in sorted(names.items())
     ]
     more = f" and {len(parts) - _NAMED} more" if len(parts) > _NAMED else ""
     return f"{', '.join(parts[:_NAMED])}{more}"
