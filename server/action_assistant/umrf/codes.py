@@ -171,6 +171,7 @@ CODES: Final[dict[str, Code]] = {
     "spontaneous-across": Code("hazard", _WARNING, "a spontaneous action in a graph of several actors", "a led start refuses the graph: a runner cannot stop what comes after the action at each of its ends"),
     "pause-across": Code("hazard", _WARNING, "an arrow that pauses an action, in a graph of several actors", "a led start refuses the graph"),
     "values-across": Code("hazard", _WARNING, "an arrow that hands an output to an action of the same actor, in a graph of several", "a robot that is led needs the package `zz_keep_values`"),
+    "values-unreadable": Code("hazard", _WARNING, "an arrow that hands on an output which no robot shows, in a graph of several actors", "a led start refuses the graph, also with the package `zz_keep_values`"),
     "stop-across": Code("hazard", _WARNING, "an arrow that stops an action, in a graph of several actors", "the stop is a message of the runner that leads the robots, and does not come without it"),
     "subgraph-across": Code("hazard", _WARNING, "a sub-graph whose actions several actors perform", "a runner that leads the robots sends a sub-graph to one robot and refuses this one; one graph without graphs inside can be led"),
     # The rest

@@ -270,36 +270,34 @@ def receiving(graph: Graph, arrows: Handing) -> dict[Key, frozenset[str]]:
     return {key: frozenset(names) for key, names in found.items()}
 
 
-def hindered(graph: Graph) -> Iterator[tuple[Relation, str]]:
-    """Yield each arrow whose values cannot be handed from one piece to another, with the reason as a
-    sentence."""
+def hindered(graph: Graph, arrows: Handing) -> Iterator[tuple[Relation, dict[str, str], str]]:
+    """Yield each arrow whose values cannot be handed from one piece to another, with its outputs and
+    their types, and the reason as the end of a sentence. `arrows`: all that hand values on."""
     actions = {action.key: action for action in graph.actions if not action.missing}
     stopped = {
         each.child
         for each in graph.relations
         if each.parent != ENTRY and "stop" in map(each.conditions.answer, PRECONDITIONS)
     }
-    for relation, handed in handing(graph):
-        parent, child = actions[relation.parent], actions[relation.child]
-        opaque = next((name for name, kind in handed.items() if kind not in NATIVE), None)
-        which = f"{parent.full_name} hands {named(handed)} to {child.full_name}"
+    for relation, handed in arrows:
+        opaque = next((kind for kind in handed.values() if kind not in NATIVE), None)
         if opaque is not None:
-            yield (
-                relation,
-                f"{which}: only numbers, strings, bools and lists of them can be read from a robot, "
-                f"and “{opaque}” is of the type {handed[opaque] or 'without a name'}.",
+            kind = f"of the type {opaque}" if opaque else "without a type"
+            why = (
+                "only numbers, strings, bools and lists of them can be read from a robot, and no value "
+                f"{kind}."
             )
-        elif takes(relation, ("on_stopped",)) and parent.key in stopped:
-            yield (
-                relation,
-                f"{which} after an arrow has stopped it: what a stopped action gives cannot be read.",
+        elif takes(relation, ("on_stopped",)) and relation.parent in stopped:
+            name = actions[relation.parent].full_name
+            why = (
+                f"an arrow may have stopped {name}, and what a stopped action gives cannot be read."
             )
-        elif not kept_outputs(parent):
-            yield (
-                relation,
-                f"{which}: the engine would not find the outputs of {parent.full_name} under other "
-                "names.",
-            )
+        elif not kept_outputs(actions[relation.parent]):
+            name = actions[relation.parent].full_name
+            why = f"the engine would not find the outputs of {name} under other names."
+        else:
+            continue
+        yield relation, handed, why
 
 
 def named(names: Collection[str]) -> str:

@@ -85,13 +85,8 @@ def obstacles(graph: Graph) -> tuple[Obstacle, ...]:
 def handed_by(graph: Graph, actions: Collection[Key]) -> tuple[Obstacle, ...]:
     """Return the arrows by which these actions, given by key, hand values to others: they need the
     helper package on the robot that carries them out."""
-    names = {action.key: action.full_name for action in graph.actions}
     return tuple(
-        Obstacle(
-            code="values-across",
-            text=f"{names[arrow.parent]} hands {named(handed)} to {names[arrow.child]}",
-            aid=arrow.child,
-        )
+        Obstacle(code="values-across", text=_hands(graph, arrow, handed), aid=arrow.child)
         for arrow, handed in handing(graph)
         if arrow.parent in actions
     )
@@ -99,8 +94,15 @@ def handed_by(graph: Graph, actions: Collection[Key]) -> tuple[Obstacle, ...]:
 
 def _values_across(graph: Graph) -> Iterator[Obstacle]:
     """Yield each arrow whose values no helper package can hand from one piece to another."""
-    for relation, why in hindered(graph):
-        yield Obstacle(code="values-across", text=why, aid=relation.child)
+    for arrow, handed, why in hindered(graph, tuple(handing(graph))):
+        text = f"{_hands(graph, arrow, handed)}: {why}"
+        yield Obstacle(code="values-across", text=text, aid=arrow.child)
+
+
+def _hands(graph: Graph, arrow: Relation, outputs: Collection[str]) -> str:
+    """Return in words that an arrow hands these outputs on."""
+    names = {action.key: action.full_name for action in graph.actions}
+    return f"{names[arrow.parent]} hands {named(outputs)} to {names[arrow.child]}"
 
 
 def _spontaneous(graph: Graph) -> Iterator[Obstacle]:

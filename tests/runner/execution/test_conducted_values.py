@@ -17,7 +17,13 @@ from action_assistant.runner.runs.events import PieceEnded
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest, GroupRequest
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.kept_values import KEEPER_PACKAGE, hindered, keeper, kept_outputs
+from action_assistant.umrf.kept_values import (
+    KEEPER_PACKAGE,
+    handing,
+    hindered,
+    keeper,
+    kept_outputs,
+)
 from action_assistant.umrf.model import EXIT, Conditions, Graph, Parameter, Relation
 from action_assistant.umrf.semantics import Behaviour
 from action_assistant.umrf.semantics.values import MISSING, slots_of
@@ -276,7 +282,7 @@ def test_an_arrow_is_refused_where_the_engine_would_lose_a_renamed_output(
     odd = tuple(parameter(name, "string") for name in names)
     graph = relay(((), odd), (odd, ()))
     assert kept_outputs(graph.actions[0]) == ()
-    ((arrow, why),) = hindered(graph)
+    ((arrow, _, why),) = hindered(graph, tuple(handing(graph)))
     assert (arrow.parent, arrow.child) == tuple(each.key for each in graph.actions)
     assert "under other names" in why
 

@@ -15,6 +15,7 @@ from action_assistant.umrf.courses.expected import check_expected
 from action_assistant.umrf.facts import PINNED, SIMULATED
 from action_assistant.umrf.hierarchy.flattening import Flattened, flattened
 from action_assistant.umrf.model import Conditions, Graph, Problem
+from action_assistant.umrf.pieces import obstacles
 from action_assistant.umrf.problem_kinds import kind_of
 from action_assistant.umrf.semantics import Behaviour, Script, simulate
 from action_assistant.umrf.semantics.steps import steps_of
@@ -27,6 +28,7 @@ from umrf.semantics.traces import graph_of, optional
 KINDS = {
     "actors", "synchroniser", "values-across-robots", "two-at-once", "loaded-anew",
     "spontaneous-across", "stop-across", "subgraph-across", "pause-across", "values-across",
+    "values-unreadable",
 }  # fmt: skip
 TEXT = leaf("string")
 STOPS = Conditions("stop", "stop", "ignore", "ignore")
@@ -115,6 +117,41 @@ def test_an_arrow_that_hands_no_value_to_another_actor_is_not_named(graph: Graph
     if all(not action.actor for action in graph.actions):
         graph = owned(graph, A="Carrier", B="Scout")
     assert "values-across-robots" not in {code for code, _ in told(graph)}
+
+
+POSE = leaf("geometry_msgs/Pose")
+STOPPED = Conditions("run", "run", "ignore", "run")
+
+
+@pytest.mark.parametrize(
+    ("graph", "arrow", "why"),
+    [
+        (with_values(CHAIN, A=({}, {"p": POSE}), B=({"p": POSE}, {})), "A>B", "no value of the type geometry"),
+        (with_values(graph_of("entry>A", "A>B", "B>exit", "entry>C", "C>A", AB=STOPPED, CA=STOPS),
+                     A=({}, {"p": TEXT}), B=({"p": TEXT}, {})), "A>B", "an arrow may have stopped A_0"),
+        (with_values(CHAIN, A=({}, dict.fromkeys("!#abc", TEXT)), B=({"a": TEXT}, {})), "A>B", "under other names"),
+    ],
+    ids=["a type that is not native", "after a stop", "names that the engine loses"],
+)  # fmt: skip
+@pytest.mark.parametrize("actors", [{"A": "Carrier", "B": "Scout"}, {"B": "Scout", "A": "Scout"}])
+def test_values_that_a_led_start_refuses_are_said_to_be_refused(
+    graph: Graph, arrow: str, why: str, actors: dict[str, str]
+) -> None:
+    """The package takes no such value, so naming it would promise what no start keeps."""
+    extra = replace(graph.actions[0], key="D", name="D", actor="Carrier")
+    graph = owned(replace(graph, actions=(*graph.actions, extra)), **actors)
+    assert [each for each in told(graph) if "values" in each[0]] == [("values-unreadable", arrow)]
+    assert why in of_kind(graph, "values-unreadable").message
+    (obstacle,) = (each for each in obstacles(graph) if each.code == "values-across")
+    assert why in obstacle.text
+
+
+@pytest.mark.parametrize("taken", [leaf("number"), leaf("string", extra=',"pvf_updatable":false')])
+def test_an_arrow_that_gives_no_value_needs_no_package(taken: Any) -> None:
+    graph = with_values(CHAIN, A=({}, {"p": TEXT}), B=({"p": taken}, {}))
+    for second in ("Carrier", "Scout"):
+        graph = owned(graph, A="Carrier", B=second)
+        assert not [code for code, _ in told(graph) if "values" in code]
 
 
 def test_actions_without_an_actor_are_like_one_more_actor_beside_several() -> None:

@@ -16,7 +16,7 @@ from action_assistant.umrf.checks.places import Subject, joined, more
 from action_assistant.umrf.checks.subgraphs import Resolution, SubGraphs, at_action, place_inside
 from action_assistant.umrf.components import Mask, nodes_in, reachable
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.kept_values import KEEPER_PACKAGE
+from action_assistant.umrf.kept_values import KEEPER_PACKAGE, handing, hindered
 from action_assistant.umrf.laps import repeated
 from action_assistant.umrf.model import (
     ENTRY,
@@ -30,7 +30,6 @@ from action_assistant.umrf.model import (
     Problem,
     Relation,
 )
-from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
 
 #: The most problems of one sub-graph that are reported at each action that stands for it.
 _INSIDE: Final = 20
@@ -266,29 +265,39 @@ def _answers(relation: Relation, reports: _Reports) -> set[str]:
 def _check_values(
     subject: Subject, arrows: Iterable[Relation], actors_of: _ByKey, reports: _Reports
 ) -> None:
-    """Report each arrow that hands values to an action of another actor, and once all those that hand
-    them to one of the same actor."""
+    """Report each arrow whose values no robot shows, each that hands values to an action of another
+    actor, and once all those that hand them to one of the same actor."""
+    handed = tuple(handing(subject.graph))
+    outputs = {(each.parent, each.child): set(names) for each, names in handed}
+    refused = {(each.parent, each.child): why for each, _, why in hindered(subject.graph, handed)}
     own: list[Relation] = []
     for relation in arrows:
-        if _answers(relation, reports) <= {"ignore", "bypass"}:
+        ends = relation.parent, relation.child
+        if ends not in outputs:
             continue
-        values = _handed_over(subject, relation)
+        values = joined(outputs[ends])
         parent, child = actors_of[relation.parent], actors_of[relation.child]
-        if not values:
-            continue
-        if len(parent.last | child.first) < 2:
-            own.append(relation)
-            continue
-        message = (
-            f"{_with_actor(subject, relation.parent, parent.every)} hands {joined(values)} to "
-            f"{_with_actor(subject, relation.child, child.every)}. A runner that leads the robots can hand "
-            f"values from one to another only where the first one has the package {KEEPER_PACKAGE}."
+        one, other = (
+            _with_actor(subject, relation.parent, parent.every),
+            _with_actor(subject, relation.child, child.every),
         )
-        subject.report("values-across-robots", "warning", message, relation=relation)
+        if ends in refused:  # also where the arrow is never taken
+            message = f"{one} hands {values} to {other}. A led start of this graph is refused: {refused[ends]}"
+            subject.report("values-unreadable", "warning", message, relation=relation)
+        elif _answers(relation, reports) <= {"ignore", "bypass"}:
+            continue
+        elif len(parent.last | child.first) < 2:
+            own.append(relation)
+        else:
+            message = (
+                f"{one} hands {values} to {other}. A runner that leads the robots can hand values from "
+                f"one to another only where the first one has the package {KEEPER_PACKAGE}."
+            )
+            subject.report("values-across-robots", "warning", message, relation=relation)
     if own:
         first = own[0]
         message = (
-            f"{subject.name(first.parent)} hands {joined(_handed_over(subject, first))} to "
+            f"{subject.name(first.parent)} hands {joined(outputs[first.parent, first.child])} to "
             f"{subject.name(first.child)}. A robot that is led can hand values from one action to the "
             f"next only where it has the package {KEEPER_PACKAGE}."
             f"{more(len(own) - 1, 'arrow', 'arrows')}"
@@ -307,16 +316,6 @@ def _check_pauses(subject: Subject, arrows: Iterable[Relation]) -> None:
             subject.report(
                 "pause-across", "warning", message, relation=relation, member="/conditions"
             )
-
-
-def _handed_over(subject: Subject, relation: Relation) -> set[str]:
-    """Return the names of the child's inputs that get outputs of the parent along an arrow."""
-    outputs = slots_of(subject.actions[relation.parent].outputs)
-    inputs = slots_of(subject.actions[relation.child].inputs)
-    try:
-        return set(renamed(outputs, relation.remap, inputs))
-    except RemapUnknown:  # another problem: the engine aborts
-        return set()
 
 
 def _check_spontaneous(subject: Subject, actors_of: _ByKey, runs: Container[Key]) -> None:
