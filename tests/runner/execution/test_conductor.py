@@ -330,7 +330,7 @@ async def test_the_word_of_a_person_counts_once_rest_is_seen_and_is_not_called_o
             await control.give_outcome(run, earlier, BEN)
         assert stale.value.where == {"path": "/piece"}
         await control.give_outcome(run, msgspec.structs.replace(word, piece=piece), BEN)
-        with pytest.raises(Conflict, match="known already|no outcome"):
+        with pytest.raises(Conflict, match=r"known already|no outcome"):
             await control.give_outcome(run, WordRequest("Work_0", "false", "I looked, too."), ANN)
         await until(lambda: not run_view(control.open[run].run).actions["Work_0"].asks)
         held = control.open[run].run.held
