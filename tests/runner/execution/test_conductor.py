@@ -145,11 +145,15 @@ async def test_a_silent_robot_holds_the_run_until_a_person_lets_it_go_on() -> No
         assert len(lab.carol.starts) == 2
 
 
+@pytest.mark.parametrize("slow", ["get", "journal"])
 @pytest.mark.parametrize("tenths", range(3, 40, 4))
-def test_a_runner_that_stood_still_calls_no_robot_silent(tenths: int) -> None:
+def test_a_runner_that_stood_still_holds_its_run_and_blames_nobody(tenths: int, slow: str) -> None:
     async def main() -> None:
         lab = Lab({"*": [{"after_s": 0.4}]})
-        lab.david.old = lab.carol.old = 0.4  # a get takes so long: it is often under way
+        if slow == "get":  # it takes so long that it is often under way
+            lab.david.old = lab.carol.old = 0.4
+        else:
+            lab.harness.journal.slow = 0.2
         async with lab.runner() as control:
             graph = shared(sequence("task", 60), "Scout", "Carrier")
             run = (await control.start(led(graph, lost="stop"), ANN)).run.id

@@ -2,6 +2,7 @@
 
 from collections.abc import Awaitable, Callable
 from functools import partial
+from math import inf
 from typing import Final
 
 import anyio
@@ -177,11 +178,17 @@ class StallWatch:
     def __init__(self, clock_us: ClockUs) -> None:
         self._clock_us = clock_us
         self._ticked = anyio.current_time()
+        self._stood_still_at = -inf
 
     @property
     def stands_still(self) -> bool:
         """True if the process stood still until now, which `run` could not notice yet."""
         return anyio.current_time() - self._ticked > _STALL_S
+
+    def stood_still_since(self, moment: float) -> bool:
+        """Return whether the process stood still after `moment`, in seconds of the event loop: a
+        timeout that began there says nothing about others."""
+        return moment <= (anyio.current_time() if self.stands_still else self._stood_still_at)
 
     async def run(self, hold: Callable[[str], None]) -> None:
         """Call `hold` with the reason at each jump, until cancelled."""
@@ -191,6 +198,7 @@ class StallWatch:
             now = anyio.current_time()
             jumped = self._clock_us() / 1e6 - now - offset
             if now - self._ticked > _STALL_S:
+                self._stood_still_at = now
                 hold(f"The runner stood still for {now - self._ticked:.0f} s.")
             elif abs(jumped) > _STALL_S:
                 hold(f"The clock of the runner's computer jumped by {jumped:.0f} s.")

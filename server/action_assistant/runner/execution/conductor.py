@@ -16,6 +16,7 @@ start message leaves. A Stop closes it for good before any stop message leaves.
 import logging
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack, suppress
+from math import inf
 from typing import Final, Literal
 
 import anyio
@@ -90,7 +91,7 @@ from action_assistant.umrf.semantics import Returned
 
 log: Final = logging.getLogger(__name__)
 
-_STORED_S: Final = 5.0  # for which a piece waits for the journal; later it needs a person
+_STORED_S: Final = 5  # for which a piece waits for the journal; later it needs a person
 _MOST_ENGINES: Final = 3  # that are begun for one run after the first
 _UNSET_S: Final = 1.0  # a piece whose action has ended and whose graph goes on lacks an output
 _FOREIGN: Final = frozenset(
@@ -422,6 +423,7 @@ class Conductor:
         """Send the piece of a step once the gate is open and its robot may begin it; do what the
         starter has chosen if it may not."""
         await self._gate.wait()
+        began = anyio.current_time()
         try:  # nothing begins while its causes are not in the journal
             with anyio.fail_after(_STORED_S):
                 await self._run.stored()
@@ -429,14 +431,13 @@ class Conductor:
                     await recorder.flushed()
                     self._unstored.discard(recorder)
         except TimeoutError:
-            self._trouble(step, "unstored", f"Nothing could be stored for {_STORED_S:.0f} s.")
+            self._trouble(step, "unstored", f"Nothing could be stored for {_STORED_S} s.", began)
             return
         robot = self._robots.reachable(step.engine)
         try:
             cleared = await self._look.before_piece(robot, self._first)
         except NoAnswer as why:
-            if not self._stalls.stands_still:  # else the run is held, and the robot asked again
-                self._trouble(step, "silent", f"{step.engine} was not given {step.node}: {why}")
+            self._trouble(step, "silent", f"{step.engine} was not given {step.node}: {why}", began)
             return
         with anyio.CancelScope(shield=True):
             self._pieces += 1
@@ -604,10 +605,10 @@ class Conductor:
 
     # --- trouble ------------------------------------------------------------------------------
 
-    def _trouble(self, step: Step, code: str, why: str) -> None:
-        """Say what is wrong with a step, once, and do what the starter has chosen for that. A silence
-        is said once for all steps on its robot."""
-        if code in step.troubles or step.is_stopped:
+    def _trouble(self, step: Step, code: str, why: str, since: float = inf) -> None:
+        """Say once what is wrong with a step, and do what the starter has chosen for that; not after a
+        wait `since` then in which the runner stood still. Steps on one robot share a silence."""
+        if code in step.troubles or step.is_stopped or self._stalls.stood_still_since(since):
             return
         step.troubles.add(code)
         if code == "silent":
