@@ -37,6 +37,23 @@ test.each([
   expect(actorsIn(top, [deep, named("Deep", ...within)])).toEqual(found);
 });
 
+test("levels that double are read once for each actor, and a graph inside of itself is no circle", () => {
+  const sub = (name: string, ...calls: [name: string, actor?: string][]) => ({
+    name,
+    umrf: {
+      actions: calls.map(([called, actor], i) => ({ name: called, instance_id: i, actor })),
+    },
+  });
+  // Thirty levels of two hold a thousand million actions.
+  const levels = Array.from({ length: 30 }, (_, i) => sub(`L${i}`, [`L${i + 1}`], [`L${i + 1}`]));
+  const top = umrf("Scout").replace('"Do"', '"L0"');
+  expect(actorsIn(top, [...levels, sub("L30", ["Do"], ["Do", "Carrier"])])).toEqual([
+    "Carrier",
+    "Scout",
+  ]);
+  expect(actorsIn(top, [sub("L0", ["L0"], ["L0"], ["Do", "Carrier"])])).toEqual(["Carrier"]);
+});
+
 test("a robot that cannot play says why", () => {
   expect(whyOff(robot("David", { led: false }), true)).toBe("led runs are off");
   expect(whyOff(robot("David"), false)).toBe("operators only");

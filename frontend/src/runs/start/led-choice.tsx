@@ -16,10 +16,8 @@ import style from "./led-choice.module.css";
 import dialogStyle from "./start-dialog.module.css";
 
 type Cast = LedOrder["robots"];
-type Player = Pick<Action, "actor" | "missing">;
 
-/** Levels of graphs inside that are looked into; the server looks as deep. */
-const DEEPEST = 32;
+const real = (actions: readonly Action[]) => actions.filter(({ missing }) => !missing);
 
 /**
  * Return the actors of a graph, "" (actions that name none) last; empty while its text, or the graphs
@@ -34,17 +32,23 @@ export function actorsIn(umrf: string | undefined, inside: Inside["subgraphs"] |
       return [each.name, fromUmrf(typeof text === "string" ? JSON.parse(text) : text).actions];
     }),
   );
-  const played = (action: Action, around: string, depth: number): Player[] => {
-    const actor = action.actor === "" ? around : action.actor;
-    const within = action.missing || depth >= DEEPEST ? undefined : graphs.get(action.name);
-    if (within === undefined) return [{ actor, missing: action.missing }];
-    return within.flatMap((each) => played(each, actor, depth + 1));
+  // Each graph is read once for each actor around it: levels that double would be endless otherwise.
+  const read = new Set<string>();
+  const played = (action: Action, around: string): string[] => {
+    const actor = action.actor || around;
+    const within = graphs.get(action.name);
+    if (within === undefined) return [actor];
+    const place = JSON.stringify([action.name, actor]);
+    if (read.has(place)) return [];
+    read.add(place);
+    return real(within).flatMap((each) => played(each, actor));
   };
-  const top = fromUmrf(JSON.parse(umrf)).actions.flatMap((action) => {
-    const found = played(action, "", 0);
-    return found.some(({ missing }) => !missing) ? found : [action];
+  const actors = real(fromUmrf(JSON.parse(umrf)).actions).flatMap((action) => {
+    read.clear();
+    const found = played(action, "");
+    return found.length > 0 ? found : [action.actor];
   });
-  return robotCounts(top).map(([actor]) => actor);
+  return robotCounts(actors.map((actor) => ({ actor, missing: false }))).map(([actor]) => actor);
 }
 
 /** Return why a robot can play nobody in a led run; "" if it can. */
