@@ -78,7 +78,7 @@ export function finishedWords(result: string | null | undefined): StateWords {
 
 /** Return in words how the result of a visit is known; "" for one that an engine has shown. */
 export function howWords(visit: Visit): string {
-  if (visit.said) return `said by ${isolated(visit.said.by.name)}: ${visit.said.reason}`;
+  if (visit.said) return `said by ${isolated(visit.said.by.name)}: ${isolated(visit.said.reason)}`;
   return visit.how === "inferred" ? "inferred" : "";
 }
 

@@ -16,7 +16,7 @@ export function RestList({ run, more }: { run: Run; more?: (robot: string) => Re
       {lines.map(({ robot, tone, words }) => (
         <li key={robot} data-robot-rest={robot}>
           <i style={{ background: colorOfName(robot) }} aria-hidden />
-          <b>{robot}</b>
+          <bdi className="weight-600">{robot}</bdi>
           <StateLabel still tone={tone} word={words} />
           {more?.(robot)}
         </li>

@@ -1,7 +1,8 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import { silentRests } from "../api/run-stop";
-import type { Run } from "../api/runs";
+import type { Run, Visit } from "../api/runs";
+import { howWords } from "./progress";
 import { askedOutcomes, openRests, type RobotRest, restLines } from "./rests";
 
 const AT = "2026-01-01T12:00:04Z";
@@ -34,6 +35,16 @@ test("what a person has seen is said as seen by that person", () => {
   const words = wordsOf({ robot: "D", state: "seen", since: AT, by: BY, why: "I stand there." });
   expect(words).toContain("Ben");
   expect(words).toMatch(/not proven: I stand there$/);
+});
+
+test("words of a person turn no words around them", () => {
+  const why = "\u202eI stand there";
+  const words = wordsOf({ robot: "D", state: "seen", since: AT, by: BY, why });
+  expect(words).toMatch(/not proven: \u2068\u202eI stand there\u2069$/);
+  const said = { by: BY, at: AT, reason: why };
+  expect(howWords({ said, how: "inferred" } as unknown as Visit)).toBe(
+    "said by Ben: \u2068\u202eI stand there\u2069",
+  );
 });
 
 test("no robot is green, and none is called proven but by a proof, heard or not", () => {

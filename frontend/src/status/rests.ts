@@ -29,12 +29,12 @@ export function openRests(run: Run): RobotRest[] {
 
 const sentence = (text: string) => text.replace(/\.$/, "");
 
-function wordsOf(rest: RobotRest, run: Run): Pick<RestLine, "tone" | "words"> {
+export function restWords(rest: RobotRest, run: Run): Pick<RestLine, "tone" | "words"> {
   const at = instant(rest.since);
   const time = at === null ? "" : ` at ${clock(at)}`;
   const since = at === null ? "" : ` since ${clock(at)}`;
   const step = rest.action ? isolated(actionWords(run, rest.action)) : "its action";
-  const why = rest.why ? `: ${sentence(rest.why)}` : "";
+  const why = rest.why ? `: ${isolated(sentence(rest.why))}` : "";
   const stops = rest.stops ? "; the stop is repeated" : "";
   switch (rest.state) {
     case "unused":

@@ -211,7 +211,7 @@ function RobotLines({ run, unheard, named }: { run: Run; unheard: boolean; named
       {restLines(run, unheard).map(({ robot, words }) => (
         <li key={robot}>
           {named && `Run ${run.number}, `}
-          <b>{robot}</b>: {words}
+          <bdi className="weight-700">{robot}</bdi>: {words}
         </li>
       ))}
     </ul>
