@@ -8,7 +8,7 @@ import { useLive } from "../api/page-link";
 import { SIMULATOR } from "../api/robots";
 import type { Run } from "../api/runs";
 import { actionWords, placesOf } from "../status/level-places";
-import { isAtRest, restLines } from "../status/rests";
+import { knownRest, restWords } from "../status/rests";
 import { colorOfName } from "../ui/name-colors";
 import { instant } from "../ui/times";
 import { isolated } from "../words/isolated";
@@ -118,10 +118,8 @@ function ofRun(run: Run, silent: ReadonlySet<string>): Moving[] {
   const all = Object.entries(run.actions ?? {});
   return enginesOf(run).map((robot) => {
     const own = all.filter(([, action]) => (action.robot || SIMULATOR) === robot);
-    if (run.desired === "stopped" && isAtRest(run, robot)) {
-      const words = restLines(run, false).find((each) => each.robot === robot)?.words ?? "";
-      return { robot, run: run.id, kind: "still", words };
-    }
+    const rest = run.desired === "stopped" ? knownRest(run, robot) : null;
+    if (rest) return { robot, run: run.id, kind: "still", words: restWords(rest, run).words };
     return ofRobot({ ...run, actions: Object.fromEntries(own) }, robot, silent.has(robot));
   });
 }

@@ -69,14 +69,13 @@ export function restLines(run: Run, unheard: boolean): RestLine[] {
     if (unheard && !RESTS.has(rest.state)) {
       return { robot: rest.robot, tone: "unknown", words: "not known, the runner is not heard" };
     }
-    return { robot: rest.robot, ...wordsOf(rest, run) };
+    return { robot: rest.robot, ...restWords(rest, run) };
   });
 }
 
-/** Return whether it is known of a robot of a led run that nothing of the run goes on there. */
-export function isAtRest(run: Run, robot: string): boolean {
-  const rest = (run.rests ?? []).find((each) => each.robot === robot);
-  return rest !== undefined && RESTS.has(rest.state);
+/** Return the rest of a robot of a led run; null unless nothing of the run is known to go on there. */
+export function knownRest(run: Run, robot: string): RobotRest | null {
+  return (run.rests ?? []).find((each) => each.robot === robot && RESTS.has(each.state)) ?? null;
 }
 
 /** Return whether a run waits for something that a person has to say. */

@@ -83,6 +83,8 @@ test("while a run is stopped none of its robots is said to wait", () => {
   expect(said({ unconfirmed: "why" })).toEqual(["stop unconfirmed", "stop unconfirmed"]);
   const rests = [{ robot: "birch", state: "proven" }];
   expect(said({ desired: "stopped", rests })).toEqual(["stopping", "at rest"]);
+  const seen = [{ robot: "atlas", state: "seen" }, ...rests];
+  expect(said({ desired: "stopped", rests: seen })).toEqual(["seen at rest", "at rest"]);
 });
 
 test("values say whether they were seen or only sent, and what an action began after", () => {

@@ -13,7 +13,7 @@ import { type Lane, robotsOf, useLanes } from "../../status/lanes/lanes";
 import { Timeline, type Track } from "../../status/lanes/timeline";
 import { runLabel, type Tone } from "../../status/progress";
 import { RestList } from "../../status/rest-list";
-import { isAtRest } from "../../status/rests";
+import { knownRest, type RobotRest, restWords } from "../../status/rests";
 import { StateLabel } from "../../status/state-label";
 import { colorOfName } from "../../ui/name-colors";
 import { instant } from "../../ui/times";
@@ -245,6 +245,13 @@ function said(run: Run, names: ReadonlySet<string> | null, unheard: boolean) {
   return { tone, words: word };
 }
 
+/** Words for the rest of a robot in its tab; the lines above say more. */
+const AT_REST: Partial<Record<RobotRest["state"], string>> = {
+  seen: "seen at rest",
+  unused: "nothing begun",
+  unsent: "nothing begun",
+};
+
 /**
  * A tab for each run that goes on; of a single run, for each of the robots in it. `silent`: robots
  * that do not answer, whose part of a led run is not known.
@@ -262,10 +269,11 @@ export function robotTabs(
       const names = new Set(lanes.filter(({ robot }) => robot === actor).map(({ name }) => name));
       const robot = actor === "" ? "any robot" : actor;
       const unknown = unheard || (Boolean(only.robots) && silent.has(actor));
-      const words =
-        !unheard && only.desired === "stopped" && !only.ended_at && isAtRest(only, actor)
-          ? ({ tone: "done", words: "at rest" } as const)
-          : said(only, names, unknown);
+      const stops = !unheard && only.desired === "stopped" && !only.ended_at;
+      const rest = stops ? knownRest(only, actor) : null;
+      const words = rest
+        ? { tone: restWords(rest, only).tone, words: AT_REST[rest.state] ?? "at rest" }
+        : said(only, names, unknown);
       return { id: `${only.id} ${actor}`, robot, run: only, actor, ...words };
     });
   }
