@@ -94,28 +94,27 @@ export function handOverWords(over: HandOver): string {
 interface Props {
   overs: readonly HandOver[];
   axis: TimeAxis;
-  /** The list of lanes, whose rows are measured. */
+  /** The list whose rows are measured; the rows of this run come first in it. */
   list: RefObject<HTMLElement | null>;
-  /** Changes with the rows that are shown. */
-  rows: string;
+  /** The lanes of the run that are shown. */
+  lanes: readonly Lane[];
 }
 
-/** Return the middle of each row, px from the top of the list. */
-function useMiddles(list: Props["list"], rows: string): ReadonlyMap<string, number> {
+/** Return the middle of the row of each lane, px from the top of the list. */
+function useMiddles({ list, lanes }: Pick<Props, "list" | "lanes">): ReadonlyMap<string, number> {
   const [middles, setMiddles] = useState<ReadonlyMap<string, number>>(new Map());
-  // biome-ignore lint/correctness/useExhaustiveDependencies: measured again when other rows are shown
   useLayoutEffect(() => {
-    const box = list.current;
-    if (box === null) return;
-    const found = box.querySelectorAll<HTMLElement>("[data-lane]");
-    const middle = (row: HTMLElement) => row.offsetTop + row.offsetHeight / 2;
-    setMiddles(new Map([...found].map((row) => [row.dataset.lane ?? "", middle(row)])));
-  }, [list, rows]);
+    const found = lanes.flatMap(({ name }): [string, number][] => {
+      const row = list.current?.querySelector<HTMLElement>(`[data-lane="${CSS.escape(name)}"]`);
+      return row ? [[name, row.offsetTop + row.offsetHeight / 2]] : [];
+    });
+    setMiddles(new Map(found));
+  }, [list, lanes]);
   return middles;
 }
 
-export function HandOverLines({ overs, axis, list, rows }: Props) {
-  const middles = useMiddles(list, rows);
+export function HandOverLines({ overs, axis, list, lanes }: Props) {
+  const middles = useMiddles({ list, lanes });
   const newest = new Map(overs.map((over) => [over.to, over]));
   return (
     <li className={style.handOvers} aria-hidden>

@@ -284,7 +284,7 @@ export function Timeline(props: Props) {
   const axis = useAxis(tracks);
   const goes = tracks.some((track) => track.run.ended_at === null);
   const silentSince = run.ended_at === null ? (props.silentSince ?? null) : null;
-  const shown = openLanes(lanes, inside.open);
+  const shown = useMemo(() => openLanes(lanes, inside.open), [lanes, inside.open]);
   const list = useNewestInView(shown, run, run.ended_at === null && cursor === null);
   const overs = useMemo(() => handOversOf(run, lanes), [run, lanes]);
   const { ruler, pull, onKeyDown } = useSeeking(axis, cursor, onSeek);
@@ -317,14 +317,7 @@ export function Timeline(props: Props) {
             {...(props.picks ? { picks: props.picks } : {})}
           />
         ))}
-        {overs.length > 0 && (
-          <HandOverLines
-            overs={overs}
-            axis={axis}
-            list={list}
-            rows={shown.map(({ name }) => name).join("\n")}
-          />
-        )}
+        {overs.length > 0 && <HandOverLines overs={overs} axis={axis} list={list} lanes={shown} />}
       </ul>
     </div>
   );
