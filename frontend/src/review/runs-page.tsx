@@ -14,7 +14,7 @@ import { useInfiniteQuery, useMutation } from "@tanstack/react-query";
 import { type MouseEvent, useCallback, useMemo, useState } from "react";
 import { Link, useLocation, useSearch } from "wouter";
 import { errorText } from "../api/http";
-import { CONDUCTED, enginesOf as robotsOf } from "../api/led-runs";
+import { CONDUCTED, enginesOf } from "../api/led-runs";
 import { useLive } from "../api/page-link";
 import { useCurrentName } from "../api/people";
 import {
@@ -278,7 +278,7 @@ export function RunsPage() {
   const newest = stored[0]?.number ?? 0;
   const waiting = listed.isSuccess ? newcomers(stored, now.runs, newest) : 0;
   const filtered = queryOf(filter).size > 0;
-  const engines = useMemo(() => enginesOf(stored, filter.robot), [stored, filter.robot]);
+  const engines = useMemo(() => engineChoices(stored, filter.robot), [stored, filter.robot]);
   const choose = (run: string, on: boolean) =>
     setChosen(on ? [...chosen.slice(-1), run] : chosen.filter((each) => each !== run));
   const [b = "", a = ""] = [...chosen].sort((x, y) => numberOf(runs, y) - numberOf(runs, x));
@@ -345,12 +345,13 @@ export function RunsPage() {
   );
 }
 
-function enginesOf(runs: readonly ListedRun[], chosen: string): string[] {
+/** Return the engines by which runs can be filtered: those of the listed runs, and the chosen one. */
+function engineChoices(runs: readonly ListedRun[], chosen: string): string[] {
   return [
     ...new Set([
       "simulator",
       chosen,
-      ...runs.flatMap((run) => (run.robots ? [CONDUCTED, ...robotsOf(run)] : [run.engine])),
+      ...runs.flatMap((run) => (run.robots ? [CONDUCTED, ...enginesOf(run)] : [run.engine])),
     ]),
   ].filter(Boolean);
 }
