@@ -85,7 +85,7 @@ function GoOnButton({ run, since }: { run: Run; since: string }) {
   );
 }
 
-/** Whatever a run asks people for: to let it go on, and for outcomes that nothing shows. */
+/** Asks people what a run needs from them: to let it go on, and outcomes that nothing shows. */
 export function RunQuestions({ run }: { run: Run }) {
   return (
     <>

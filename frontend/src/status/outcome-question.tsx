@@ -3,7 +3,7 @@ import { TextInput } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
 import { IconHelpCircle, IconMessageCheck } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
-import { useId, useState } from "react";
+import { useState } from "react";
 import { errorText, isOutcomeUnknown } from "../api/http";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
@@ -34,7 +34,6 @@ function OutcomeForm({ run, action }: { run: Run; action: string }) {
   const { live, runner, now } = useLive();
   const [outcome, choose] = useState<SaidOutcome | "">("");
   const [reason, setReason] = useState("");
-  const id = useId();
   // Never kept for later: the words are about what was seen a moment ago.
   usePendingText(reason, null);
   const give = useMutation({
@@ -54,11 +53,10 @@ function OutcomeForm({ run, action }: { run: Run; action: string }) {
         label={`Outcome of ${words}`}
         size="xs"
         data={OUTCOMES}
-        value={outcome as SaidOutcome}
+        value={outcome}
         onChange={choose}
       />
       <TextInput
-        id={id}
         size="xs"
         className={style.reason ?? ""}
         aria-label={`What shows the outcome of ${words}?`}
