@@ -14,7 +14,7 @@ import anyio
 import anyio.lowlevel
 import msgspec
 from anyio.abc import TaskGroup
-from sqlalchemy import Row, Select, StaticPool, create_engine
+from sqlalchemy import Row, Select, StaticPool, create_engine, insert
 
 from action_assistant.errors import Conflict, Unavailable
 from action_assistant.journal.events import BareEvent, Draft, Event, StreamSnapshot, bare
@@ -41,7 +41,7 @@ from action_assistant.runner.runs.events import Author, RunEvent, decode
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
-from action_assistant.schema.runner_tables import RUNNER
+from action_assistant.schema.runner_tables import RUNNER, runner_event
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.files import codec
@@ -170,6 +170,8 @@ class MemoryJournal:
                     draft.body,
                     self.position,
                 )
+                row = {**msgspec.structs.asdict(event), "chain": b""}
+                connection.execute(insert(runner_event).prefix_with("OR REPLACE").values(row))
                 for statement in projection.fold(event):
                     connection.execute(statement)
                 events.append(event)

@@ -23,11 +23,12 @@ from action_assistant.runner.analysis.keyframes import KeyframeStore
 from action_assistant.runner.analysis.replay import run_replay
 from action_assistant.runner.api.review import _lines
 from action_assistant.runner.archives import archive_file
-from action_assistant.runner.archives.archive_store import Archived, streams_of_pieces
+from action_assistant.runner.archives.archive_store import Archived
 from action_assistant.runner.archives.raw_messages import RawArchived, raw_of
 from action_assistant.runner.links.observations import NodeState
 from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.robots.recordings import Recording
+from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import (
     Author,
     Ended,
@@ -317,7 +318,10 @@ async def test_a_sweep_that_was_interrupted_clears_the_pieces_later(
     shelved = archive_store(journal, data)
     assert {each: await shelved.read(stream_of(each)) for each in known} == known
     assert (await retention(journal, data).sweep(30, None)).problems == []
-    assert await journal.query(select(runner_event).where(streams_of_pieces("r4").exists())) == []
+    assert (
+        await journal.query(select(runner_event).where(queries.streams_of_pieces("r4").exists()))
+        == []
+    )
     assert await journal.verify() == []
     assert {each: await shelved.read(stream_of(each)) for each in known} == known
     await journal.close()

@@ -1,11 +1,16 @@
-"""A conducted run of whose events some cannot be read after a restart: its pieces are not left alone."""
+"""Conducted runs of whose events some are missing or cannot be read after a restart: no piece is left alone."""
+
+from collections.abc import Sequence
+from typing import Any
 
 import anyio
 import msgspec
 import pytest
 
-from action_assistant.errors import Conflict
+from action_assistant.errors import Conflict, Unavailable
+from action_assistant.journal.events import Draft
 from action_assistant.runner.execution.interventions import RestRequest
+from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.runs.events import (
     Observed,
     PieceBegan,
@@ -13,8 +18,10 @@ from action_assistant.runner.runs.events import (
     Published,
     Requested,
 )
-from runner.execution.test_conductor import Lab, alarms, refused
-from runner.harness import BEN, MemoryJournal, ended, order, sequence, until, virtual
+from action_assistant.runner.runs.views import time
+from action_assistant.runner.start.admission import GoOnRequest
+from runner.execution.test_conductor import Lab, alarms, led, refused, shared
+from runner.harness import ANN, BEN, MemoryJournal, ended, order, sequence, until, virtual
 
 
 def damage(journal: MemoryJournal, run: str, kind: str) -> None:
@@ -89,3 +96,69 @@ async def test_the_pieces_of_a_run_whose_start_cannot_be_read_are_runs_of_their_
         assert control.stop_all(BEN).runs == [piece]
         assert await ended(control, piece) == "stopped"
         assert not await lab.david.moving("task--Work_0")
+
+
+async def led_after_a_refusal(
+    lab: Lab, control: ExecutionService, monkeypatch: pytest.MonkeyPatch
+) -> str:
+    """Lead a run whose piece 1 the journal refuses; return its id once piece 2 moves on David."""
+    journal = lab.harness.journal
+    append = journal.append
+
+    async def refusing(stream: str, drafts: Sequence[Draft], **more: Any) -> int:
+        if stream.endswith(".1"):
+            raise Unavailable("no space left on device")
+        return await append(stream, drafts, **more)
+
+    monkeypatch.setattr(journal, "append", refusing)
+    graph = shared(sequence("task", 2), "Scout", "Carrier")
+    run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+    await until(lambda: control.open[run].run.held is not None)
+    held = control.open[run].run.held
+    assert held is not None
+    await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+    await until(lambda: journal.history(run).actions["Work_0"].state == "RUNNING")
+    assert f"run/{run}.1" not in journal.streams
+    assert journal.history(run).actions["Work_0"].piece == f"{run}.2"
+    return run
+
+
+@virtual
+async def test_a_piece_behind_one_that_could_not_be_stored_is_followed_and_stopped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lab = Lab({"*": [{"after_s": 60, "stop_s": 1}]})
+    async with lab.runner() as control:
+        run = await led_after_a_refusal(lab, control, monkeypatch)
+    damage(lab.harness.journal, run, PieceSeen.kind)
+    async with lab.runner() as control:
+        assert control.open[f"{run}.2"].run.state == "running"
+        await control.stop(run, BEN)
+        assert await lab.david.moving("task--Work_0")
+        assert control.open[run].run.end is None
+        await until(lambda: run not in control.open)
+        assert not await lab.david.moving("task--Work_0")
+        last = next(each for _, each in reversed(lab.harness.shown) if each.id == run)
+        assert last.state == "stopped"
+
+
+@virtual
+async def test_a_piece_that_left_and_was_not_noted_is_not_sent_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lab = Lab({"*": [{"after_s": 20}]})
+    journal = lab.harness.journal
+    async with lab.runner() as control:
+        run = await led_after_a_refusal(lab, control, monkeypatch)
+    events = journal.streams[f"run/{run}"]
+    del events[next(n for n, each in enumerate(events) if each.kind == PieceBegan.kind) :]
+    async with lab.runner() as control:
+        assert control.open[f"{run}.2"].run.state == "running"
+        await anyio.sleep(40)
+        assert journal.history(f"{run}.2").end == "finished"
+        held = control.open[run].run.held
+        assert held is not None
+        await control.go_on(run, GoOnRequest(time(held.at)), BEN)
+        assert await ended(control, run) == "finished"
+        assert [each.run for each in lab.david.starts] == [f"{run}.2"]
+        assert [each.run for each in lab.carol.starts] == [f"{run}.3"]

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Final, Protocol
 
 import msgspec
-from sqlalchemy import ColumnElement, Row, Select, literal, select
+from sqlalchemy import Row, Select, select
 
 from action_assistant.errors import Refused
 from action_assistant.journal.chain import Head
@@ -23,9 +23,9 @@ from action_assistant.kit.lru_cache import LruCache
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.analysis.keyframes import SnapshotJournal
 from action_assistant.runner.archives import archive_file
-from action_assistant.runner.runs import views
-from action_assistant.runner.runs.history import whole_of
-from action_assistant.schema.runner_tables import run, runner_event
+from action_assistant.runner.runs import queries, views
+from action_assistant.runner.runs.history import pieces_in, whole_of
+from action_assistant.schema.runner_tables import run
 from action_assistant.web.workers.lanes import RunInWorker
 
 _PREFIX: Final = "run/"
@@ -140,11 +140,9 @@ class ArchiveStore:
     async def pieces(self, run_id: str) -> list[str]:
         """Return the ids of the pieces of a conducted run, also of an archived one, in the order in
         which they were sent. Raise Unavailable if the journal cannot be read."""
-        rows = await self._journal.query(streams_of_pieces(run_id))
+        rows = await self._journal.query(queries.streams_of_pieces(run_id))
         here = (row.stream.removeprefix(_PREFIX) for row in rows)
-        gone = await self._archived_pieces(run_id)
-        found = {each for each in (*here, *gone) if whole_of(each) == run_id}
-        return sorted(found, key=lambda piece: int(piece.rpartition(".")[2]))
+        return pieces_in(run_id, (*here, *await self._archived_pieces(run_id)))
 
     async def _archived_pieces(self, run_id: str) -> dict[str, str]:
         """Return the archives of the pieces of a run: their files by id."""
@@ -170,9 +168,3 @@ class ArchiveStore:
         if not events or events[0].stream != stream:
             raise archive_file.Damaged(f"{place.archived_as} holds another run.")
         return self._cache.put(stream, events, sum(len(each.body) + 200 for each in events))
-
-
-def streams_of_pieces(run_id: "str | ColumnElement[str]") -> Select[Any]:
-    """Select the streams in the journal whose names begin as those of the pieces of a run do."""
-    stream, own = runner_event.c.stream, literal(_PREFIX) + run_id
-    return select(stream).distinct().where(stream > own + ".", stream < own + "/")

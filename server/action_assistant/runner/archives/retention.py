@@ -23,10 +23,10 @@ from action_assistant.journal.removal import StreamRemoved
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations
 from action_assistant.runner.archives import archive_file
-from action_assistant.runner.archives.archive_store import Journaled, streams_of_pieces
+from action_assistant.runner.archives.archive_store import Journaled
 from action_assistant.runner.archives.raw_messages import RawArchived, stream_of_raw
 from action_assistant.runner.robots.recordings import Recordings
-from action_assistant.runner.runs import views
+from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import draft_of
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.schema.runner_tables import review, run, runner_event
@@ -120,7 +120,7 @@ class Retention:
         fails; its events then stay in the journal."""
         pieces = [
             each.stream.removeprefix("run/")
-            for each in await self._journal.query(streams_of_pieces(row.id))
+            for each in await self._journal.query(queries.streams_of_pieces(row.id))
         ]
         for each in pieces:
             if self._is_open(each):
@@ -246,7 +246,7 @@ def _pinned(run_id: str) -> Select[Any]:
 
 def _unfinished() -> Select[Any]:
     here = exists().where(runner_event.c.stream == literal("run/") + run.c.id)
-    pieces = streams_of_pieces(run.c.id).exists()
+    pieces = queries.streams_of_pieces(run.c.id).exists()
     return select(run.c.id).where(run.c.archived_at.is_not(None), or_(here, pieces))
 
 

@@ -34,7 +34,7 @@ from action_assistant.runner.runs.events import (
     StopRequested,
     decode,
 )
-from action_assistant.runner.runs.history import LeftRun, RunHistory, piece_id
+from action_assistant.runner.runs.history import LeftRun, RunHistory, piece_number
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.idempotency import IdempotentStarts
@@ -180,8 +180,11 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
     """Return how far an earlier process led a conducted run; `now`: the run as its events show it. Raise
     Unavailable if the journal cannot be read."""
     ends: list[tuple[int, Returned | Literal["stop"]]] = []
-    began, sent, calls = first.at, 0, dict[int, int]()
+    began = first.at
     unproven: Run | None = None
+    noted: set[str] = set()
+    newest: dict[int, str] = {}  # the last noted piece of each call without an outcome
+    over: set[int] = set()  # the calls with an outcome
     after = 0
     while events := await history.events(first.run, after, _PAGE):
         after = events[-1].seq
@@ -190,41 +193,39 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
                 case Published(at=at):
                     began = at
                 case PieceBegan(call=call, piece=piece):
-                    sent = max(sent, int(piece.rpartition(".")[2]))
-                    calls[call] = sent
+                    noted.add(piece)
+                    newest[call] = piece
                 case PieceEnded(at=at, call=call, how=how, piece=piece) as ended:
                     if how == "word":
                         unproven = (await history.left(piece))[0] or unproven
-                    calls.pop(call, None)
+                    newest.pop(call, None)
+                    over.add(call)
                     ends.append((at, returned_of(ended)))
                 case StopRequested(at=at):
                     ends.append((at, "stop"))
     pieces: dict[int, tuple[Run, int]] = {}
-    for call, number in calls.items():
-        run, seq = await _left_piece(history, first.run, number)
-        if run is not None:
-            pieces[call] = run, seq
-    while True:  # those that were sent, and not noted any more
-        run, seq = await _left_piece(history, first.run, sent + 1)
-        if run is None or run.piece is None:
-            break
-        sent += 1
-        pieces[run.piece.call] = run, seq
+    sent = await history.piece_ids(first.run)
+    for id_ in sent:
+        if id_ in noted and id_ not in newest.values():
+            continue  # its outcome is known, or a newer one was sent for its call
+        left, seq = await _left_piece(history, id_)
+        if left.piece is not None and left.piece.call not in over:
+            pieces[left.piece.call] = left, seq
     steps = tuple(((at - began) / 1000, step) for at, step in ends)
     return LeftOpen(
         order=order_of(first),
         course=LedCourse(began=began, steps=steps),
-        sent=sent,
+        sent=max(map(piece_number, sent), default=0),
         pieces=pieces,
         states={name: each.state for name, each in now.actions.items() if each.robot},
         unproven=unproven,
     )
 
 
-async def _left_piece(history: RunHistory, run: str, number: int) -> tuple[Run | None, int]:
-    """Return a piece that an earlier process left and the seq of its last event; None if none was
-    stored. Raise msgspec.DecodeError if some of its events cannot be read."""
-    piece, seq, is_whole = await history.left(piece_id(run, number))
-    if seq and (piece is None or not is_whole):
-        raise msgspec.DecodeError(f"Some events of {piece_id(run, number)} cannot be read.")
+async def _left_piece(history: RunHistory, id_: str) -> tuple[Run, int]:
+    """Return a stored piece that an earlier process left, and the seq of its last event. Raise
+    msgspec.DecodeError if some of its events cannot be read."""
+    piece, seq, is_whole = await history.left(id_)
+    if piece is None or not is_whole:
+        raise msgspec.DecodeError(f"Some events of {id_} cannot be read.")
     return piece, seq

@@ -1,7 +1,6 @@
 """Reads runs from the journal: those that are over, and those that an earlier process left open."""
 
-from collections.abc import Awaitable, Callable, Sequence
-from itertools import count
+from collections.abc import Awaitable, Callable, Iterable, Sequence
 from typing import Any, Protocol, TypeAlias
 
 import msgspec
@@ -9,6 +8,7 @@ from sqlalchemy import Row, Select
 
 from action_assistant.errors import NotFound
 from action_assistant.journal.events import Event
+from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import ModifyRequested, Requested, RunEvent, decode
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.recorder import Store, stream_of
@@ -67,16 +67,20 @@ class RunHistory:
         events_read = [event for event in read if event is not None]
         return replay(events_read), events[-1].seq if events else 0, len(events_read) == len(read)
 
+    async def piece_ids(self, run: str) -> list[str]:
+        """Return the ids of all stored pieces of a conducted run in the order of their numbers, of
+        which some may be missing: a piece that could not be stored has used up its number. Raise
+        Unavailable while the journal cannot be read."""
+        rows = await self._journal.query(queries.streams_of_pieces(run))
+        return pieces_in(run, (row.stream.removeprefix(stream_of("")) for row in rows))
+
     async def pieces(self, run: str) -> tuple[list[LeftRun], list[str]]:
         """Return the pieces of a conducted run in the order in which they began, and the ids of those
         of which nothing can be read. Raise Unavailable while the journal cannot be read."""
         found: list[LeftRun] = []
         lacking: list[str] = []
-        for number in count(1):
-            id_ = piece_id(run, number)
+        for id_ in await self.piece_ids(run):
             piece, seq, is_whole = await self.left(id_)
-            if not seq:
-                break
             if piece is None or piece.piece is None:
                 lacking.append(id_)
             else:
@@ -115,9 +119,15 @@ class RunHistory:
         return await self._journal.query(statement)
 
 
-def piece_id(run: str, number: int) -> str:
-    """Return the id of the piece of this number in a conducted run, the first being 1."""
-    return f"{run}.{number}"
+def pieces_in(run: str, ids: Iterable[str]) -> list[str]:
+    """Return those of these ids that belong to pieces of this conducted run, each once, in the order
+    of their numbers."""
+    return sorted({each for each in ids if whole_of(each) == run}, key=piece_number)
+
+
+def piece_number(piece: str) -> int:
+    """Return the number of a piece in its conducted run, the first being 1. `piece`: its id."""
+    return int(piece.rpartition(".")[2])
 
 
 def whole_of(run: str) -> str:

@@ -15,6 +15,7 @@ from sqlalchemy import (
     and_,
     cast,
     func,
+    literal,
     not_,
     or_,
     select,
@@ -24,7 +25,14 @@ from sqlalchemy import (
 from sqlalchemy.sql.selectable import TableValuedAlias
 
 from action_assistant.runner.links.port import CONDUCTED
-from action_assistant.schema.runner_tables import FAILED, review, robot, run, run_label
+from action_assistant.schema.runner_tables import (
+    FAILED,
+    review,
+    robot,
+    run,
+    run_label,
+    runner_event,
+)
 
 OPEN: Final = "open"
 
@@ -42,6 +50,12 @@ def last_number() -> Select[Any]:
 def of_run(run_id: str) -> Select[Any]:
     """Select `state` and `simulated` of a run."""
     return select(run.c.state, run.c.simulated).where(run.c.id == run_id)
+
+
+def streams_of_pieces(run_id: str | ColumnElement[str]) -> Select[Any]:
+    """Select the streams in the journal whose names begin as those of the pieces of a run do."""
+    stream, own = runner_event.c.stream, literal("run/") + run_id
+    return select(stream).distinct().where(stream > own + ".", stream < own + "/")
 
 
 def by_request(request_id: str) -> Select[Any]:
