@@ -20,8 +20,18 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest
-from runner.execution.test_conductor import Lab, alarms, led, refused, shared
-from runner.harness import ANN, BEN, MemoryJournal, ended, order, sequence, until, virtual
+from runner.execution.test_conductor import Lab, alarms, led, refused, rests, shared
+from runner.harness import (
+    ANN,
+    BEN,
+    MemoryJournal,
+    ended,
+    engine,
+    order,
+    sequence,
+    until,
+    virtual,
+)
 
 
 def damage(journal: MemoryJournal, run: str, kind: str) -> None:
@@ -162,3 +172,35 @@ async def test_a_piece_that_left_and_was_not_noted_is_not_sent_again(
         assert await ended(control, run) == "finished"
         assert [each.run for each in lab.david.starts] == [f"{run}.2"]
         assert [each.run for each in lab.carol.starts] == [f"{run}.3"]
+
+
+async def moved_again(lab: Lab, control: ExecutionService) -> str:
+    """Lead a run until its first piece, which had ended, moves again; return the run's id."""
+    graph = shared(sequence("task", 2), "Scout", "Carrier")
+    run = (await control.start(led(graph, lost="wait"), ANN)).run.id
+    await until(lambda: bool(lab.carol.starts), 200)
+    await anyio.sleep(5)
+    await lab.david.engine.start(lab.david.starts[0])
+    await until(lambda: control.open[run].run.held is not None)
+    return run
+
+
+@pytest.mark.parametrize("stops", [False, True])
+@virtual
+async def test_a_piece_that_moves_again_is_not_forgotten_by_a_restarted_runner(stops: bool) -> None:
+    lab = Lab({"*": [{"after_s": 100, "stop_s": 1}]})
+    async with lab.runner() as control:
+        run = await moved_again(lab, control)
+        if stops:
+            await control.stop(run, BEN)
+            await anyio.sleep(0.05)
+    async with lab.runner() as control:
+        if not stops:
+            await anyio.sleep(5)
+            assert control.open[f"{run}.1"].run.state == "running"
+            assert rests(control, run)["David"] == "going"
+            await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+        assert not await lab.david.moving("task--Work_0")
+        assert not await lab.carol.moving("task--Work_1")
+        assert lab.harness.journal.history(f"{run}.1").end == "stopped"

@@ -71,14 +71,15 @@ class Word(msgspec.Struct, frozen=True, kw_only=True):
 
 class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
     """A conducted run that an earlier process left: its start, how far it got, the highest number of
-    its pieces, those of calls without an outcome, by number of the call, each with the seq of its last
-    event, the states of the actions that robots play, and the last piece whose rest no answer has
-    proven."""
+    its pieces, those of calls without an outcome, by number of the call, and those that have moved
+    again since their outcome, each with the seq of its last event, the states of the actions that
+    robots play, and the last piece whose rest no answer has proven."""
 
     order: Order
     course: LedCourse
     sent: int
     pieces: dict[int, tuple[Run, int]]
+    again: tuple[tuple[Run, int], ...]
     states: dict[str, str]
     unproven: Run | None
 

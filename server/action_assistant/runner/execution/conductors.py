@@ -26,6 +26,7 @@ from action_assistant.runner.links.simulator import LeadableLink, Simulator
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import (
     Author,
+    MovesAgain,
     PieceBegan,
     PieceEnded,
     Published,
@@ -108,6 +109,9 @@ class Conductors:
         opened = self.open(first, run, texts, self._engine_for(first), seq=seq, left=left)
         if run.desired != "stopped":
             self._open[run.id].hold("The runner was restarted while it led this run.")
+        for piece, last in left.again:  # opened, each is told to the conductor (`_see`)
+            link = self._robots.link(piece.engine)
+            self._runs.drive(self._runs.open(piece, link, owns_link=False, seq=last))
         self._runs.drive(opened)
 
     async def follow_unread(self, run: Run, seq: int) -> None:
@@ -204,19 +208,26 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
                 case StopRequested(at=at):
                     ends.append((at, "stop"))
     pieces: dict[int, tuple[Run, int]] = {}
+    again: list[tuple[Run, int]] = []
     sent = await history.piece_ids(first.run)
+    moved = await history.piece_ids(first.run, MovesAgain.kind)
     for id_ in sent:
-        if id_ in noted and id_ not in newest.values():
-            continue  # its outcome is known, or a newer one was sent for its call
+        # Of the others the outcome is known, or a newer piece was sent for their call.
+        is_open = id_ not in noted or id_ in newest.values()
+        if not is_open and id_ not in moved:
+            continue
         left, seq = await _left_piece(history, id_)
-        if left.piece is not None and left.piece.call not in over:
+        if left.piece is not None and is_open and left.piece.call not in over:
             pieces[left.piece.call] = left, seq
+        elif id_ in moved and left.end is None:
+            again.append((left, seq))
     steps = tuple(((at - began) / 1000, step) for at, step in ends)
     return LeftOpen(
         order=order_of(first),
         course=LedCourse(began=began, steps=steps),
         sent=max(map(piece_number, sent), default=0),
         pieces=pieces,
+        again=tuple(again),
         states={name: each.state for name, each in now.actions.items() if each.robot},
         unproven=unproven,
     )

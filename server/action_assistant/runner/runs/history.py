@@ -67,11 +67,12 @@ class RunHistory:
         events_read = [event for event in read if event is not None]
         return replay(events_read), events[-1].seq if events else 0, len(events_read) == len(read)
 
-    async def piece_ids(self, run: str) -> list[str]:
+    async def piece_ids(self, run: str, having: str = "") -> list[str]:
         """Return the ids of all stored pieces of a conducted run in the order of their numbers, of
-        which some may be missing: a piece that could not be stored has used up its number. Raise
-        Unavailable while the journal cannot be read."""
-        rows = await self._journal.query(queries.streams_of_pieces(run))
+        which some may be missing: a piece that could not be stored has used up its number.
+        `having`: only of those with an event of this kind. Raise Unavailable while the journal
+        cannot be read."""
+        rows = await self._journal.query(queries.streams_of_pieces(run, having))
         return pieces_in(run, (row.stream.removeprefix(stream_of("")) for row in rows))
 
     async def pieces(self, run: str) -> tuple[list[LeftRun], list[str]]:

@@ -52,10 +52,12 @@ def of_run(run_id: str) -> Select[Any]:
     return select(run.c.state, run.c.simulated).where(run.c.id == run_id)
 
 
-def streams_of_pieces(run_id: str | ColumnElement[str]) -> Select[Any]:
-    """Select the streams in the journal whose names begin as those of the pieces of a run do."""
+def streams_of_pieces(run_id: str | ColumnElement[str], having: str = "") -> Select[Any]:
+    """Select the streams in the journal whose names begin as those of the pieces of a run do.
+    `having`: only those with an event of this kind."""
     stream, own = runner_event.c.stream, literal("run/") + run_id
-    return select(stream).distinct().where(stream > own + ".", stream < own + "/")
+    found = select(stream).distinct().where(stream > own + ".", stream < own + "/")
+    return found.where(runner_event.c.kind == having) if having else found
 
 
 def by_request(request_id: str) -> Select[Any]:
