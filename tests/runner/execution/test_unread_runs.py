@@ -204,3 +204,21 @@ async def test_a_piece_that_moves_again_is_not_forgotten_by_a_restarted_runner(s
         assert not await lab.david.moving("task--Work_0")
         assert not await lab.carol.moving("task--Work_1")
         assert lab.harness.journal.history(f"{run}.1").end == "stopped"
+
+
+@virtual
+async def test_the_word_for_the_rest_of_a_piece_that_moves_again_is_no_proof_of_its_run() -> None:
+    lab = Lab({"*": [{"after_s": 100, "stop_s": 1}]})
+    async with lab.runner() as control:
+        run = await moved_again(lab, control)
+        lab.david.engine = engine({"*": [{"after_s": 60}]})
+        piece = f"{run}.1"
+        await until(lambda: bool(control.open[piece].run.lost))
+        await control.stop(run, BEN)
+        await anyio.sleep(10)
+        await control.confirm_rest(piece, RestRequest("I stand beside it."), BEN)
+        assert await ended(control, run) == "error"
+        found = lab.harness.journal.history(run)
+        assert found.proof_at is None
+        assert found.at_rest is not None
+        assert found.at_rest.by == BEN

@@ -521,7 +521,12 @@ class Conductor:
                 step.rested.set()
             return
         step.over.set()
-        self._unproven = run if run.at_rest is not None else self._unproven
+        self._note_end(run)
+
+    def _note_end(self, piece: Run) -> None:
+        """Note that a piece has ended, and whether an answer has proven that; show the end of the
+        graph if it has waited for this."""
+        self._unproven = piece if piece.at_rest is not None else self._unproven
         self._show_what_may_be(self._first.run)
 
     def _find_trouble(self, step: Step, run: Run) -> None:
@@ -682,6 +687,8 @@ class Conductor:
         if again.id in self._again or again.end is None:
             self._rests.show(again)
         if again.end is not None:
+            if again.id in self._again:
+                self._note_end(again)
             return
         is_known, self._again[again.id] = again.id in self._again, piece
         if self._gate.is_final and again.desired != "stopped":
