@@ -103,7 +103,7 @@ class Step:
         self.word: Word | None = None
         self.decided = anyio.Event()  # it is to end, or a person has given its outcome
         self.over = anyio.Event()  # its piece has ended
-        self.rested = anyio.Event()  # its action has ended, and its graph goes on
+        self.rested = anyio.Event()  # set once `has_rested` is true
         self._waiting = anyio.CancelScope()  # while nothing was sent
 
     @property
@@ -115,6 +115,14 @@ class Step:
     def is_open(self) -> bool:
         """True while its piece may move: it was handed over and is not proven at rest."""
         return self.run is not None and self.run.end is None
+
+    @property
+    def has_rested(self) -> bool:
+        """True while its action has ended and the graph of its piece goes on."""
+        run = self.run
+        if run is None or run.graph_state != "RUNNING":
+            return False
+        return run.actions[self.node].state == "FINISHED"
 
     @property
     def is_going(self) -> bool:

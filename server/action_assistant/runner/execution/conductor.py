@@ -517,7 +517,7 @@ class Conductor:
             self._run.tell(event)
         if run.end is None:
             self._find_trouble(step, run)
-            if _rests(step, run):
+            if step.has_rested:
                 step.rested.set()
             return
         step.over.set()
@@ -553,7 +553,7 @@ class Conductor:
             await step.rested.wait()
             if not self._values.tells_false_by_rest(step):
                 await anyio.sleep(_UNSET_S)
-            if step.run is not None and step.piece is not None and _rests(step, step.run):
+            if step.piece is not None and step.has_rested:
                 step.lacks_output = not step.is_stopped
                 step.piece.stop(GRAPH, "")
                 return
@@ -700,8 +700,3 @@ class Conductor:
     def _run(self) -> Leading:
         assert self._leading is not None
         return self._leading
-
-
-def _rests(step: Step, run: Run) -> bool:
-    """Return whether the action of a piece has ended and its graph goes on."""
-    return run.graph_state == "RUNNING" and run.actions[step.node].state == "FINISHED"
