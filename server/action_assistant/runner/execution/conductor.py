@@ -17,7 +17,7 @@ import logging
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, ExitStack, suppress
 from math import inf
-from typing import Final, Literal
+from typing import Final, Literal, NoReturn
 
 import anyio
 import msgspec
@@ -206,17 +206,11 @@ class Conductor:
             if piece.run.end is None:
                 piece.stop(author, "")
 
-    async def pause(self, graph_name: str) -> None:
-        """Raise NotSent: a conducted run is held, not paused."""
-        raise NotSent("a conducted run is held, not paused")
+    async def _refuse(self, *_: object, **__: object) -> NoReturn:
+        """Raise NotSent: a conducted run is held, not paused, and its graph stays as it is."""
+        raise NotSent("a conducted run is held, not paused, and its graph cannot be changed")
 
-    async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Raise NotSent: a conducted run is held, not paused."""
-        raise NotSent("a conducted run is held, not paused")
-
-    async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Raise NotSent: the graph of a conducted run cannot be changed while it runs."""
-        raise NotSent("the graph of a conducted run cannot be changed while it runs")
+    pause = resume = modify = _refuse
 
     async def get(self) -> Answer:
         """Return the whole graph, with the states of actions as their robots showed them. Raise
