@@ -36,83 +36,19 @@ from action_assistant.schema.branches import BRANCHES, VERSIONS
 from action_assistant.schema.editor_tables import editor_head, editor_snapshot
 from action_assistant.schema.log_tables import LOG
 
-Asked: TypeAlias = Callable[[Callable[[Connection], Any]], Awaitable[Any]]
-
-_PATIENCE_S: Final = 2.0
-_FINE: Final = ""
-#: A stream that nothing is ever stored in.
-_NOTHING: Final = {"stream": "health", "seq": 0, "proof": b"", "state": b""}
-
-
-class JournalProbe:
-    """Tests a journal on request, once a second at most. `write` commits something on the writer's
-    thread, `read` asks beside it; `is_alive` returns whether that thread lives."""
-
-    def __init__(
-        self, branch: Branch, write: Asked, read: Asked, is_alive: Callable[[], bool]
-    ) -> None:
-        self._expected = revisions_of(branch)[-1]
-        self._is_alive = is_alive
-        self._writing = SharedCheck(lambda: _tried(write, _leave_no_trace), patience=_PATIENCE_S)
-        self._reading = SharedCheck(lambda: _tried(read, self._misfit), patience=_PATIENCE_S)
-
-    async def parts(self) -> dict[str, str | None]:
-        """Return for each part of the journal None if it works, else the reason."""
-        parts: dict[str, str | None] = {"database": None, "writer": None, "schema": None}
-        if not self._is_alive():
-            parts["writer"] = (
-                "The thread that writes the journal has ended: start this process anew."
-            )
-            return parts
-        wrote = await self._writing.answer()
-        read = await self._reading.answer()
-        if wrote:
-            parts["database"] = wrote
-        elif read is None:
-            parts["database"] = f"The database does not answer within {_PATIENCE_S:g} s."
-        elif wrote is None:
-            parts["writer"] = f"Nothing was stored within {_PATIENCE_S:g} s, though it can be read."
-        elif read:
-            parts["schema"] = read
-        return parts
-
-    def close(self) -> None:
-        """Cancel the tests under way."""
-        self._writing.cancel()
-        self._reading.cancel()
-
-    def _misfit(self, connection: Connection) -> str:
-        found = set(connection.scalars(select(VERSIONS.c.version_num)))
-        if self._expected in found:
-            return _FINE
-        other = ", ".join(sorted(found)) or "none"
-        return f"The tables are of another version ({other}, not {self._expected})."
-
-
-async def _tried(way: Asked, question: Callable[[Connection], Any]) -> str:
-    """Return the reason why a question failed, or the text for success."""
-    try:
-        said: str | None = await way(question)
-    except Unavailable as error:
-        return error.detail
-    return said or _FINE
-
-
-def _leave_no_trace(connection: Connection) -> None:
-    """Write and delete a row, so that the commit has to reach the disk as that of an edit does."""
-    table = editor_snapshot
-    connection.execute(insert(table).values(_NOTHING))
-    connection.execute(delete(table).where(table.c.stream == _NOTHING["stream"]))
-
-
 log: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
+#: Runs work on a connection of the journal, and returns its result.
+OnConnection: TypeAlias = Callable[[Callable[[Connection], Any]], Awaitable[Any]]
 
+_PROBE_TIMEOUT_S: Final = 2.0
+_FINE: Final = ""
+#: A row of a stream in which nothing is ever stored.
+_PROBE_ROW: Final = {"stream": "health", "seq": 0, "proof": b"", "state": b""}
 _PAGE: Final = 500  # events that a follower reads at once
 _HELD: Final = 1000  # events that wait for a follower in memory; after that it reads them
 _BRIEF: Final = 64 * 1024  # bytes of events that are written without a thread
-
 # The tables of the log are the same for both branches.
 _head, _snapshot = editor_head.c, editor_snapshot.c
 
@@ -495,3 +431,68 @@ class Journal(JournalReader):
                 if each.position > last:
                     last = each.position
                     yield each
+
+
+class JournalProbe:
+    """Tests a journal on request, once a second at most. `write` commits something on the writer's
+    thread, `read` asks beside it; `is_alive` returns whether that thread lives."""
+
+    def __init__(
+        self, branch: Branch, write: OnConnection, read: OnConnection, is_alive: Callable[[], bool]
+    ) -> None:
+        self._expected = revisions_of(branch)[-1]
+        self._is_alive = is_alive
+        self._writing = SharedCheck(
+            lambda: _tried(write, _leave_no_trace), patience=_PROBE_TIMEOUT_S
+        )
+        self._reading = SharedCheck(lambda: _tried(read, self._misfit), patience=_PROBE_TIMEOUT_S)
+
+    async def parts(self) -> dict[str, str | None]:
+        """Return for each part of the journal None if it works, else the reason."""
+        parts: dict[str, str | None] = {"database": None, "writer": None, "schema": None}
+        if not self._is_alive():
+            parts["writer"] = (
+                "The thread that writes the journal has ended: start this process anew."
+            )
+            return parts
+        wrote = await self._writing.answer()
+        read = await self._reading.answer()
+        if wrote:
+            parts["database"] = wrote
+        elif read is None:
+            parts["database"] = f"The database does not answer within {_PROBE_TIMEOUT_S:g} s."
+        elif wrote is None:
+            parts["writer"] = (
+                f"Nothing was stored within {_PROBE_TIMEOUT_S:g} s, though it can be read."
+            )
+        elif read:
+            parts["schema"] = read
+        return parts
+
+    def close(self) -> None:
+        """Cancel the tests under way."""
+        self._writing.cancel()
+        self._reading.cancel()
+
+    def _misfit(self, connection: Connection) -> str:
+        found = set(connection.scalars(select(VERSIONS.c.version_num)))
+        if self._expected in found:
+            return _FINE
+        other = ", ".join(sorted(found)) or "none"
+        return f"The tables are of another version ({other}, not {self._expected})."
+
+
+async def _tried(way: OnConnection, question: Callable[[Connection], Any]) -> str:
+    """Return the reason why a question failed, or the text for success."""
+    try:
+        said: str | None = await way(question)
+    except Unavailable as error:
+        return error.detail
+    return said or _FINE
+
+
+def _leave_no_trace(connection: Connection) -> None:
+    """Write and delete a row, so that the commit has to reach the disk as that of an edit does."""
+    table = editor_snapshot
+    connection.execute(insert(table).values(_PROBE_ROW))
+    connection.execute(delete(table).where(table.c.stream == _PROBE_ROW["stream"]))

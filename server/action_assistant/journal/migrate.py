@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 _OURS: Final = re.compile(rf"({'|'.join(BRANCHES)})_\d+")
 log: Final = logging.getLogger(__name__)
 logging.getLogger("alembic.runtime").setLevel(logging.WARNING)  # we say it in one line
+# The table is the same for both branches.
+_LAST_WRITER: Final = select(written_by).order_by(written_by.c.since.desc()).limit(1)
+_SHORT_COMMIT: Final = 8
 
 
 def revisions_of(branch: str) -> list[str]:
@@ -165,11 +168,6 @@ def _is_foreign(connection: Connection, current: set[str]) -> bool:
     return not columns >= {*Event.__struct_fields__, "chain"}
 
 
-# The table is the same for both branches.
-_LAST: Final = select(written_by).order_by(written_by.c.since.desc()).limit(1)
-_SHORT: Final = 8
-
-
 class ProgramVersion(NamedTuple):
     """A version that wrote, and the revision of the tables then. `build`: its commit, "" if unknown."""
 
@@ -178,14 +176,16 @@ class ProgramVersion(NamedTuple):
     revision: str
 
     def __str__(self) -> str:
-        return f"{self.version} (commit {self.build[:_SHORT]})" if self.build else self.version
+        return (
+            f"{self.version} (commit {self.build[:_SHORT_COMMIT]})" if self.build else self.version
+        )
 
 
 def last_writer(connection: Connection) -> ProgramVersion | None:
     """Return the version that wrote last; None if no version was stored."""
     if not inspect(connection).has_table(written_by.name):
         return None
-    row = connection.execute(_LAST).first()
+    row = connection.execute(_LAST_WRITER).first()
     return None if row is None else ProgramVersion(row.version, row.build, row.revision)
 
 
@@ -193,7 +193,7 @@ def sign(connection: Connection, revision: str) -> None:
     """Store that this version writes from now on. Nothing is written if it was the last writer."""
     if not inspect(connection).has_table(written_by.name):
         return  # brought to an earlier revision, by a test
-    row = connection.execute(_LAST).first()
+    row = connection.execute(_LAST_WRITER).first()
     mine = ProgramVersion(VERSION, commit() or "", revision)
     if row is not None and (row.version, row.build, row.revision) == mine:
         return

@@ -9,6 +9,9 @@ from typing import Any, Final
 
 from action_assistant.errors import CannotStart
 
+_MOST_DESCRIPTORS: Final = 1 << 16  # that are asked for where there is no limit
+_WINDOWS_DESCRIPTORS: Final = 512  # where nobody says
+
 
 def _module(name: str) -> Any:
     try:
@@ -79,17 +82,13 @@ def user_exists(name: str) -> bool:
     return True
 
 
-_MOST: Final = 1 << 16  # descriptors that are asked for where there is no limit
-_WINDOWS: Final = 512  # descriptors, where nobody says
-
-
 def raise_descriptors() -> int:
     """Raise the limit of open files and connections of this process as far as allowed; return the
     new limit."""
     if resource is None:
-        return _WINDOWS
+        return _WINDOWS_DESCRIPTORS
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    most = _MOST if hard == resource.RLIM_INFINITY else hard
+    most = _MOST_DESCRIPTORS if hard == resource.RLIM_INFINITY else hard
     if soft != resource.RLIM_INFINITY and soft < most:
         try:
             resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
@@ -101,9 +100,9 @@ def raise_descriptors() -> int:
 def descriptors_allowed() -> int:
     """Return how many files and sockets this process could open at most."""
     if resource is None:
-        return _WINDOWS
+        return _WINDOWS_DESCRIPTORS
     _, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    return int(_MOST if hard == resource.RLIM_INFINITY else hard)
+    return int(_MOST_DESCRIPTORS if hard == resource.RLIM_INFINITY else hard)
 
 
 def bound_memory(more: int) -> None:

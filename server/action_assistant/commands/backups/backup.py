@@ -39,6 +39,14 @@ from action_assistant.private_files import make_folder, opener
 from action_assistant.system import posix
 from action_assistant.web.auth.keys import TOKEN_FILE
 
+_LOCK: Final = ".action-assistant.lock"
+_COMMAND_TIMEOUT_S: Final = 6 * 3600.0  # that a command may take
+_RETRY_S: Final = 15 * 60.0  # after which a backup that failed is tried again
+_WAIT_FOR_JOURNALS_S: Final = 10.0  # after which a folder without journals is looked at again
+_JOURNALS: Final = ("editor.db", "editor.database", "runner.db")
+_MOST_SAID: Final = 500  # characters of what a command said
+_NICE: Final = 19  # the least of a processor
+
 
 def _add_backup(backup: argparse.ArgumentParser) -> None:
     backup.epilog = (
@@ -167,15 +175,6 @@ def _tell(done: FinishedBackup, data: Path, off_site: OffSite | None) -> int:
     return 1 if made.missing else 0
 
 
-_LOCK: Final = ".action-assistant.lock"
-_PATIENCE: Final = 6 * 3600.0  # seconds that a command may take
-_SOON: Final = 15 * 60.0  # seconds after which a backup that failed is tried again
-_NEW: Final = 10.0  # seconds after which a folder without journals is looked at again
-_JOURNALS: Final = ("editor.db", "editor.database", "runner.db")
-_LINE: Final = 500  # characters of what a command said
-_NICE: Final = 19  # the least of a processor
-
-
 class RegularBackups(msgspec.Struct, frozen=True):
     """The settings of regular backups: source, target folder, retention rule, and the command that
     is called with each finished backup."""
@@ -225,12 +224,14 @@ def keep_making(plan: RegularBackups, every: float) -> int:
                 return 0
             begun = time.time()
             if not any((plan.data / name).exists() for name in _JOURNALS):
-                due = begun + min(every, _NEW)  # the processes are only just starting
+                due = begun + min(
+                    every, _WAIT_FOR_JOURNALS_S
+                )  # the processes are only just starting
                 continue
             try:
                 done, off_site = back_up(plan, Progress())
             except CannotStart as error:
-                due = time.time() + min(every, _SOON)
+                due = time.time() + min(every, _RETRY_S)
                 _say(f"no backup was made: {error} It is tried again in {due - time.time():.0f} s.")
                 continue
             due = max(begun + every, time.time())
@@ -302,17 +303,17 @@ def _taken_away(command: str | None, path: Path) -> OffSite | None:
             start_new_session=True,
         )
         try:
-            said, _ = process.communicate(timeout=_PATIENCE)
+            said, _ = process.communicate(timeout=_COMMAND_TIMEOUT_S)
         except BaseException:
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
             raise
         if process.returncode:
             lines = said.decode(errors="replace").strip().splitlines()
-            last = f": {lines[-1][:_LINE]}" if lines else " and said nothing"
+            last = f": {lines[-1][:_MOST_SAID]}" if lines else " and said nothing"
             why = f"`{command}` ended with {process.returncode}{last}"
     except subprocess.TimeoutExpired:
-        why = f"`{command}` did not end within {_PATIENCE / 3600:.0f} hours"
+        why = f"`{command}` did not end within {_COMMAND_TIMEOUT_S / 3600:.0f} hours"
     except (OSError, ValueError) as error:
         why = f"`{command}` cannot be run: {error}"
     return OffSite(round(time.monotonic() - begun, 3), why)

@@ -67,6 +67,10 @@ CHECKS: Final[tuple[Check, ...]] = (
     machine_checks.clock_is_possible,
     machine_checks.shared_memory_is_there,
 )
+_SIGNS: Final[dict[Severity, str]] = {"fine": "✓", "warning": "·", "error": "✗"}
+_ROBOTS_TIMEOUT_S: Final = 45.0
+#: The most seconds that `robots_answer` takes.
+ROBOTS_S: Final = _ROBOTS_TIMEOUT_S + 5
 
 
 def diagnose(place: Installation) -> list[Diagnostic]:
@@ -125,9 +129,6 @@ class _CheckThread(threading.Thread):
                 "Look at disks and servers on the network that it asks, and run doctor again.",
             )
         ]
-
-
-_SIGNS: Final[dict[Severity, str]] = {"fine": "✓", "warning": "·", "error": "✗"}
 
 
 def _add_doctor(doctor: argparse.ArgumentParser) -> None:
@@ -210,11 +211,6 @@ def _tell(each: Diagnostic) -> None:
         print(one_line(f"    {each.remedy}"), flush=True)
 
 
-_PATIENCE_S: Final = 45.0
-#: Seconds that it takes at most.
-ROBOTS_S: Final = _PATIENCE_S + 5
-
-
 def robots_answer(place: Installation) -> Iterator[Diagnostic]:
     """Check ROS 2, and whether each registered robot answers, with the Python that the runner would
     use. Yield what was found.
@@ -293,12 +289,12 @@ def _asked(interpreter: Interpreter, place: Installation) -> list[Diagnostic]:
             command,
             env=interpreter.environment(os.environ),
             capture_output=True,
-            timeout=_PATIENCE_S,
+            timeout=_ROBOTS_TIMEOUT_S,
             check=False,
         )
         return msgspec.json.decode(answer.stdout, type=list[Diagnostic])
     except subprocess.TimeoutExpired:
-        why = f"did not answer in {_PATIENCE_S:g} s"
+        why = f"did not answer in {_ROBOTS_TIMEOUT_S:g} s"
     except OSError as error:
         why = f"cannot be started: {error.strerror}"
     except msgspec.DecodeError:

@@ -25,6 +25,25 @@ from action_assistant.kit.packing import is_packed
 from action_assistant.schema import editor_tables
 from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker, run_here
 
+log: Final = logging.getLogger(__name__)
+
+SLICES: Final = (2_000, 500)  # events read at once; fewer where not all of those can be read
+TOGETHER: Final = 200_000  # events, or
+TOGETHER_BYTES: Final = 16 << 20  # in their bodies, after which those so far are put together
+_COLUMNS: Final = ("seq", "kind", "author", "at", "body", "position", "chain")
+_TYPES: Final = (int, str, str, int, bytes, int, bytes)
+_event = editor_tables.editor_event.c
+_ROWS: Final = (
+    select(*(_event[name] for name in _COLUMNS))
+    .where(
+        _event.stream == bindparam("stream"),
+        _event.seq > bindparam("after"),
+        _event.seq <= bindparam("last"),
+    )
+    .order_by(_event.seq)
+)
+_SMALL: Final = 32 * 1024  # bytes that are put together at once: milliseconds, as a way aside takes
+
 
 class StreamDamage(msgspec.Struct, frozen=True):
     """A stream is sound before its event `seq`, and not at it."""
@@ -100,23 +119,6 @@ def _first_bad(document: bytes, events: EventColumns) -> tuple[int, str]:
         except (Malformed, Panicked) as error:
             return n, str(error)
     raise Unavailable("A log reads otherwise each time.")
-
-
-SLICES: Final = (2_000, 500)  # events read at once; fewer where not all of those can be read
-TOGETHER: Final = 200_000  # events, or
-TOGETHER_BYTES: Final = 16 << 20  # in their bodies, after which those so far are put together
-_COLUMNS: Final = ("seq", "kind", "author", "at", "body", "position", "chain")
-_TYPES: Final = (int, str, str, int, bytes, int, bytes)
-_event = editor_tables.editor_event.c
-_ROWS: Final = (
-    select(*(_event[name] for name in _COLUMNS))
-    .where(
-        _event.stream == bindparam("stream"),
-        _event.seq > bindparam("after"),
-        _event.seq <= bindparam("last"),
-    )
-    .order_by(_event.seq)
-)
 
 
 class LogTail:
@@ -268,11 +270,6 @@ def _linked_of_one(chain: bytes, stream: str, events: StoredColumns) -> int:
         rows: Iterable[Sequence[Any]] = zip(*events, strict=True)
         typed = list(itertools.takewhile(lambda row: tuple(map(type, row)) == _TYPES, rows))
         return linked(chain, stream, StoredColumns(*zip(*typed, strict=True))) if typed else 0
-
-
-log: Final = logging.getLogger(__name__)
-
-_SMALL: Final = 32 * 1024  # bytes that are put together at once: milliseconds, as a way aside takes
 
 
 class Loaded(msgspec.Struct, frozen=True):

@@ -37,8 +37,15 @@ from action_assistant.editor.log.graph_events import DEFERRED, UPDATED
 from action_assistant.journal.events import Event
 from action_assistant.kit.packing import is_packed, packed, unpacked
 
+log: Final = logging.getLogger(__name__)
+
 #: Kind, author and body of an event.
 EventRow: TypeAlias = tuple[str, str, bytes]
+_BODIES: Final = msgspec.msgpack.Decoder(list[bytes])
+WAITING_BYTES: Final = 4 << 20  # of one author, for something that may never come
+WAITING_UPDATES: Final = 256
+_KEPT_BYTES: Final = 256 * 1024
+_LARGE: Final = 1 << 20  # bytes, from which on it is stored packed
 
 
 class EventColumns(msgspec.Struct, frozen=True):
@@ -100,17 +107,6 @@ class EventColumns(msgspec.Struct, frozen=True):
 
 def _received(first: int, kinds: list[str], authors: list[str], bodies: bytes) -> EventColumns:
     return EventColumns(first, kinds, authors, _BODIES.decode(bodies))
-
-
-_BODIES: Final = msgspec.msgpack.Decoder(list[bytes])
-
-
-log: Final = logging.getLogger(__name__)
-
-WAITING_BYTES: Final = 4 << 20  # of one author, for something that may never come
-WAITING_UPDATES: Final = 256
-_KEPT_BYTES: Final = 256 * 1024
-_LARGE: Final = 1 << 20  # bytes, from which on it is stored packed
 
 
 class UpdateEffect(Enum):

@@ -43,9 +43,28 @@ from action_assistant.umrf.model import (
     Remap,
 )
 
+__all__ = [
+    "PLAIN",
+    "Maps",
+    "change",
+    "fill",
+    "flatten",
+    "is_same",
+    "maps_of",
+    "name_of",
+    "new_aid",
+    "read",
+    "read_maps",
+]
+
 Fields: TypeAlias = Mapping[str, object]
 _Extra: TypeAlias = tuple[tuple[str, JsonText], ...]
 _NOTHING: Fields = {}
+#: root → flat key → plain value
+Maps: TypeAlias = dict[str, dict[str, object]]
+SCHEMA: Final = 1.0
+#: The types of values of a key; nested shared types, which no client of ours writes, are not among them.
+PLAIN: Final = (str, float, int, bool, list, dict, bytes, bytearray, type(None))
 
 
 def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
@@ -281,28 +300,6 @@ def _redirected(relations: list[Relation], taken_up: Mapping[Key, Key]) -> list[
         taken.add(relation_id(Ends(parent, child, listing)))
         arrows.append(replace(relation, parent=parent, child=child, listing=listing))
     return arrows
-
-
-__all__ = [
-    "PLAIN",
-    "Maps",
-    "change",
-    "fill",
-    "flatten",
-    "is_same",
-    "maps_of",
-    "name_of",
-    "new_aid",
-    "read",
-    "read_maps",
-]
-
-#: root → flat key → plain value
-Maps: TypeAlias = dict[str, dict[str, object]]
-
-SCHEMA: Final = 1.0
-#: The types of values of a key; nested shared types, which no client of ours writes, are not among them.
-PLAIN: Final = (str, float, int, bool, list, dict, bytes, bytearray, type(None))
 
 
 def new_aid() -> Key:

@@ -23,6 +23,10 @@ from action_assistant.umrf.model import PRECONDITIONS
 _DELETED: Final = 1  # the kind of an item whose content is gone
 _VALUES: Final = frozenset({3, 8})  # the kinds of items that hold plain values
 _ROOTS: Final = {root.encode(): root for root in ROOTS}
+#: A plain value of the document as MessagePack; None where there is no such key.
+Packed: TypeAlias = bytes | None
+Place: TypeAlias = tuple[Root, str]
+_OUTCOMES: Final = frozenset(PRECONDITIONS)
 
 
 class LostValue(NamedTuple):
@@ -160,11 +164,6 @@ def _value_of(item: WrittenItem) -> object:
     with applying():
         doc.apply_update(one + b"\x01m\x01v" + item.content + b"\x00")
     return shared.get("v")
-
-
-#: A plain value of the document as MessagePack; None where there is no such key.
-Packed: TypeAlias = bytes | None
-Place: TypeAlias = tuple[Root, str]
 
 
 class LoggedChange(NamedTuple):
@@ -323,9 +322,6 @@ def _plain(value: object) -> object:
 
 def _packed(value: object) -> Packed:
     return None if value is None else msgspec.msgpack.encode(value)
-
-
-_OUTCOMES: Final = frozenset(PRECONDITIONS)
 
 
 def places_of(state: bytes) -> dict[Place, Any]:

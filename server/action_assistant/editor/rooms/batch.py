@@ -25,10 +25,19 @@ from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker
 
 log: Final = logging.getLogger(__name__)
 
+T = TypeVar("T")
+
 LONGEST: Final = 0.01  # seconds; nobody sees it, and a busy room needs a fifth of the work
 SHORTEST: Final = 0.001  # seconds in which what people do at the same time arrives
 _BUSY: Final = 0.7  # share of its processor that the loop works, from which on windows are longest
-_MEMORY: Final = 0.1  # seconds over which that is looked at
+_MEASURED_S: Final = 0.1  # over which that share is measured
+#: Bytes of an update that is tried on a copy first, and is a batch of its own.
+LARGE: Final = 8 * 1024
+_BATCH_ITEMS: Final = 200  # of one commit
+_BATCH_BYTES: Final = 512 * 1024
+_CRASHES: Final = 2  # of workers that try an update, after which the update counts as their cause
+_MERGED: Final = 50  # updates merged at once; the time for it grows with their square
+_MERGED_BYTES: Final = 128 * 1024
 
 
 class TurnEnd:
@@ -87,7 +96,7 @@ class BatchWindow:
 
     def _open(self) -> None:
         now = self._loop.time()
-        if now - self._looked_at > _MEMORY:
+        if now - self._looked_at > _MEASURED_S:
             self._adapt_length(now)
         self._next = now + self._length
         waiting, self._waiting = self._waiting, []
@@ -100,18 +109,6 @@ class BatchWindow:
         busy = (worked - self._worked) / (now - self._looked_at)
         self._worked, self._looked_at = worked, now
         self._length = max(self._shortest, self._longest * min(1.0, busy / _BUSY) ** 2)
-
-
-T = TypeVar("T")
-
-LARGE: Final = (
-    8 * 1024
-)  # bytes of an update that is tried on a copy first, and is a batch of its own
-_BATCH: Final = 200  # items of one commit
-_BATCH_BYTES: Final = 512 * 1024
-_CRASHES: Final = 2  # of workers that try an update, after which the update counts as their cause
-_MERGED: Final = 50  # updates merged at once; the time for it grows with their square
-_MERGED_BYTES: Final = 128 * 1024
 
 
 class SubmittedEdit(msgspec.Struct, frozen=True):
@@ -311,7 +308,7 @@ def batch_of(
     """Return the items of the next commit, and the rest. A batch is small enough for clients that read in
     time; a large update is a batch of its own; with `one` every item is."""
     size = count = 0
-    for item in items[: 1 if one else _BATCH]:
+    for item in items[: 1 if one else _BATCH_ITEMS]:
         own = len(item.update) if isinstance(item, SubmittedEdit) else 0
         size += own
         if count and (size > _BATCH_BYTES or own > LARGE):

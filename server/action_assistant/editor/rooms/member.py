@@ -16,7 +16,12 @@ from action_assistant.web.server.direct import framed
 PER_MINUTE: Final = 16 << 20  # bytes, of all sockets of a person
 AT_ONCE: Final = 32 << 20  # bytes: a large graph after a day without a network
 #: Bytes that a presence message counts for at least, so that 200 of them a second are allowed without end.
-_PRESENCE: Final = PER_MINUTE // (60 * 200)
+_PRESENCE_BYTES: Final = PER_MINUTE // (60 * 200)
+WAITING_FRAMES: Final = 256
+WAITING_BYTES: Final = 1 << 20
+_BURST_S: Final = 0.1  # processor time of the loop that edits of one socket may take at once
+_LOOP_SHARE: Final = 0.2  # of the time, that they may take for long
+_UNHANDLED_EDITS: Final = 256  # of one socket that may wait in the room
 
 
 class ByteRateLimits:
@@ -28,7 +33,7 @@ class ByteRateLimits:
 
     def spend_on_presence(self, person: str, size: int) -> float:
         """Count a presence message of `size` bytes; return as `spend` does."""
-        return self.spend(person, max(size, _PRESENCE))
+        return self.spend(person, max(size, _PRESENCE_BYTES))
 
     def spend(self, person: str, size: int) -> float:
         """Count `size` bytes that a person sent; return the seconds to wait before more of theirs is read."""
@@ -37,13 +42,6 @@ class ByteRateLimits:
         bucket = self._buckets.of(person)
         bucket.spend(size)
         return bucket.debt()
-
-
-WAITING_FRAMES: Final = 256
-WAITING_BYTES: Final = 1 << 20
-_BURST_S: Final = 0.1  # processor time of the loop that edits of one socket may take at once
-_SHARE: Final = 0.2  # of the time, that they may take for long
-_UNHANDLED_EDITS: Final = 256  # of one socket that may wait in the room
 
 
 class _SyncState(Enum):
@@ -73,7 +71,9 @@ class Member:
         self.synced = False  # has been sent the document
         self.refused = False  # nothing more is taken from it
         self.close_text: str | None = None  # where the close code alone does not say enough
-        self._cpu: Final = TokenBucket(_BURST_S, _SHARE)  # seconds of the loop's processor time
+        self._cpu: Final = TokenBucket(
+            _BURST_S, _LOOP_SHARE
+        )  # seconds of the loop's processor time
         self.handled = 0  # edits of this socket that the room has dealt with
         self._received = 0  # edits that the socket sent
         self._frames: list[bytes] = []

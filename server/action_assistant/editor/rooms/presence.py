@@ -21,6 +21,10 @@ PALETTE: Final = (
 )  # fmt: skip
 #: The colour of people who left before others took all colours.
 NOBODYS: Final = "#757575"
+STATE_LIMIT: Final = 32_768  # bytes of one client's entry
+MOST_NUMBER: Final = 2**53 - 2  # of a client or a clock: pages read it, and the one after it
+_GONE: Final = b"null"
+_decode: Final = msgspec.json.Decoder(dict[str, msgspec.Raw])
 
 
 def colour_at(place: int) -> str:
@@ -73,12 +77,6 @@ class PersonColours:
             return self._places.pop(first)
         taken = set(self._places.values())
         return next(place for place in range(len(taken) + 1) if place not in taken)
-
-
-STATE_LIMIT: Final = 32_768  # bytes of one client's entry
-MOST_NUMBER: Final = 2**53 - 2  # of a client or a clock: pages read it, and the one after it
-_GONE: Final = b"null"
-_decode: Final = msgspec.json.Decoder(dict[str, msgspec.Raw])
 
 
 class PersonStamp(msgspec.Struct, frozen=True):

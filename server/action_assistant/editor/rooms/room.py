@@ -59,7 +59,16 @@ from action_assistant.logs import about
 from action_assistant.web.server.direct import framed
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
-_BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30)
+log: Final = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
+_ACK_BUCKETS: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30)
+#: Intervals that an announcement waits for an update to go along with.
+_ANNOUNCEMENT_WAIT: Final = 1.5
+_DAMAGED: Final = "This graph can only be read: change {} of its history is damaged."
+_CLOSING: Final = "This graph is being closed; try again."
+_ENDS: Final = (asyncio.CancelledError, KeyboardInterrupt, SystemExit)
 
 
 class RoomMetrics(Collector):
@@ -73,7 +82,7 @@ class RoomMetrics(Collector):
         self._acks = Histogram(
             "action_assistant_ack_seconds",
             "Time from an edit's arrival at its room until it was durable and acknowledged.",
-            buckets=_BUCKETS,
+            buckets=_ACK_BUCKETS,
             registry=None,
         )
 
@@ -85,20 +94,17 @@ class RoomMetrics(Collector):
 
     def objected(self, error: Objection) -> None:
         """Count an edit that was refused for this reason."""
-        self.refused[_name(error)] += 1
+        self.refused[_label(error)] += 1
 
     def collect(self) -> Iterator[Metric]:
         """Yield the metrics, as `prometheus_client` asks a collector for them."""
         yield from self._acks.collect()
 
 
-def _name(error: Objection) -> str:
+def _label(error: Objection) -> str:
     """Return the name of a reason in snake case, as labels are written."""
     name = type(error).__name__
     return "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
-
-
-_PATIENCE: Final = 1.5  # intervals that an announcement waits for an update to go along with
 
 
 class UpdateBroadcast:
@@ -155,7 +161,7 @@ class UpdateBroadcast:
         now = self._loop.time()
         if now < self._next_announcement:
             if self._timer is None:
-                wait = _PATIENCE * self._interval
+                wait = _ANNOUNCEMENT_WAIT * self._interval
                 self._timer = self._loop.call_later(wait, self._announce)
             return False
         self._next_announcement = now + self._interval
@@ -208,7 +214,7 @@ def answer_requests(
     for comparison in outcome.comparisons:
         comparisons.ask(comparison)
     for read in outcome.reads:
-        _read(read, replica, seq)
+        _answer_read(read, replica, seq)
 
 
 def _send_document(request: SyncRequest, replica: Replica, seq: int) -> None:
@@ -223,22 +229,13 @@ def _send_document(request: SyncRequest, replica: Replica, seq: int) -> None:
     request.member.post_ack(seq)
 
 
-def _read(request: ReadRequest, replica: Replica, seq: int) -> None:
+def _answer_read(request: ReadRequest, replica: Replica, seq: int) -> None:
     if request.done.done():  # nobody waits any more
         return
     try:
         request.done.set_result(request.see(replica, seq))
     except Exception as error:  # noqa: BLE001 - the reader's own
         request.done.set_exception(error)
-
-
-log: Final = logging.getLogger(__name__)
-
-T = TypeVar("T")
-
-_DAMAGED: Final = "This graph can only be read: change {} of its history is damaged."
-_CLOSING: Final = "This graph is being closed; try again."
-_ENDS: Final = (asyncio.CancelledError, KeyboardInterrupt, SystemExit)
 
 
 class Room:

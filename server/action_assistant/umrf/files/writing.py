@@ -1,4 +1,4 @@
-"""Writes graphs as canonical D3 files (docs/contracts.md 2)."""
+"""Writes graphs as canonical D3 files, and names those files (docs/contracts.md 2)."""
 
 import re
 from collections.abc import Iterable
@@ -12,6 +12,13 @@ from action_assistant.umrf.json.text import Json, Number, dump_indented, number,
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Key, Position, Relation
 from action_assistant.umrf.parameters import nest
 from action_assistant.umrf.relations import conditions_text
+
+#: An engine takes a file with this in its name for a graph, and one with the other for an action.
+GRAPH_MARK: Final = "graph.json"
+ACTION_MARK: Final = "umrf.json"
+ENDING: Final = ".umrf.graph.json"
+_UNFIT: Final = re.compile(r"[^A-Za-z0-9_.-]+")
+_LONGEST_STEM: Final = 80
 
 
 class Stamp(msgspec.Struct, frozen=True):
@@ -157,20 +164,12 @@ def _joined(ours: Json, theirs: Json) -> Json:
     return ours
 
 
-#: An engine takes a file with this in its name for a graph, and one with the other for an action.
-GRAPH_MARK: Final = "graph.json"
-ACTION_MARK: Final = "umrf.json"
-ENDING: Final = ".umrf.graph.json"
-_UNFIT: Final = re.compile(r"[^A-Za-z0-9_.-]+")
-_LONGEST: Final = 80
-
-
 def graph_file_name(graph: str, number: int = 1) -> str:
     """Return a name that every file system accepts, whatever the graph is called.
 
     `number` distinguishes graphs that would have the same file name.
     """
-    stem = unmarked(_UNFIT.sub("_", graph)).strip("._")[:_LONGEST] or "graph"
+    stem = unmarked(_UNFIT.sub("_", graph)).strip("._")[:_LONGEST_STEM] or "graph"
     return f"{stem}{'' if number == 1 else f'-{number}'}{ENDING}"
 
 

@@ -45,6 +45,8 @@ from action_assistant.umrf.semantics.parts import exit_inputs, exit_owner
 from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
 
 _NAMES: Final = {ENTRY: "the entry", EXIT: "the exit"}
+#: Names that no action can have: the engine takes them for the ends of a graph.
+_RESERVED: Final = frozenset({"graph_entry", "graph_exit"})
 
 
 class BehaviourDifference(NamedTuple):
@@ -146,10 +148,6 @@ def _values(
         )
     except RemapUnknown:
         return relation.remap
-
-
-#: Names that no action can have: the engine takes them for the ends of a graph.
-_RESERVED: Final = frozenset({"graph_entry", "graph_exit"})
 
 
 class Extracted(msgspec.Struct, frozen=True, tag="extracted", tag_field="kind"):

@@ -34,8 +34,32 @@ from action_assistant.web.auth.caller import Caller, caller
 if TYPE_CHECKING:  # not on Windows
     from multiprocessing.context import ForkServerContext, ForkServerProcess
 
+__all__ = [
+    "HOPELESS",
+    "Crashed",
+    "GaveUp",
+    "Lane",
+    "OutOfTime",
+    "RunInWorker",
+    "child",
+    "kept_warm",
+    "run_here",
+]
+
+log: Final = logging.getLogger(__name__)
+
+T = TypeVar("T")
+
 _MEMORY: Final = 768 << 20  # bytes that a worker may take beyond what it begins with
 _TIRED: Final = 256 << 20  # bytes in use after which a worker makes room for a fresh one
+_MORE: Final = b"+"
+LAST: Final = b"."  # this worker does nothing more
+_WAITING: Final = 32  # requests of one person
+_ALL_WAITING: Final = 256
+_START_S: Final = 30.0
+_FIRST_S: Final = 2.0  # after the start, which has enough to do by itself
+_ENDING_S: Final = 5.0  # for which a process whose wire is closed may still be ending
+_DIED: Final = "The process that worked on this has died; nothing came of it."
 
 
 @cache
@@ -88,10 +112,6 @@ def _end_with_parent() -> None:
         os._exit(0)
 
 
-_MORE: Final = b"+"
-LAST: Final = b"."  # this worker does nothing more
-
-
 def serve(wire: Connection) -> None:
     """Serve requests one after the other until the parent closes the pipe."""
     with contextlib.suppress(EOFError, OSError):
@@ -120,33 +140,6 @@ def _raised(error: Exception) -> bytes:
         logging.getLogger(__name__).exception("a worker cannot say what went wrong")
         reply = pickle.dumps(("raised", RuntimeError(repr(error)[:2000])))
     return reply
-
-
-if TYPE_CHECKING:  # not on Windows
-    from multiprocessing.context import ForkServerProcess
-
-__all__ = [
-    "HOPELESS",
-    "Crashed",
-    "GaveUp",
-    "Lane",
-    "OutOfTime",
-    "RunInWorker",
-    "child",
-    "kept_warm",
-    "run_here",
-]
-
-log: Final = logging.getLogger(__name__)
-
-T = TypeVar("T")
-
-_WAITING: Final = 32  # requests of one person
-_ALL_WAITING: Final = 256
-_START_S: Final = 30.0
-_FIRST_S: Final = 2.0  # after the start, which has enough to do by itself
-_ENDING_S: Final = 5.0  # for which a process whose wire is closed may still be ending
-_DIED: Final = "The process that worked on this has died; nothing came of it."
 
 
 class RunInWorker(Protocol):
