@@ -15,7 +15,7 @@ from action_assistant.umrf.digest import digest, tree_digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.hierarchy.extraction import Extracted, extracted
 from action_assistant.umrf.model import Conditions, Graph, Relation
-from runner.execution.test_conductor import Lab, led, refused, shared
+from runner.execution.test_conductor import Lab, alarms, led, refused, shared
 from runner.harness import ANN, BEN, ended, sequence, until, virtual
 
 ALWAYS = Conditions(on_true="run", on_false="run", on_error="run")
@@ -126,17 +126,18 @@ async def test_the_outcome_of_a_sub_graph_is_that_of_its_last_action(outcome: st
         assert found.alarms == ()
 
 
-@virtual
-async def test_a_sub_graph_that_may_have_ended_false_or_with_an_error_asks_a_person() -> None:
-    lab = Lab(
-        {
-            "Work_0": [{"after_s": 1, "result": "on_error"}],
-            "Work_1": [{"after_s": 2, "result": "on_false"}],
-        }
-    )
+#: Two actions beside each other, of which one ends false and one with an error.
+DOUBTFUL = {
+    "Work_0": [{"after_s": 1, "result": "on_error"}],
+    "Work_1": [{"after_s": 2, "result": "on_false"}],
+}
+
+
+def side_by_side() -> Graph:
+    """The graph of DOUBTFUL: its states do not tell its outcome."""
     line = sequence("Pick", 2)
     first, second = (each.key for each in line.actions)
-    beside = msgspec.structs.replace(
+    return msgspec.structs.replace(
         line,
         relations=tuple(
             Relation(parent=parent, child=child, conditions=ALWAYS)
@@ -148,8 +149,13 @@ async def test_a_sub_graph_that_may_have_ended_false_or_with_an_error_asks_a_per
             )
         ),
     )
+
+
+@virtual
+async def test_a_sub_graph_that_may_have_ended_false_or_with_an_error_asks_a_person() -> None:
+    lab = Lab(DOUBTFUL)
     async with lab.runner() as control:
-        run = (await control.start(sent(going_on(TASK), beside, lost="wait"), ANN)).run.id
+        run = (await control.start(sent(going_on(TASK), side_by_side(), lost="wait"), ANN)).run.id
         await until(lambda: control.open[run].run.held is not None)
         found = control.open[run].run
         assert [each.code for each in found.alarms] == ["led_ended"]
@@ -158,6 +164,34 @@ async def test_a_sub_graph_that_may_have_ended_false_or_with_an_error_asks_a_per
         await control.give_outcome(run, WordRequest("Pick_0", "false", "I saw it."), BEN)
         await control.go_on(run, GoOnRequest(time(found.held.at)), BEN)
         assert await ended(control, run) == "finished"
+
+
+@pytest.mark.parametrize("is_stored", [True, False])
+@virtual
+async def test_no_word_is_taken_for_a_piece_that_moves_again_and_the_run_is_held(
+    is_stored: bool,
+) -> None:
+    lab = Lab(DOUBTFUL)
+    async with lab.runner() as control:
+        run = (await control.start(sent(going_on(TASK), side_by_side(), lost="wait"), ANN)).run.id
+        await anyio.sleep(0.5)
+        lab.harness.journal.slow = 0 if is_stored else 3
+        await until(lambda: control.open[run].run.held is not None)
+        first = control.open[run].run.held
+        assert first is not None
+        await control.go_on(run, GoOnRequest(time(first.at)), BEN)
+        await anyio.sleep(1)
+        assert (f"{run}.1" in control.open) is not is_stored
+        await lab.david.engine.start(lab.david.starts[0])
+        await until(lambda: bool(alarms(control.open[run].run, "moves_again")))
+        assert control.open[run].run.held is not None
+        with pytest.raises(Conflict, match="not known to be at rest"):
+            await control.give_outcome(run, WordRequest("Pick_0", "true", "I saw it."), BEN)
+        await control.stop(run, BEN)
+        assert await ended(control, run) == "stopped"
+        assert lab.harness.journal.history(f"{run}.1").end is not None
+        assert not await lab.david.moving(lab.david.starts[0].graph.name)
+        assert lab.carol.starts == []
 
 
 @virtual

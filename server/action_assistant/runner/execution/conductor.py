@@ -491,7 +491,7 @@ class Conductor:
         """Show what a robot shows of its piece, and act on its end and on its troubles."""
         if step.piece is not piece:  # it had not left, and another one was sent
             return
-        if step.call.number not in self._steps and piece.run.end is None:
+        if step.over.is_set() and piece.run.end is None:
             self.moves_again(piece)
         if piece.run.end is not None and not step.over.is_set():
             self._unstored.add(piece.recorder)
@@ -678,6 +678,9 @@ class Conductor:
     def moves_again(self, piece: OpenRun) -> None:
         """Act on a piece that had ended and moves, until it has ended again."""
         again = piece.run
+        for step in self._steps.values():  # it may still wait for the word of a person
+            if step.run is not None and step.run.id == again.id:
+                step.piece, step.run = piece, again
         if again.id in self._again or again.end is None:
             self._rests.show(again)
         if again.end is not None:
