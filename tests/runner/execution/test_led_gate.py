@@ -5,11 +5,12 @@ import asyncio
 import anyio
 import pytest
 
-from action_assistant.runner.execution.conducted_steps import StallWatch
+from action_assistant.runner.execution.conducted_steps import RestNews, StallWatch
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest
-from runner.execution.test_conductor import Lab
-from runner.harness import BEN, VirtualLoop, clock_us, ended, virtual
+from runner.execution.test_conductor import Lab, forked
+from runner.harness import BEN, VirtualLoop, clock_us, ended, until, virtual
 
 
 @virtual
@@ -61,3 +62,31 @@ async def test_a_process_that_stood_still_holds_the_run_and_lets_nothing_leave()
         tasks.cancel_scope.cancel()
     assert len(told) == 1
     assert told[0].startswith("The runner stood still for")
+
+
+@virtual
+async def test_a_fault_at_one_robot_keeps_no_stop_from_the_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lab = Lab({"*": [{"after_s": 60, "stop_s": 1}]})
+    show = RestNews.show
+
+    def failing(news: RestNews, piece: Run, *, asks: bool = False) -> None:
+        if piece.engine == "David" and piece.state == "stopping":
+            monkeypatch.undo()
+            raise RuntimeError("a fault of the runner")
+        show(news, piece, asks=asks)
+
+    async with lab.runner() as control:
+        run = await forked(lab, control)
+        await until(lambda: bool(lab.david.starts and lab.carol.starts))
+        await anyio.sleep(1)
+        monkeypatch.setattr(RestNews, "show", failing)
+        with pytest.raises(RuntimeError):
+            await control.stop(run, BEN)
+        assert control.open[run].run.state == "stopping"
+        assert await ended(control, run) == "stopped"
+        assert lab.david.stops
+        assert lab.carol.stops
+        for robot in (lab.david, lab.carol):
+            assert not await robot.moving(robot.starts[0].graph.name)

@@ -143,14 +143,18 @@ class OpenRun:
 
     def stop(self, author: Author, stop_id: str) -> None:
         """Record that a person wants the run stopped, and send stops until the run has ended. The
-        call never waits and never fails."""
-        if self._pressed is not None:
-            self._pressed(author)
-        else:
-            self._doubts.reach()
-        if pressed := self._stopping.press(author, stop_id):
-            self.tell(pressed, author.id)
+        call never waits. If it fails by a fault of the runner, stops are sent all the same, and
+        each of them reaches for the pieces that the call has not reached."""
+        pressed = self._stopping.press(author, stop_id)
         self._handing.cancel()
+        try:
+            if self._pressed is not None:
+                self._pressed(author)
+            else:
+                self._doubts.reach()
+        finally:
+            if pressed:
+                self.tell(pressed, author.id)
 
     @property
     def failed(self) -> frozenset[tuple[str, str]]:
