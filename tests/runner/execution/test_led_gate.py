@@ -90,3 +90,28 @@ async def test_a_fault_at_one_robot_keeps_no_stop_from_the_other(
         assert lab.carol.stops
         for robot in (lab.david, lab.carol):
             assert not await robot.moving(robot.starts[0].graph.name)
+
+
+@pytest.mark.parametrize("is_stored", [True, False])
+@pytest.mark.parametrize("names_piece", [True, False])
+@virtual
+async def test_a_piece_that_moves_after_the_end_of_its_run_can_be_stopped(
+    is_stored: bool, names_piece: bool
+) -> None:
+    lab = Lab({"*": [{"after_s": 10, "stop_s": 1}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control)
+        piece = f"{run}.1"
+        await anyio.sleep(15)
+        assert lab.carol.starts
+        lab.harness.journal.down = not is_stored
+        await until(lambda: run not in control.open or control.open[run].run.end == "finished")
+        await anyio.sleep(5)
+        assert (run in control.open) is not is_stored
+        await lab.david.engine.start(lab.david.starts[0])
+        await until(lambda: piece in control.open and control.open[piece].run.end is None)
+        assert await control.stop(piece if names_piece else run, BEN) == [piece]
+        await until(lambda: piece not in control.open or control.open[piece].run.end is not None)
+        assert lab.david.stops
+        assert not await lab.david.moving(lab.david.starts[0].graph.name)
+        lab.harness.journal.down = False

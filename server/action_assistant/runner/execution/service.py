@@ -199,18 +199,19 @@ class ExecutionService:
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
         """Begin to stop a run, or all runs of a group, and return the ids of the runs that are
-        being stopped. The list is empty if the run is over already. The call waits only to look
-        up an id that is not open. Raise NotFound if there is no such run or group."""
-        whole = whole_of(run)
-        if whole in self.open:  # nothing of the run of this piece shall go on
-            run = whole
-        if run in self.open:
-            return [run] if self._stop(run, author, stop_id) else []
-        group = [each for each, opened in tuple(self.open.items()) if opened.run.group == run]
-        if group:
+        being stopped. The Stop of a piece is one of its whole run; once that is over, a Stop of
+        either reaches the pieces that move again. The list is empty if all is over already. The
+        call waits only to look up an id that is not open. Raise NotFound if there is no such run
+        or group."""
+        for each in (whole_of(run), run):
+            if each in self.open and self._stop(each, author, stop_id):
+                return [each]
+        parts = [each for each, opened in tuple(self.open.items()) if run in _wholes_of(opened.run)]
+        if parts:
             self._stops.note(run, author, stop_id)
-            return [each for each in group if self._stop(each, author, stop_id)]
-        await self._over(run)
+            return [each for each in parts if self._stop(each, author, stop_id)]
+        if run not in self.open:
+            await self._over(run)
         return []
 
     def _stop(self, run: str, author: Author, stop_id: str) -> bool:
@@ -433,6 +434,11 @@ class ExecutionService:
             log.error("run %s: some of its events cannot be read", run.id)
             opened.lose("Some of what was recorded of this run cannot be read.")
         self._runs.drive(opened)
+
+
+def _wholes_of(run: Run) -> set[str]:
+    """Return the ids of what a run is a part of: a group, and a conducted run whose piece it is."""
+    return {run.group or "", run.piece.run if run.piece is not None else ""} - {""}
 
 
 def _no_piece(opened: OpenRun) -> OpenRun:
