@@ -29,11 +29,13 @@ class LaterRule:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.is_broken = False
+        self.takes_s = 0.0
         self.asked: list[str] = []
         items = LedLook.items
 
         async def with_rule(look: LedLook, robot: Any, *more: Any) -> list[Item]:
             self.asked.append(robot.registration.name)
+            await anyio.sleep(self.takes_s)
             found = await items(look, robot, *more)
             return [*found, CLOSED] if self.is_broken else found
 
@@ -107,6 +109,25 @@ async def test_a_rule_of_the_look_keeps_every_action_from_its_robot(
         assert sent() == 2
     assert rule.asked.count("David") > 3
     assert "Carol" in rule.asked
+
+
+@virtual
+async def test_an_answer_is_too_old_for_a_piece_after_a_rule_that_has_waited(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    lab = Lab({"*": [{"after_s": 2}]})
+    rule = LaterRule(monkeypatch)
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+        rule.takes_s = 4
+        await until(lambda: control.open[run].run.held is not None)
+        held = control.open[run].run.held
+        assert held is not None
+        assert "too late" in held.why
+        assert lab.carol.starts == []
+        rule.takes_s = 0
+        await go_on(control, run)
+        assert await ended(control, run) == "finished"
 
 
 def _group(request: Any) -> GroupRequest:

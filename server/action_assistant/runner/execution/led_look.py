@@ -27,8 +27,8 @@ _FRESH_S: Final = 3.0  # for which a look at a robot counts
 
 
 class Cleared(msgspec.Struct, frozen=True):
-    """A robot on which a piece may begin. `life`: of its engine; `at`: when it was looked at, in
-    seconds of the event loop."""
+    """A robot on which a piece may begin. `life`: of its engine; `at`: when it gave the answer on
+    which this rests, in seconds of the event loop."""
 
     robot: KnownEngine
     life: str
@@ -67,7 +67,8 @@ class LedLook:
         name, standing = robot.registration.name, robot.standing
         if life == cleared and standing.indexes is None:  # how it was started does not change
             standing = msgspec.structs.replace(standing, indexes=False)
-        return indexing_item(name, robot.facts, standing, await self._indexing.of(name, life))
+        word = await self._indexing.of(name, life) if standing.indexes is None else None
+        return indexing_item(name, robot.facts, standing, word)
 
     async def before_piece(self, robot: KnownEngine, run: Requested) -> Cleared:
         """Ask a robot, and return that a piece of a led run may begin on it. Raise NoAnswer with the
@@ -79,6 +80,7 @@ class LedLook:
             answer = await _asked(robot)
         except TimeoutError as late:
             raise NoAnswer(f"it has not answered for {_GET_S:.0f} s. {robot.why}") from late
+        at = anyio.current_time()  # what follows may wait, and makes the answer no newer
         if answer.incarnation != run.led.lives.get(name):
             raise NoAnswer("its engine was restarted since the start of this run")
         if robot.standing.doubt:
@@ -100,7 +102,7 @@ class LedLook:
         for item in items:
             if is_blocking(item, overridden):
                 raise NoAnswer(item.text)
-        return Cleared(robot, answer.incarnation, anyio.current_time())
+        return Cleared(robot, answer.incarnation, at)
 
     def _require_known(self, name: str, run: str) -> None:
         """Raise NoAnswer with the reason if a piece of this run on this robot is unknown, lost or
