@@ -12,6 +12,7 @@ import anyio
 import msgspec
 
 from action_assistant.errors import Conflict, Refused
+from action_assistant.runner.execution.monitor import STOOD_S
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.port import Answer, NoAnswer, NotSent
 from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
@@ -22,7 +23,6 @@ from action_assistant.runner.start.preflight import Item, is_blocking
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 
 _GET_S: Final = 2.0  # within which a robot has to answer before a piece leaves
-_STOOD_S: Final = 0.5  # a wait that lasts longer by this: the process itself stood still
 _FRESH_S: Final = 3.0  # for which a look at a robot counts
 
 
@@ -155,7 +155,7 @@ async def _asked(robot: KnownEngine) -> Answer:
         with anyio.fail_after(_GET_S):
             return await robot.get()
     except (NoAnswer, TimeoutError):
-        if anyio.current_time() - began < _GET_S + _STOOD_S:
+        if anyio.current_time() - began < _GET_S + STOOD_S:
             raise
     with anyio.fail_after(_GET_S):
         return await robot.get()

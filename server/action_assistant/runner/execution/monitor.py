@@ -43,6 +43,8 @@ log: Final = logging.getLogger(__name__)
 _POLL_S: Final = 1.0
 _STOP_POLL_S: Final = 0.1
 _SILENT_S: Final = 3.0
+#: A wait that lasts longer than it was asked for by this: the process itself stood still.
+STOOD_S: Final = 0.5
 _APPEAR_S: Final = 3.0  # after a start until its graph must show in answers
 _ABSENT_S: Final = 1.0  # for which answers must lack a graph whose start the engine has refused
 _GIVEN_UP_S: Final = 30.0  # until a stopped run that never showed is believed to have never begun

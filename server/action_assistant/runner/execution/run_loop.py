@@ -16,7 +16,7 @@ import msgspec
 
 from action_assistant.errors import OutcomeUnknown, Refused
 from action_assistant.kit.clock import ClockUs
-from action_assistant.runner.execution.monitor import Job, Monitor
+from action_assistant.runner.execution.monitor import STOOD_S, Job, Monitor
 from action_assistant.runner.execution.run_changes import RunChanges
 from action_assistant.runner.links.engine_process import has_ended
 from action_assistant.runner.links.engine_text import run_in
@@ -67,7 +67,6 @@ _HAND_OVER_S: Final = 5.0
 _UNCONFIRMED_S: Final = 2.0
 _SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
 _GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
-_STOOD_S: Final = 0.5  # a wait that lasts longer by this: the process itself stood still
 _NO_TURN: Final = (
     "It was not sent: its turn among the starts on its domain did not come within 5 seconds."
 )
@@ -389,7 +388,7 @@ class OpenRun:
                     await self._asks.wait()
                 self._asks = anyio.Event()
                 look = self.watch.begin_query()
-                self.watch.stood_still(max(0.0, look.began - began - wait - _STOOD_S))
+                self.watch.stood_still(max(0.0, look.began - began - wait - STOOD_S))
                 answer, why = None, ""
                 try:
                     with anyio.fail_after(_GET_S):
@@ -397,7 +396,7 @@ class OpenRun:
                 except (NoAnswer, TimeoutError) as failure:
                     why = str(failure)
                 stood = anyio.current_time() - look.began - _GET_S
-                if stood > _STOOD_S and not has_stood:  # this says nothing of the engine
+                if stood > STOOD_S and not has_stood:  # this says nothing of the engine
                     self.watch.stood_still(stood)
                     wait, has_stood = 0.0, True
                     continue
