@@ -114,6 +114,7 @@ class RunsCopier:
     def __init__(self, path: Path, kept: Path, engine: AsyncEngine, progress: Progress) -> None:
         self.missing: list[str] = []
         self._log = FileJournalReader(path)
+        # Only `pieces` and `read` are called here, which need no more than this reader has.
         self._archives = ArchiveStore(self._log, kept, run_here)  # type: ignore[arg-type]
         self._engine = engine
         self._progress = progress

@@ -60,7 +60,7 @@ class TurnEnd:
         for each in work:
             try:
                 each()
-            except Exception:  # that one's; all others have their turn
+            except Exception:  # a fault in one must not keep the others from running
                 log.exception("something failed at the end of a turn")
 
 

@@ -87,8 +87,8 @@ class LateActivity:
         return bool(self._others.get(run) or self._elsewhere.get((robot, run)))
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Process graphs that an engine shows, in an answer or by feedback. Return at once and
-        start no task, since feedback arrives outside of any task."""
+        """Process graphs that an engine shows, in an answer or by feedback. Return at once: what
+        takes longer is queued for `run`."""
         robot = engine.registration.name
         for each in snapshots:
             if each.run is None or not each.active or (robot, each.run) in self._looking:
@@ -118,9 +118,7 @@ class LateActivity:
             moving = shown if shown.source == "get" else await _asked(engine, shown, run)
             if moving is not None and self._is_over(robot, run):
                 await self._take_back(engine, moving, run)
-        except (
-            Exception
-        ):  # one look must not end the others; the next snapshot is looked into again
+        except Exception:  # the next snapshot of this run is examined again
             log.exception("whether run %s moves again cannot be told", run)
         finally:
             self._looking.discard((robot, run))

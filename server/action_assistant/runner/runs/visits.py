@@ -276,9 +276,9 @@ def after_piece(
 def after_outcome(
     action: ActionRun, call: int, outcome: str, how: How, outputs: dict[str, str] | None = None
 ) -> ActionRun:
-    """Return an action of a conducted run after the call with this number has an outcome. `how`: by
-    an answer of its robot, which shows the visit also where it was too short to be seen going, or
-    else; `outputs`: the values that the answer showed, as texts for
+    """Return an action of a conducted run after the call with this number has an outcome. `how`:
+    observed if an answer of its robot has shown the outcome, even where the visit was too short to
+    be seen, and inferred otherwise. `outputs`: the values that the answer showed, as texts for
     people."""
     if action.call != call or not action.visits:  # nothing of it was ever seen
         return action
