@@ -222,3 +222,19 @@ async def test_the_word_for_the_rest_of_a_piece_that_moves_again_is_no_proof_of_
         assert found.proof_at is None
         assert found.at_rest is not None
         assert found.at_rest.by == BEN
+
+
+@virtual
+async def test_one_press_sends_one_stop_to_a_robot_that_holds_the_piece_no_more() -> None:
+    lab = Lab({"*": [{"after_s": 60}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+    damage(lab.harness.journal, run, PieceSeen.kind)
+    lab.david.engine = engine({"*": [{"after_s": 60}]})
+    async with lab.runner() as control:
+        await until(lambda: bool(control.open[f"{run}.1"].run.lost))
+        for presses in (1, 2):
+            await control.stop(run, BEN, f"press {presses}")
+            await anyio.sleep(20)
+            assert len(lab.david.stops) == presses
+        assert control.open[run].run.end is None

@@ -143,9 +143,12 @@ class UnreadRun:
             piece.stop(author, "")
 
     async def stop(self, graph_name: str) -> None:
-        """Begin to stop all pieces, and return at once. Stop messages are then sent for each piece
-        until it is proven at rest."""
-        self.close(self._stopped_by)
+        """Begin to stop the pieces that are not being stopped, such as one that moves again, and
+        return at once. Stop messages are then sent for each piece until it is proven at rest."""
+        self._is_closed = True
+        for piece in self._open():
+            if piece.run.desired != "stopped":
+                piece.stop(self._stopped_by, "")
 
     async def get(self) -> Answer:
         """Return the whole graph as stopped. Raise NoAnswer before a Stop, while a piece may move, and
