@@ -24,8 +24,9 @@ const OUTCOMES = [
 
 function failure(error: unknown) {
   const message = errorText(error);
-  if (!isOutcomeUnknown(error)) return { color: "red", title: "Not taken", message };
-  return { color: "red", autoClose: false as const, title: "NOT KNOWN whether it counts", message };
+  if (!isOutcomeUnknown(error)) return { color: "red", title: "Not stored", message };
+  const title = "NOT KNOWN whether the outcome was stored";
+  return { color: "red", autoClose: false as const, title, message };
 }
 
 function OutcomeForm({ run, action }: { run: Run; action: string }) {
@@ -68,7 +69,7 @@ function OutcomeForm({ run, action }: { run: Run; action: string }) {
       <HoldButton
         size="compact-sm"
         icon={<IconMessageCheck size={14} aria-hidden />}
-        label={give.isPending ? "Telling …" : "Hold to say so"}
+        label={give.isPending ? "Sending …" : "Hold to say so"}
         name={
           ready
             ? `Say that ${words} ended ${outcome}`
@@ -100,7 +101,7 @@ export function OutcomeQuestions({ run }: { run: Run }) {
             {where} has ended, and nothing shows its outcome.
           </b>{" "}
           {may
-            ? "What was it? It is kept as said by you, not as observed."
+            ? "Which outcome was it? Your answer is stored as your word, not as observed."
             : "Operators can say what it was."}
         </p>
         {may && <OutcomeForm run={run} action={action} />}
