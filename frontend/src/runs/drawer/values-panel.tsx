@@ -56,13 +56,13 @@ export function ValuesPanel({ run, graph, aid }: Props) {
           </div>
         ))}
       </dl>
-      {found.values.length + found.gave.length === 0 && <p>No value of it is known.</p>}
+      {found.values.length + found.outputs.length === 0 && <p>No value of it is known.</p>}
       {onlySent && <p>These values were sent; the values that it runs with were not seen.</p>}
-      {found.gave.length > 0 && (
+      {found.outputs.length > 0 && (
         <>
-          <p>It gave, as observed:</p>
+          <p>Its outputs, as observed:</p>
           <dl>
-            {found.gave.map(({ name, text }) => (
+            {found.outputs.map(({ name, text }) => (
               <div key={name} data-from="ran">
                 <dt>{name}</dt>
                 <dd title={text}>{text}</dd>
@@ -106,7 +106,7 @@ export interface ActionValues {
   readonly name: string;
   readonly values: readonly KnownValue[];
   /** Outputs that an answer showed after its last visit. */
-  readonly gave: readonly Omit<KnownValue, "from">[];
+  readonly outputs: readonly Omit<KnownValue, "from">[];
   readonly said: string | null;
   readonly after: readonly BeganAfter[];
 }
@@ -164,7 +164,7 @@ export function valuesOf(
   return {
     name,
     values,
-    gave: shown(last?.outputs ?? {}),
+    outputs: shown(last?.outputs ?? {}),
     said: action.messages.at(-1)?.text ?? null,
     after: beganAfter(run, graph, aid, begun),
   };
