@@ -19,10 +19,11 @@ interface Props extends Omit<ShownRunProps, "run"> {
 
 export function RunDrawer(props: Props) {
   const { run, folded } = props;
-  if (run === undefined) return <DrawerFrame mode="low" busy />;
+  const low = folded === null ? "alone" : "low";
+  if (run === undefined) return <DrawerFrame mode={low} busy />;
   if (run === null) {
     return (
-      <DrawerFrame mode="low">
+      <DrawerFrame mode={low}>
         <div className={style.none}>
           <IconTimeline size={18} aria-hidden />
           <span>
@@ -32,9 +33,8 @@ export function RunDrawer(props: Props) {
       </DrawerFrame>
     );
   }
-  const mode = folded === null ? "alone" : folded ? "low" : "open";
   return (
-    <DrawerFrame mode={mode}>
+    <DrawerFrame mode={folded === false ? "open" : low}>
       <ShownRun {...props} run={run} />
     </DrawerFrame>
   );
