@@ -193,3 +193,30 @@ test("two people draw what Scout does when Carrier has arrived; one robot is los
     await expect(rest(page, robot)).toContainText("proven at rest", { timeout: 15_000 });
   await expect(moves(page)).toBeHidden();
 });
+
+test("an outcome that nothing shows is given by word, and shown as said", async () => {
+  const { page } = ada;
+  await page.goto(`${product.url}/graphs/${graph}`);
+  await saved(page);
+  await startLed(page);
+  await expect(lane(page, "Look")).toContainText("running", { timeout: 15_000 });
+  await mari.page.goto(`${product.url}/robots`);
+  const carried = mari.page.getByRole("article", { name: "David" });
+  await expect(carried).toContainText(
+    /In drive_look.*s run \d+ \(led\): further actions begin here/,
+  );
+  await david.kill();
+  david.start(product.data, { "*": { after_s: 60, stop_s: 0.05 } });
+  const question = page.getByRole("region", { name: /^Outcome of Look/ });
+  await question.getByText("True", { exact: true }).click();
+  await question.getByRole("textbox").fill("The picture is on my desk");
+  await holdEnter(page, question.getByRole("button", { name: /^Say that/ }));
+  await expect(lane(page, "Look")).toContainText("true, said by Ada");
+  await expect(rest(page, "David")).toContainText(/^David.*seen at rest .*, not proven/);
+  const [run] = await product.ask<{ state: string; proof_at: string | null }[]>(
+    "/api/runs?robot=David",
+    {},
+    product.runnerUrl,
+  );
+  expect(run).toMatchObject({ proof_at: null });
+});
