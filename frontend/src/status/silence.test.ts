@@ -1,7 +1,7 @@
 import { expect, test } from "vitest";
 import type { LiveState } from "../api/live-socket";
-import type { ActionRun } from "../api/runs";
-import { silentSinceOf } from "./silence";
+import type { ActionRun, Run } from "../api/runs";
+import { endUnknownSince, silentSinceOf } from "./silence";
 
 const visit: ActionRun["visits"][number] = {
   from: "2026-01-01T00:00:01Z",
@@ -32,4 +32,15 @@ test("a lane is not known from when its robot became silent, and only while some
   expect(silentSinceOf(on("David"), answers)).toBeNull();
   const untold = { ...now, engines: [{ ...robot, since: null }] } as unknown as LiveState;
   expect(silentSinceOf(on("David"), untold)).toBe(Date.parse(visit.from));
+});
+
+test("an action that a person is asked about is not known from when its robot or the run told so", () => {
+  const asked = { visits: [visit], robot: "David", asks: true } as unknown as ActionRun;
+  const run = (held: string | null, since?: string) =>
+    ({ held: held && { since: held }, rests: [{ robot: "David", since }] }) as unknown as Run;
+  const [early, late] = ["2026-01-01T00:00:04Z", "2026-01-01T00:00:05Z"];
+  expect(endUnknownSince(asked, run(late, early))).toBe(Date.parse(early));
+  expect(endUnknownSince(asked, run(late))).toBe(Date.parse(late));
+  expect(endUnknownSince(asked, run(null))).toBe(Date.parse(visit.from));
+  expect(endUnknownSince({ ...asked, asks: false }, run(late, early))).toBeNull();
 });

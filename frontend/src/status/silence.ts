@@ -28,3 +28,15 @@ export function silentSinceOf(action: ActionRun, now: LiveState): number | null 
   const last = visits.at(-1);
   return since ?? (last ? visitBegin(last) : null);
 }
+
+/**
+ * Return since when no answer can show any more how an action of a led run ended, ms; null unless a
+ * person is asked for its outcome.
+ */
+export function endUnknownSince(action: ActionRun, run: Run): number | null {
+  if (!action.asks) return null;
+  const rest = run.rests?.find(({ robot }) => robot === action.robot);
+  const told = [run.held?.since, rest?.since].flatMap((at) => instant(at) ?? []);
+  const last = action.visits.at(-1);
+  return told.length > 0 ? Math.min(...told) : last ? visitBegin(last) : null;
+}

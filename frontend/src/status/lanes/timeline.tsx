@@ -9,13 +9,13 @@ import {
   useState,
 } from "react";
 import { useLive } from "../../api/page-link";
-import type { Run } from "../../api/runs";
+import type { ActionRun, Run } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
 import { keyOf } from "../../ui/keys";
 import { colorOfName } from "../../ui/name-colors";
 import { duration, instant, stopwatch, useNow } from "../../ui/times";
 import { type Progress, progressOf, progressOfAction, type Tone } from "../progress";
-import { silentSinceOf, useUnsure } from "../silence";
+import { endUnknownSince, silentSinceOf, useUnsure } from "../silence";
 import { toneColor } from "../state-label";
 import { waitingFor, waitWords } from "../waits";
 import {
@@ -231,6 +231,8 @@ function Groups({ track, axis, named, overs, inside, ...props }: GroupsProps) {
   const silent = ended === null ? silentSince : null;
   const { now } = useLive();
   const unsure = useUnsure(run);
+  const unknownSince = (action: ActionRun) =>
+    endUnknownSince(action, run) ?? silentSinceOf(action, now);
   const progressIn = (name: string): Progress | null => {
     const action = run.actions?.[name];
     return action ? progressOfAction(name, action, run, silent !== null || unsure) : null;
@@ -263,7 +265,7 @@ function Groups({ track, axis, named, overs, inside, ...props }: GroupsProps) {
               progress={progressIs(lane)}
               axis={axis}
               ended={ended}
-              silentSince={silent ?? (action && ended === null ? silentSinceOf(action, now) : null)}
+              silentSince={silent ?? (action && ended === null ? unknownSince(action) : null)}
               selected={lane.name === selected}
               onPick={picks(lane) ? onPick : undefined}
               waited={waited.get(lane.name) ?? ""}
@@ -317,7 +319,7 @@ export function Timeline(props: Props) {
             {...(props.picks ? { picks: props.picks } : {})}
           />
         ))}
-        {overs.length > 0 && <HandOverLines overs={overs} axis={axis} list={list} lanes={shown} />}
+        {overs.length > 0 && <HandOverLines overs={overs} axis={axis} lanes={shown} />}
       </ul>
     </div>
   );
