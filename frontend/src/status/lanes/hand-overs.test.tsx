@@ -1,7 +1,10 @@
+// @vitest-environment jsdom
 import fc from "fast-check";
+import { act } from "react";
+import { createRoot } from "react-dom/client";
 import { expect, test } from "vitest";
 import type { Run, Visit } from "../../api/runs";
-import { handOversOf, handOverTime } from "./hand-overs";
+import { HandOverLines, handOversOf, handOverTime } from "./hand-overs";
 import type { Lane } from "./lanes";
 
 const at = (ms: number) => new Date(ms).toISOString();
@@ -74,4 +77,23 @@ test("bounds hold for every moment at which both may have been", () => {
   );
   expect(handOverTime({ least: 0, most: 39.2 })).toBe("≤ 40 ms");
   expect(handOverTime({ least: 12.3, most: 40 })).toBe("12–40 ms");
+});
+
+test("lines are drawn also on a page that is opened while the run goes on", async () => {
+  const run = runOf({ Drive: [visit(0, 1000)], Look: [visit(1016, 2000)] });
+  const overs = handOversOf(run, LANES);
+  const page = document.body.appendChild(document.createElement("div"));
+  const root = createRoot(page);
+  await act(async () =>
+    root.render(
+      <ul>
+        {LANES.map(({ name }) => (
+          <li key={name} data-lane={name} />
+        ))}
+        <HandOverLines overs={overs} axis={{ start: 0, span: 4000 }} lanes={LANES} />
+      </ul>,
+    ),
+  );
+  expect(page.querySelector("i")?.title).toBe("began 16 ms after Carrier: Drive had ended");
+  await act(async () => root.unmount());
 });

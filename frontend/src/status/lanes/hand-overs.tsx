@@ -1,6 +1,6 @@
 /** Times between the end of an action and the begin of another robot's that waited for it, as lines between lanes. */
 
-import { type RefObject, useLayoutEffect, useState } from "react";
+import { type RefObject, useLayoutEffect, useRef, useState } from "react";
 import type { Run, Visit } from "../../api/runs";
 import { instant } from "../../ui/times";
 import { boundsText } from "../durations";
@@ -94,30 +94,34 @@ export function handOverWords(over: HandOver): string {
 interface Props {
   overs: readonly HandOver[];
   axis: TimeAxis;
-  /** The list whose rows are measured; the rows of this run come first in it. */
-  list: RefObject<HTMLElement | null>;
   /** The lanes of the run that are shown. */
   lanes: readonly Lane[];
 }
 
-/** Return the middle of the row of each lane, px from the top of the list. */
-function useMiddles({ list, lanes }: Pick<Props, "list" | "lanes">): ReadonlyMap<string, number> {
+/**
+ * Return the middle of the row of each lane, px from the top of the list that `lines` stands in. The
+ * rows of another run with lanes of the same names come later in that list.
+ */
+function useMiddles(lines: RefObject<HTMLElement | null>, lanes: Props["lanes"]) {
   const [middles, setMiddles] = useState<ReadonlyMap<string, number>>(new Map());
   useLayoutEffect(() => {
+    const rows = lines.current?.parentElement?.querySelectorAll<HTMLElement>("[data-lane]") ?? [];
+    const rowOf = new Map([...rows].reverse().map((row) => [row.dataset.lane, row]));
     const found = lanes.flatMap(({ name }): [string, number][] => {
-      const row = list.current?.querySelector<HTMLElement>(`[data-lane="${CSS.escape(name)}"]`);
+      const row = rowOf.get(name);
       return row ? [[name, row.offsetTop + row.offsetHeight / 2]] : [];
     });
     setMiddles(new Map(found));
-  }, [list, lanes]);
+  }, [lines, lanes]);
   return middles;
 }
 
-export function HandOverLines({ overs, axis, list, lanes }: Props) {
-  const middles = useMiddles({ list, lanes });
+export function HandOverLines({ overs, axis, lanes }: Props) {
+  const lines = useRef<HTMLLIElement>(null);
+  const middles = useMiddles(lines, lanes);
   const newest = new Map(overs.map((over) => [over.to, over]));
   return (
-    <li className={style.handOvers} aria-hidden>
+    <li ref={lines} className={style.handOvers} aria-hidden>
       {overs.map((over) => {
         const [from, to] = [middles.get(over.from), middles.get(over.to)];
         if (from === undefined || to === undefined) return null;
