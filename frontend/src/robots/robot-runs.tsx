@@ -109,8 +109,8 @@ export function RobotRuns({ robot, onImport }: Props) {
   const { now } = useLive();
   const own = openRuns(now).filter((run) => enginesOf(run).includes(robot.name));
   const foreign = foreignGraphs(now).filter((each) => each.robot.name === robot.name);
+  const unsure = robot.state !== "answering" && robot.state !== "restarted";
   if (own.length + foreign.length === 0) {
-    const unsure = robot.state !== "answering" && robot.state !== "restarted";
     return (
       <p className={style.none}>
         {unsure ? "What runs there is not known." : "Nothing runs there."}
@@ -137,7 +137,7 @@ export function RobotRuns({ robot, onImport }: Props) {
           key={held.graph}
           robot={robot}
           graph={held.graph}
-          state={held.state}
+          state={unsure ? "unknown" : held.state}
           stopping={held.stopping}
           onImport={onImport}
         />

@@ -133,3 +133,17 @@ test("of a led run that is stopped, a robot that is proven at rest is told apart
   expect(david).toMatchObject({ robot: "David", kind: "unknown" });
   expect(movesNow(live([led], "down"))).toMatchObject([{ kind: "unknown" }, { kind: "unknown" }]);
 });
+
+test("what a robot ran when it last answered is not said to move while it does not answer", () => {
+  const held = { graph: "patrol", state: "RUNNING", active: true, run: null, stopping: null };
+  const on = (state: string) => {
+    const robot = { name: "David", simulated: false, state, holds: [held] };
+    return { ...live([]), engines: [robot] } as unknown as LiveState;
+  };
+  expect(movesNow(on("answering"))).toMatchObject([
+    { kind: "moves", words: "patrol, not started here" },
+  ]);
+  expect(movesNow(on("busy"))).toMatchObject([
+    { kind: "unknown", words: "not known, ran patrol when it last answered" },
+  ]);
+});

@@ -126,15 +126,15 @@ function ofRun(run: Run, silent: ReadonlySet<string>): Moving[] {
 
 /** By robot. While the runner is not heard, nothing is known of any of them. */
 export function movesNow(now: LiveState): Moving[] {
-  const runs = openRuns(now).flatMap((run) => ofRun(run, silentRobots(now)));
-  const foreign = foreignGraphs(now).map(
-    ({ robot, held }): Moving => ({
-      robot: robot.name,
-      kind: "moves",
-      words: `${isolated(held.graph)}, not started here`,
-      run: null,
-    }),
-  );
+  const silent = silentRobots(now);
+  const runs = openRuns(now).flatMap((run) => ofRun(run, silent));
+  const foreign = foreignGraphs(now).map(({ robot, held }): Moving => {
+    const base = { robot: robot.name, run: null };
+    const graph = isolated(held.graph);
+    if (silent.has(robot.name))
+      return { ...base, kind: "unknown", words: `not known, ran ${graph} when it last answered` };
+    return { ...base, kind: "moves", words: `${graph}, not started here` };
+  });
   const all = [...runs, ...foreign].sort((a, b) => a.robot.localeCompare(b.robot));
   if (now.link === "live") return all;
   return all.map((each) => ({ ...each, kind: "unknown", words: "not known" }));
