@@ -4,6 +4,7 @@ Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the p
 """
 
 import json
+import math
 import signal
 import subprocess
 import sys
@@ -72,6 +73,8 @@ class Engines:
         self.domain = domain
         self.names = {name: domain + n for n, name in enumerate([*PLAYERS.values()][:count])}
         self.processes: dict[str, subprocess.Popen[bytes]] = {}
+        #: From when to when engines were frozen, in seconds UTC, by robot.
+        self.frozen: dict[str, list[tuple[float, float]]] = {}
 
     def lines(self) -> list[Line]:
         """Return what the code of all actions did, oldest first."""
@@ -98,9 +101,12 @@ class Engines:
     def freeze(self, name: str) -> None:
         """Freeze the engine of a robot (SIGSTOP)."""
         self.processes[name].send_signal(signal.SIGSTOP)
+        self.frozen.setdefault(name, []).append((time.time(), math.inf))
 
     def thaw(self, name: str) -> None:
         """Let a frozen engine go on (SIGCONT)."""
+        since, _ = self.frozen[name].pop()
+        self.frozen[name].append((since, time.time()))
         self.processes[name].send_signal(signal.SIGCONT)
 
     def dead(self) -> list[str]:

@@ -35,7 +35,7 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.views import time as as_text
 from action_assistant.runner.start.admission import GoOnRequest
-from ros.led_engines import ACCEPTED, LATE_S, Engines, as_led, clock_us, over, watch
+from ros.led_engines import ACCEPTED, LATE_S, Engines, Line, as_led, clock_us, over, watch
 from runner.harness import ANN, BEN, MemoryJournal
 from support.real_engine import needs_engine
 
@@ -109,7 +109,7 @@ def faults_of(told: Told, engines: Engines, run_over_at: int) -> list[str]:
     found += [
         f"{line.action} began {line.second - since / 1e6:.3f} s after the gate had closed"
         for line in lines
-        if line.what == "begin"
+        if line.what == "begin" and not was_under_way(line, told, engines)
         for since, until in closed
         if since / 1e6 + LATE_S < line.second < until / 1e6
     ]
@@ -140,6 +140,20 @@ def faults_of(told: Told, engines: Engines, run_over_at: int) -> list[str]:
             if each.outcome != meant:
                 found.append(f"{each.node} was {each.outcome}, and its code {meant}")
     return found
+
+
+def was_under_way(line: Line, told: Told, engines: Engines) -> bool:
+    """Return whether the start of what began had left for an engine that was frozen then, or froze before
+    it could begin. Such an engine begins it when it goes on; nobody can call a start message back."""
+    at, robot = max(
+        (at, engine)
+        for at, piece, engine in told.published()
+        if told.pieces[piece][1] == line.action and at / 1e6 < line.second
+    )
+    return any(
+        since - LATE_S < at / 1e6 < until < line.second < until + LATE_S
+        for since, until in engines.frozen.get(robot, ())
+    )
 
 
 class Scene:
