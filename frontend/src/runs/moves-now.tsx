@@ -130,10 +130,13 @@ export function movesNow(now: LiveState): Moving[] {
   const runs = openRuns(now).flatMap((run) => ofRun(run, silent));
   const foreign = foreignGraphs(now).map(({ robot, held }): Moving => {
     const base = { robot: robot.name, run: null };
-    const graph = isolated(held.graph);
     if (silent.has(robot.name))
-      return { ...base, kind: "unknown", words: `not known, ran ${graph} when it last answered` };
-    return { ...base, kind: "moves", words: `${graph}, not started here` };
+      return {
+        ...base,
+        kind: "unknown",
+        words: `not known, ran ${isolated(held.graph)} when it last answered`,
+      };
+    return { ...base, kind: "moves", words: `${isolated(held.graph)}, not started here` };
   });
   const all = [...runs, ...foreign].sort((a, b) => a.robot.localeCompare(b.robot));
   if (now.link === "live") return all;
