@@ -10,7 +10,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import GoOnRequest
 from runner.execution.test_conductor import Lab, forked
-from runner.harness import BEN, VirtualLoop, clock_us, ended, until, virtual
+from runner.harness import BEN, VirtualLoop, clock_us, ended, engine, until, virtual
 
 
 @virtual
@@ -115,3 +115,17 @@ async def test_a_piece_that_moves_after_the_end_of_its_run_can_be_stopped(
         assert lab.david.stops
         assert not await lab.david.moving(lab.david.starts[0].graph.name)
         lab.harness.journal.down = False
+
+
+@virtual
+async def test_each_press_of_stop_reaches_a_robot_that_holds_its_piece_no_more_once() -> None:
+    lab = Lab({"*": [{"after_s": 60}]})
+    async with lab.runner() as control:
+        run = await lab.led_run(control, lost="wait")
+        lab.david.engine = engine({"*": [{"after_s": 60}]})
+        await until(lambda: bool(control.open[f"{run}.1"].run.lost))
+        for presses in (1, 2):
+            await control.stop(run, BEN, f"press {presses}")
+            await anyio.sleep(20)
+            assert len(lab.david.stops) == presses
+        assert control.open[run].run.end is None

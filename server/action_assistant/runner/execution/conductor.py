@@ -189,7 +189,7 @@ class Conductor:
     async def stop(self, graph_name: str) -> None:
         """Stop the whole graph. Nothing begins any more, and every piece gets a Stop that is repeated
         until it is proven."""
-        self.close(self._stopped_by)
+        self._stop_pieces(self._stopped_by, is_press=False)
         if not self._is_told_to_stop:
             self._is_told_to_stop = True
             self._course.append((self._now_ms(), "stop"))
@@ -199,11 +199,16 @@ class Conductor:
         """Let nothing begin any more, and begin to stop every piece. The call never waits. `author`
         has pressed Stop."""
         self._stopped_by = author
+        self._stop_pieces(author, is_press=True)
+
+    def _stop_pieces(self, author: Author, *, is_press: bool) -> None:
+        """Let nothing begin any more, and stop every piece; one that is being stopped already only
+        at a press, for which it gets one message more if its robot does not hold it any more."""
         self._gate.close()
         for step in self._steps.values():
-            self._end_step(step, author)
-        for piece in self._again.values():
-            if piece.run.end is None:
+            step.end()
+        for piece in (*(step.piece for step in self._steps.values()), *self._again.values()):
+            if piece and piece.run.end is None and (is_press or piece.run.desired != "stopped"):
                 piece.stop(author, "")
 
     async def _refuse(self, *_: object, **__: object) -> NoReturn:
@@ -340,9 +345,7 @@ class Conductor:
                     self._others[each.node] = each.state
         self._waiting += shown
         self._show_what_may_be(run)
-        if (
-            self._ends(self._waiting) and not self._gate.is_final
-        ):  # the graph is over: nothing may go on
+        if self._ends(self._waiting) and not self._gate.is_final:  # nothing may go on
             for step in self._steps.values():
                 self._end_step(step, GRAPH)
 
@@ -355,9 +358,7 @@ class Conductor:
         ready: list[Exact] = []
         while self._waiting:
             first = self._waiting[0]
-            is_end = isinstance(first, GraphResult) or (
-                isinstance(first, GraphState) and first.state in TERMINAL
-            )
+            is_end = isinstance(first, GraphResult) or self._ends([first])
             if is_end and self._is_going:
                 break
             if is_end and self._gate.is_final and self._unproven is not None:
