@@ -5,7 +5,7 @@ import contextlib
 import os
 import socket
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Iterator
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from editor.process import BEARER, Editor, running
 
 TOGETHER = 1000
 ROUNDS = max(1, int(os.environ.get("TEST_RECONNECTS", "1000")) // TOGETHER)
+TRIES = 3
 MB = 1 << 20
 
 
@@ -131,9 +132,23 @@ async def signed_in(editor: Editor, name: str) -> dict[str, str]:
     return {**origin, "cookie": cookies}
 
 
+async def sound_s(editor: Editor, things: int) -> float:
+    """Return the seconds in which a sound update of so many things becomes durable in a new graph."""
+    doc: Doc[Any] = Doc()
+    doc.get("things", type=Map).update({f"k{n}": "" for n in range(things)})
+    async with editor.socket(new_graph(editor), "?acks=1") as session:
+        await session.send_bytes(messages.question(b"\x00"))
+        begun = time.monotonic()
+        await session.send_bytes(messages.change(doc.get_update()))
+        await acks(session, 1, patience=60)
+        return time.monotonic() - begun
+
+
 async def test_updates_that_kill_the_library_are_refused_while_others_edit(
     unlimited: Editor, calm: str
 ) -> None:
+    """No edit waits for a refusal as long as a sound update of the size takes, and edits of another graph
+    go on meanwhile. The best of some tries counts, so that a busy computer is not taken for a fault."""
     killers = [
         forged_updates.nested_values(30_000),
         forged_updates.nested_values(300_000),
@@ -143,14 +158,26 @@ async def test_updates_that_kill_the_library_are_refused_while_others_edit(
         b"\xff" * 50,
         b"\x01\x01\x07\x00\x28\x01\x01m\x01k\x01\x75" + messages.number(2**40),
     ]
+    sound = await sound_s(unlimited, 40_000)
     before = memory(unlimited)
+    # By killer, and whether it came to the graph that is edited.
+    held: dict[tuple[int, bool], list[float]] = defaultdict(list)
+    refused_in: dict[int, list[float]] = defaultdict(list)  # in another graph
     async with healthy(unlimited, calm) as taken:
-        for killer in killers:
+        for number, killer in enumerate(killers * TRIES):
             for graph in (calm, new_graph(unlimited)):
+                first, begun = len(taken), time.monotonic()
                 async with unlimited.socket(graph) as eve:
                     await eve.send_bytes(messages.change(killer))
-                    assert await closed(eve) == messages.MALFORMED
-    assert max(taken) < 3
+                    assert await closed(eve, 60) == messages.MALFORMED
+                last = len(taken)
+                if graph != calm:
+                    refused_in[number % len(killers)].append(time.monotonic() - begun)
+                await eventually(lambda last=last: len(taken) > last)
+                held[number % len(killers), graph == calm].append(max(taken[first : last + 1]))
+    assert max(map(min, held.values())) < sound
+    slowest = max(refused_in, key=lambda killer: min(refused_in[killer]))
+    assert min(held[slowest, False]) < min(refused_in[slowest]) / 2
     assert memory(unlimited) - before < 100 * MB
 
 
