@@ -1,4 +1,4 @@
-"""Real engines that one runner of this process leads, and what the code of their actions wrote down.
+"""Real engines that one runner of this process leads. The code of their actions writes down what it does.
 
 Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the program that starts it.
 """
@@ -9,31 +9,32 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 import anyio
+import httpx
 import msgspec
 
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Registration
-from action_assistant.runner.links.ros2.availability import ros2_reach
-from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.events import Override, PieceEnded
 from action_assistant.runner.start.admission import StartRequest
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
+    EXIT,
     Action,
     Conditions,
     Graph,
     Parameter,
     Relation,
 )
-from runner.harness import ANN, MemoryJournal, at_once, order, sequence
-from support.real_engine import PROGRAM
+from ros.led_runner import is_over, led_runner
+from runner.harness import ANN, BEN, MemoryJournal, order, sequence
+from support.real_engine import PROGRAM, answers
+from support.waiting import until
 
 ALWAYS = Conditions(on_true="run", on_false="run", on_error="run")
 #: The robot of each actor.
@@ -42,13 +43,9 @@ ACCEPTED = Override(("two-at-once", "stop-across", "H12", "H14"), "They are far 
 LATE_S = 0.25  # from a start message to the begin of the code, on a busy computer
 
 
-def clock_us() -> int:
-    """Microseconds UTC."""
-    return time.time_ns() // 1000
-
-
 class Line(NamedTuple):
-    """What the code of an action did: at `second` UTC, `what` (begin, end, stop …), in this process."""
+    """An entry that the code of an action wrote: at `second` UTC it did `what` (begin, end, stop …), in
+    the process `pid`."""
 
     second: float
     what: str
@@ -57,8 +54,8 @@ class Line(NamedTuple):
 
 
 class Engines:
-    """Real engines by robot, each on a domain of its own, and what the code of their actions did.
-    `rate`: their options about indexing."""
+    """Real engines, one for each robot, on domains from `domain` on. `rate`: their options about
+    indexing."""
 
     def __init__(
         self,
@@ -77,7 +74,7 @@ class Engines:
         self.frozen: dict[str, list[tuple[float, float]]] = {}
 
     def lines(self) -> list[Line]:
-        """Return what the code of all actions did, oldest first."""
+        """Return the entries of the code of all actions, oldest first."""
         found: list[Line] = []
         for name in self.names:
             path = self.folder / f"truth-{name}"
@@ -123,22 +120,10 @@ class Engines:
         """Open a runner that may lead them."""
         for name in self.names:
             self.start(name)
-        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(self.domain)})
-        assert not isinstance(reach, str), reach
-        robots, journal = Robots(reach=reach), MemoryJournal()
         try:
-            async with ExecutionService.opened(
-                journal, robots, clock_us=clock_us, run_in_worker=at_once
-            ) as control:
-                for name, domain in self.names.items():
-                    await control.register(Registration(name=name, domain=domain, led=True), ANN)
-                with anyio.fail_after(60):
-                    while any(robots.robot(name).state != "answering" for name in self.names):  # noqa: ASYNC110
-                        await anyio.sleep(0.05)
-                yield control, journal
+            async with led_runner(self.names) as opened:
+                yield opened
         finally:
-            with anyio.CancelScope(shield=True):
-                await reach.aclose()
             self.end()
 
 
@@ -195,14 +180,47 @@ def as_led(graph: Graph, **more: object) -> StartRequest:
     return order(graph, engine="conducted", graph=None, robots=robots, **more)
 
 
+def going_round(graph: Graph) -> Graph:
+    """Return the graph with an arrow from its second action back to its first instead of an exit."""
+    first, second = (each.key for each in graph.actions)
+    back = Relation(parent=second, child=first, conditions=ALWAYS, required=False)
+    kept = tuple(each for each in graph.relations if each.child != EXIT)
+    return msgspec.structs.replace(graph, relations=(*kept, back))
+
+
+async def led_round(
+    control: ExecutionService, journal: MemoryJournal, graph: Graph, laps: int
+) -> list[PieceEnded]:
+    """Lead two actions that go round until each has ended so many times, and stop them; return all
+    ends."""
+    run = (await control.start(as_led(graph), ANN)).run.id
+    with anyio.fail_after(20 + 4 * laps):
+        while len(ends_of(journal, run)) < 2 * laps:
+            assert run in control.open, journal.history(run)
+            await anyio.sleep(0.1)
+    await control.stop(run, BEN)
+    assert await over(control, run, 20) == "stopped"
+    return ends_of(journal, run)
+
+
+def ends_of(journal: MemoryJournal, run: str) -> list[PieceEnded]:
+    """Return the ends of the pieces of a run."""
+    return [each for each in journal.told(run) if isinstance(each, PieceEnded)]
+
+
 async def over(control: ExecutionService, run: str, seconds: float) -> str:
     """Wait for the end of a run, and return its state."""
-    with anyio.move_on_after(seconds):
-        while run in control.open:  # noqa: ASYNC110
-            await anyio.sleep(0.02)
-    assert run not in control.open, "\n".join(
+    assert await is_over(control, run, seconds), "\n".join(
         f"{each.run.id} {each.run.state} {each.run.graph_state} {each.watch.trouble} "
         f"{each.run.alarms} {[(a.state, a.visits) for a in each.run.actions.values()]}"
         for each in control.open.values()
     )
     return (await control.find(run)).state
+
+
+def register(client: httpx.Client, domains: Mapping[str, int]) -> None:
+    """Register robots that may be led at a runner, and wait until they answer. `domains`: by name."""
+    for name, domain in domains.items():
+        asked = {"name": name, "domain": domain, "led": True}
+        client.post("/api/robots", json=asked).raise_for_status()
+    until("not all robots answer", lambda: all(answers(client, name) for name in domains))

@@ -25,13 +25,13 @@ pytest.importorskip(
 from action_assistant.errors import Refused
 from action_assistant.runner.emulator.node import EmulatorNode
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Registration
-from action_assistant.runner.links.ros2.availability import ros2_reach
-from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs.events import Override, PieceEnded
+from action_assistant.runner.runs.events import Override
+from action_assistant.runner.runs.run import Run
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.semantics import Behaviour, GraphRefused
+from ros.led_engines import ends_of
+from ros.led_runner import is_over, led_runner
 from ros.robots import LOSSLESS, robot, started_by_others
 from runner.execution.test_conducted_courses import (
     Seen,
@@ -43,7 +43,7 @@ from runner.execution.test_conducted_courses import (
     played,
 )
 from runner.execution.test_conductor import shared
-from runner.harness import ANN, BEN, MemoryJournal, at_once, order, sequence
+from runner.harness import ANN, BEN, MemoryJournal, order, sequence, until
 
 GRAPHS = int(os.environ.get("TEST_LED_GRAPHS", "2"))
 FROM = int(os.environ.get("TEST_LED_FROM", "1"))
@@ -52,11 +52,6 @@ ACCEPTED = Override(("two-at-once", "stop-across"), "They are far apart.")
 _CLOSE_MS = 3.0  # between two ends whose order only the robots know
 
 pytestmark = pytest.mark.timeout(0 if GRAPHS > 5 else 180)
-
-
-def clock_us() -> int:
-    """Microseconds UTC."""
-    return time.time_ns() // 1000
 
 
 class Led(NamedTuple):
@@ -79,30 +74,9 @@ async def led(domains: list[int], scripts: dict[str, Any]) -> AsyncIterator[Led]
             )
             for domain, name in zip(domains, NAMES.values(), strict=False)
         )
-        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": str(domains[0])})
-        assert not isinstance(reach, str), reach
-        robots, journal = Robots(reach=reach), MemoryJournal()
-        try:
-            async with ExecutionService.opened(
-                journal, robots, clock_us=clock_us, run_in_worker=at_once, simulator=seen.made
-            ) as control:
-                for domain, name in zip(domains, NAMES.values(), strict=False):
-                    await control.register(Registration(name=name, domain=domain, led=True), ANN)
-                with anyio.fail_after(30):
-                    while any(robots.robot(each).state != "answering" for each in NAMES.values()):  # noqa: ASYNC110
-                        await anyio.sleep(0.05)
-                yield Led(control, journal, nodes, seen)
-        finally:
-            with anyio.CancelScope(shield=True):
-                await reach.aclose()
-
-
-async def over(control: ExecutionService, run: str, seconds: float) -> bool:
-    """Wait for the end of a run; return whether it came."""
-    with anyio.move_on_after(seconds):
-        while run in control.open:  # noqa: ASYNC110
-            await anyio.sleep(0.02)
-    return run not in control.open
+        by_name = dict(zip(NAMES.values(), domains, strict=False))
+        async with led_runner(by_name, seen.made) as (control, journal):
+            yield Led(control, journal, nodes, seen)
 
 
 async def led_through(scene: Led, seed: int, count: Counter[str]) -> None:
@@ -133,17 +107,17 @@ async def led_through(scene: Led, seed: int, count: Counter[str]) -> None:
         count[f"not offered: {refused.detail}"] += 1
         return
     count[f"led on {len(set(robots.values()))} robots"] += 1
-    is_over = await over(control, run, 8)
+    has_ended = await is_over(control, run, 8)
     held = scene.journal.history(run).held
-    if not is_over:
+    if not has_ended:
         await control.stop(run, BEN)
-        assert await over(control, run, 20), (seed, scene.journal.history(run))
-    for each in scene.journal.told(run):
-        if isinstance(each, PieceEnded) and each.outcome != "on_stopped":
+        assert await is_over(control, run, 20), (seed, scene.journal.history(run))
+    for each in ends_of(scene.journal, run):
+        if each.outcome != "on_stopped":
             assert each.outcome == calls[each.node][0].result, (seed, each)
             count["outcomes"] += 1
     assert held is None, (seed, held)
-    count[compared(seed, graph, calls, seen) if is_over else "stopped, as it had no end"] += 1
+    count[compared(seed, graph, calls, seen) if has_ended else "stopped, as it had no end"] += 1
 
 
 def compared(seed: int, graph: Graph, calls: dict[str, list[Behaviour]], seen: Seen) -> str:
@@ -188,15 +162,18 @@ def test_a_start_of_others_stops_every_robot_of_a_run(domains: list[int]) -> Non
             robots = {"A": "Ann", "B": "Bob"}
             asked = order(task, engine="conducted", robots=robots, lost="stop", override=ACCEPTED)
             run = (await control.start(asked, ANN)).run.id
-            with anyio.fail_after(15):
-                while not control.open[run].run.active:  # noqa: ASYNC110
-                    await anyio.sleep(0.02)
+            await until(lambda: bool(control.open[run].run.active))
             theirs = json.loads(codec.write(sequence("theirs", 1)))
             with started_by_others(domains[0], theirs, "Ann"):
-                assert await over(control, run, 20), journal.history(run)
+                assert await is_over(control, run, 20), journal.history(run)
             assert (await control.find(run)).state == "stopped"
 
     anyio.run(main)
+
+
+def has_doubt(run: Run) -> bool:
+    """Return whether a run has told that a Stop of it is not confirmed in time."""
+    return any(each.code == "stop_unconfirmed" for each in run.alarms)
 
 
 def test_a_robot_that_never_obeys_delays_no_other_robots_stop(domains: list[int]) -> None:
@@ -221,19 +198,16 @@ def test_a_robot_that_never_obeys_delays_no_other_robots_stop(domains: list[int]
                 override=Override(codes, "A test."),
             )
             run = (await control.start(request, ANN)).run.id
-            with anyio.fail_after(15):
-                while len(control.open[run].run.active) < 2:  # noqa: ASYNC110
-                    await anyio.sleep(0.02)
+            await until(lambda: len(control.open[run].run.active) == 2)
             began = time.monotonic()
             await control.stop(run, BEN)
-            with anyio.fail_after(5):
-                while "Work_1" in control.open[run].run.active:  # noqa: ASYNC110
-                    await anyio.sleep(0.01)
+            await until(lambda: "Work_1" not in control.open[run].run.active)
             sys.stdout.write(f"\nthe other robot rested after {time.monotonic() - began:.2f} s\n")
-            await anyio.sleep(7)
-            found = control.open[run].run
-            assert found.state == "stopping"  # Ann moves on, so nothing is called stopped
-            assert any(alarm.code == "stop_unconfirmed" for alarm in found.alarms)
+            assert not has_doubt(control.open[run].run)  # Bob has not waited for Ann
+            await until(lambda: has_doubt(control.open[run].run))
+            assert (
+                control.open[run].run.state == "stopping"
+            )  # Ann moves on: nothing is called stopped
             assert journal.history(run).end is None
 
     random.seed(0)

@@ -26,9 +26,9 @@ pytest.importorskip(
 
 from action_assistant.errors import Refused
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.runs.events import Override, PieceEnded
-from action_assistant.umrf.model import Parameter, Relation
-from ros.led_engines import ALWAYS, Engines, as_led, over, relay
+from action_assistant.runner.runs.events import Override
+from action_assistant.umrf.model import Parameter
+from ros.led_engines import Engines, as_led, ends_of, going_round, led_round, over, relay
 from runner.harness import ANN, BEN, MemoryJournal
 from support.real_engine import needs_engine
 
@@ -51,8 +51,7 @@ def test_each_outcome_is_that_of_the_code(tmp_path: Path) -> None:
         works = random.Random(n).sample(kinds, len(kinds))
         run = (await control.start(as_led(relay(f"relay{n}", works)), ANN)).run.id
         state = await over(control, run, 25)
-        ends = [e for e in journal.told(run) if isinstance(e, PieceEnded)]
-        ended = [e for e in ends if e.how == "shape" and e.outcome != "on_stopped"]
+        ended = [e for e in ends_of(journal, run) if e.how == "shape" and e.outcome != "on_stopped"]
         count[state] += 1
         for each, (delay, result) in zip(ended, works, strict=False):
             count[result] += 1
@@ -109,9 +108,7 @@ def test_an_output_that_is_never_set_keeps_no_run_open(tmp_path: Path) -> None:
             for _ in range(max(1, OUTCOMES // 30)):
                 run = (await control.start(as_led(graph), ANN)).run.id
                 assert await over(control, run, 25) == "finished"
-                found.update(
-                    (e.node, e.outcome) for e in journal.told(run) if isinstance(e, PieceEnded)
-                )
+                found.update((e.node, e.outcome) for e in ends_of(journal, run))
 
     anyio.run(main)
     sys.stdout.write(f"\n{dict(found)}\n")
@@ -124,27 +121,15 @@ def test_an_output_that_is_never_set_keeps_no_run_open(tmp_path: Path) -> None:
 
 def test_one_name_is_started_again_and_again(tmp_path: Path) -> None:
     engines = Engines(tmp_path, DOMAIN)
-    graph = relay("carousel", [(0.02, "on_true"), (0.02, "on_false")])
-    first, second = (each.key for each in graph.actions)
-    back = Relation(parent=second, child=first, conditions=ALWAYS, required=False)
-    kept = tuple(each for each in graph.relations if each.child != "exit")
-    loop = msgspec.structs.replace(graph, relations=(*kept, back))
+    loop = going_round(relay("carousel", [(0.02, "on_true"), (0.02, "on_false")]))
 
     async def main() -> None:
         async with engines.led() as (control, journal):
-            run = (await control.start(as_led(loop), ANN)).run.id
-            with anyio.fail_after(10 + 3 * LAPS):
-                while sum(isinstance(e, PieceEnded) for e in journal.told(run)) < 2 * LAPS:
-                    assert run in control.open, journal.history(run)
-                    await anyio.sleep(0.2)
-            await control.stop(run, BEN)
-            assert await over(control, run, 20) == "stopped"
+            ends = await led_round(control, journal, loop, LAPS)
             ended = time.time()
             await anyio.sleep(1)
             assert [line for line in engines.lines() if line.second > ended] == []
-            outcomes = Counter(
-                (e.node, e.outcome) for e in journal.told(run) if isinstance(e, PieceEnded)
-            )
+            outcomes = Counter((each.node, each.outcome) for each in ends)
             sys.stdout.write(f"\n{dict(outcomes)}\n")
             assert set(outcomes) <= {
                 ("OxWork_0", "on_true"),

@@ -17,7 +17,8 @@ pytest.importorskip(
 
 from ros.robots import started_by_others
 from support.product import Product, running
-from support.real_engine import answers, browser, needs_engine, real_engine, until
+from support.real_engine import answers, browser, needs_engine, real_engine
+from support.waiting import until
 
 SLOW = {
     "graph_name": "theirs",

@@ -1,6 +1,6 @@
 """A real engine is killed, frozen or started anew in the middle of a led run: the run ends as its starter
 has chosen, the other robots are proven at rest, nothing is called ended that moves, and nothing begins
-after the gate has closed. The truth is what the code of the actions wrote down.
+after the gate has closed. The code of the actions writes down what it does.
 
 Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the program that starts it.
 `TEST_LED_FAULTS` is how often each fault is tried with each choice (default 1), from the seed
@@ -35,8 +35,9 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.views import time as as_text
 from action_assistant.runner.start.admission import GoOnRequest
-from ros.led_engines import ACCEPTED, LATE_S, Engines, Line, as_led, clock_us, over, watch
-from runner.harness import ANN, BEN, MemoryJournal
+from ros.led_engines import ACCEPTED, LATE_S, Engines, Line, as_led, over, watch
+from ros.led_runner import clock_us, is_over
+from runner.harness import ANN, BEN, MemoryJournal, until
 from support.real_engine import needs_engine
 
 FAULTS = int(os.environ.get("TEST_LED_FAULTS", "1"))
@@ -89,7 +90,7 @@ class Told:
 
 
 def faults_of(told: Told, engines: Engines, run_over_at: int) -> list[str]:
-    """Return what must not be, by the journal and by what the code wrote down."""
+    """Return the faults that the journal and the entries of the code show."""
     found: list[str] = []
     lines = engines.lines()
     closed = told.closed()
@@ -171,14 +172,12 @@ class Scene:
         self.state = ""
 
     async def live(self) -> list[str]:
-        """Live through it; return what must not be."""
+        """Live through the fault; return what was found wrong."""
         async with self.engines.led() as (control, journal):
             self.control, self.journal = control, journal
             asked = as_led(watch("watch"), lost=self.lost, override=ACCEPTED)
             self.run = (await control.start(asked, ANN)).run.id
-            with anyio.fail_after(20):
-                while len({line.action for line in self.engines.lines()}) < 3:  # noqa: ASYNC110
-                    await anyio.sleep(0.02)
+            await until(lambda: len({line.action for line in self.engines.lines()}) == 3)
             await anyio.sleep(self.chance.uniform(0.0, 0.6))
             await self._fail()
             if self.lost == "wait":
@@ -214,9 +213,7 @@ class Scene:
             case _:
                 self.engines.freeze(self.victim)
         opened = self.control.open[self.run]
-        with anyio.fail_after(25):
-            while opened.run.held is None and opened.run.desired != "stopped":  # noqa: ASYNC110
-                await anyio.sleep(0.02)
+        await until(lambda: opened.run.held is not None or opened.run.desired == "stopped")
         chosen = opened.run.held is None if self.lost == "stop" else opened.run.desired == "running"
         assert chosen, opened.run
 
@@ -242,27 +239,32 @@ class Scene:
 
     async def _others_rest(self) -> None:
         """Wait until every piece on the other robots is proven at rest, and note how long it took."""
-        stopped: list[int] = []
-        with anyio.fail_after(15):
-            while not stopped:
-                told = self.journal.told(self.run)
-                stopped = [each.at for each in told if isinstance(each, StopRequested)]
-                await anyio.sleep(0.01)
-            while any(  # noqa: ASYNC110
-                each.run.piece is not None and each.run.engine in self.others
-                for each in self.control.open.values()
-            ):
-                await anyio.sleep(0.01)
+        await until(lambda: bool(self._stopped_at()))
+        await until(
+            lambda: (
+                not any(
+                    each.run.piece is not None and each.run.engine in self.others
+                    for each in self.control.open.values()
+                )
+            )
+        )
         await anyio.sleep(0.1)  # the journal has them
         for name in self.others:
-            ends = [at for at, *_ in Told(self.journal, self.run).ends(name) if at > stopped[0]]
-            self.proven_s += [(max(ends) - stopped[0]) / 1e6] if ends else []
+            ends = [
+                at
+                for at, *_ in Told(self.journal, self.run).ends(name)
+                if at > self._stopped_at()[0]
+            ]
+            self.proven_s += [(max(ends) - self._stopped_at()[0]) / 1e6] if ends else []
+
+    def _stopped_at(self) -> list[int]:
+        """Return when somebody pressed Stop or the runner did so itself, in microseconds UTC."""
+        told = self.journal.told(self.run)
+        return [each.at for each in told if isinstance(each, StopRequested)]
 
     async def _end(self) -> None:
         """Wait for the run's end. Where the engine is gone a person says that its robot is at rest."""
-        with anyio.move_on_after(20):
-            while self.run in self.control.open:  # noqa: ASYNC110
-                await anyio.sleep(0.02)
+        await is_over(self.control, self.run, 20)
         for opened in self._of_victim():
             assert self.fault != "frozen", opened.run
             confirm_rest(opened, RestRequest("I stand beside it."), BEN)

@@ -14,7 +14,6 @@ import sys
 import time
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import anyio
 import msgspec
@@ -24,12 +23,12 @@ pytest.importorskip(
     "rclpy", reason="rclpy is not here; `make ros-test` brings it", exc_type=ImportError
 )
 
-from action_assistant.runner.runs.events import PieceEnded
 from action_assistant.runner.runs.sent_graphs import SentSubgraph
+from action_assistant.runner.start.admission import StartRequest
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Action, Graph
-from ros.led_engines import Engines, as_led, over, relay
+from ros.led_engines import Engines, as_led, ends_of, over, relay
 from runner.harness import ANN, BEN
 from support.real_engine import needs_engine
 
@@ -70,8 +69,8 @@ def engines(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Engines:
     return Engines(tmp_path, DOMAIN)
 
 
-def task(name: str, *subs: Graph) -> Any:
-    """Sub-graphs on Scout and Carrier in turn, as a start."""
+def task(name: str, *subs: Graph) -> StartRequest:
+    """Return the start of a graph with these sub-graphs on Scout and Carrier in turn."""
     graph = relay(name, [(0.0, "on_true")] * len(subs))
     actions = tuple(
         Action(key=each.key, name=sub.name, actor=each.actor)
@@ -97,7 +96,7 @@ def test_each_outcome_of_a_sub_graph_is_that_of_the_code(engines: Engines) -> No
                 request = task(f"nested{n}", *(SUBS[each] for each in results))
                 run = (await control.start(request, ANN)).run.id
                 count[await over(control, run, 25)] += 1
-                ends = [e for e in journal.told(run) if isinstance(e, PieceEnded)]
+                ends = ends_of(journal, run)
                 for each, result in zip(ends, results, strict=False):
                     count[result] += 1
                     if (each.outcome, each.how) != (result, "shape"):

@@ -16,7 +16,8 @@ pytest.importorskip(
 )
 
 from support.product import Product, running
-from support.real_engine import answers, browser, needs_engine, real_engine, until
+from support.real_engine import answers, browser, needs_engine, real_engine
+from support.waiting import until
 
 DOMAIN = int(os.environ.get("TEST_SUBGRAPHS_DOMAIN", "150"))
 ACTIONS = Path(os.environ.get("ENGINE_LAB", "/nonexistent")) / "actions"

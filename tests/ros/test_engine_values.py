@@ -1,5 +1,5 @@
-"""Values of every native type go from one real engine to another in a led run: truth is what the code
-of the actions wrote down that it got and gave.
+"""Values of every native type go from one real engine to another in a led run. The code of the actions
+writes down which ones it got and gave.
 
 Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the program that starts it.
 The package that keeps values is written by the command, and compiled by its own CMakeLists.txt.
@@ -25,10 +25,10 @@ pytest.importorskip(
 from action_assistant.errors import Conflict
 from action_assistant.runner.runs.events import PieceEnded
 from action_assistant.umrf.kept_values import KEEPER_PACKAGE
-from action_assistant.umrf.model import Graph, Parameter, Relation
+from action_assistant.umrf.model import Graph, Parameter
 from ros.generated_packages import Workspace, graph_of
-from ros.led_engines import ALWAYS, Engines, as_led, over
-from runner.harness import ANN, BEN, MemoryJournal, sequence
+from ros.led_engines import ALWAYS, Engines, as_led, ends_of, going_round, led_round, over
+from runner.harness import ANN, MemoryJournal, sequence
 from support.real_engine import needs_engine
 from umrf.packages.sources import NATIVE
 
@@ -112,13 +112,13 @@ def passing(name: str, *plain: dict[str, Any]) -> Graph:
 
 
 def alarms(journal: MemoryJournal) -> set[str]:
-    """The codes of the alarms of all runs and of their pieces."""
+    """Return the codes of the alarms of all runs and of their pieces."""
     runs = [each.removeprefix("run/") for each in journal.streams if each.startswith("run/")]
     return {alarm.code for run in runs for alarm in journal.history(run).alarms}
 
 
 def truth(engines: Engines) -> list[dict[str, Any]]:
-    """What the code of the actions got and gave, oldest first."""
+    """Return the entries of the code of all actions about the values that it got and gave, oldest first."""
     found: list[dict[str, Any]] = []
     for name in engines.names:
         path = engines.folder / f"truth-{name}"
@@ -129,7 +129,8 @@ def truth(engines: Engines) -> list[dict[str, Any]]:
 
 
 def check_chain(engines: Engines) -> int:
-    """Each visit after the first got what the one before it gave; return how many did."""
+    """Check that each visit after the first got the values that the one before it gave; return how many
+    there were."""
     told = truth(engines)
     gave, got = ([each for each in told if each["event"] == what] for what in ("gave", "got"))
     assert got[0]["values"] == {name: value for name, (_, value) in GIVEN.items()}
@@ -140,26 +141,15 @@ def check_chain(engines: Engines) -> int:
 
 
 def test_values_of_every_type_go_round_in_a_loop(engines: Engines) -> None:
-    graph = passing("round", {}, {"result": "on_false"})
-    first, second = (each.key for each in graph.actions)
-    back = Relation(parent=second, child=first, conditions=ALWAYS, required=False)
-    kept = tuple(each for each in graph.relations if each.child != "exit")
-    loop = msgspec.structs.replace(graph, relations=(*kept, back))
-    ends: list[PieceEnded] = []
+    loop = going_round(passing("round", {}, {"result": "on_false"}))
 
-    async def main() -> None:
+    async def main() -> list[PieceEnded]:
         async with engines.led() as (control, journal):
-            run = (await control.start(as_led(loop), ANN)).run.id
-            with anyio.fail_after(20 + 4 * LAPS):
-                while sum(isinstance(e, PieceEnded) for e in journal.told(run)) < 2 * LAPS:
-                    assert run in control.open, journal.history(run)
-                    await anyio.sleep(0.1)
-            await control.stop(run, BEN)
-            assert await over(control, run, 20) == "stopped"
-            ends.extend(e for e in journal.told(run) if isinstance(e, PieceEnded))
+            found = await led_round(control, journal, loop, LAPS)
             assert alarms(journal) == set()
+            return found
 
-    anyio.run(main)
+    ends = anyio.run(main)
     assert {(e.node, e.outcome) for e in ends[: 2 * LAPS]} == {  # then Stop was pressed
         ("OxPass_0", "on_true"),
         ("OxPass_1", "on_false"),
@@ -168,7 +158,6 @@ def test_values_of_every_type_go_round_in_a_loop(engines: Engines) -> None:
     for each, values in zip(ends[: 2 * LAPS], gave, strict=False):
         assert {name: json.loads(text) for name, text in each.outputs.items()} == values
         assert each.unset == ()
-    times = [each["at"] for each in truth(engines)]
     sys.stdout.write(f"\n{check_chain(engines)} hand-overs of {len(GIVEN)} values\n")
     gaps = {
         node: sorted(
@@ -178,7 +167,6 @@ def test_values_of_every_type_go_round_in_a_loop(engines: Engines) -> None:
         )
         for node in ("OxPass_0", "OxPass_1")
     }
-    assert times
     for node, found in gaps.items():
         sys.stdout.write(
             f"{node} gave → the next got, ms: n={len(found)} p50={found[len(found) // 2]:.0f} max={found[-1]:.0f}\n"
@@ -195,7 +183,7 @@ def test_outcomes_stay_right_with_values_kept(engines: Engines) -> None:
         async with engines.led() as (control, journal):
             run = (await control.start(as_led(graph), ANN)).run.id
             assert await over(control, run, 60) == "finished"
-            return [e for e in journal.told(run) if isinstance(e, PieceEnded)]
+            return ends_of(journal, run)
 
     ends = anyio.run(main)
     assert [each.outcome for each in ends] == meant
@@ -214,8 +202,7 @@ def test_an_output_that_is_not_set_is_told_and_hands_nothing_on(engines: Engines
         async with engines.led() as (control, journal):
             run = (await control.start(as_led(graph), ANN)).run.id
             assert await over(control, run, 60) == "finished"
-            ends = [e for e in journal.told(run) if isinstance(e, PieceEnded)]
-            return ends, alarms(journal)
+            return ends_of(journal, run), alarms(journal)
 
     ends, told = anyio.run(main)
     assert [each.outcome for each in ends] == ["on_true", "on_true", "on_false", "on_true"]

@@ -15,7 +15,8 @@ from action_assistant.umrf.files import codec
 from ros.robots import RobotProcess
 from runner.harness import sequence
 from support.product import running
-from support.real_engine import answers, browser, until
+from support.real_engine import answers, browser
+from support.waiting import until
 
 OUTER = json.loads(codec.write(sequence("tour", 1)).replace('"Work"', '"leg"'))
 LEG = json.loads(codec.write(sequence("leg", 2)))

@@ -26,10 +26,11 @@ pytest.importorskip(
 )
 
 from action_assistant.runner.emulator.messages import LogMessage, Said
-from ros.led_engines import ACCEPTED, LATE_S, PLAYERS, Engines, as_led, watch
+from ros.led_engines import ACCEPTED, LATE_S, PLAYERS, Engines, as_led, register, watch
 from ros.robots import LOSSLESS, robot
-from runner.process import RunnerProcess, body
+from runner.process import RunnerProcess, over, started
 from support.real_engine import IS_HERE
+from support.waiting import until
 
 FAULTS = int(os.environ.get("TEST_LED_FAULTS", "1"))
 FROM = int(os.environ.get("TEST_LED_FROM", "0"))
@@ -45,7 +46,7 @@ pytestmark = pytest.mark.timeout(0 if FAULTS > 1 else 180)
 
 
 class Begun:
-    """When actions have begun: heard by emulated robots, or written down by the code of real ones."""
+    """Records when actions begin: emulated robots hear that, and the code of real ones writes it down."""
 
     def __init__(self) -> None:
         self.engines: Engines | None = None
@@ -57,13 +58,13 @@ class Begun:
             self._heard.append(time.time())
 
     def times(self) -> list[float]:
-        """Return when, in seconds UTC, oldest first."""
+        """Return the times at which actions have begun, in seconds UTC, oldest first."""
         if self.engines is None:
             return list(self._heard)
         return [line.second for line in self.engines.lines() if line.what == "begin"]
 
     def since(self, second: float) -> list[float]:
-        """Return how long after `second` each later action has begun."""
+        """Return the time from `second` to the begin of each later action, in seconds."""
         return [round(each - second, 3) for each in self.times() if each > second]
 
 
@@ -71,7 +72,7 @@ class Begun:
 def robots_of(
     kind: str, domains: list[int], folder: Path
 ) -> Iterator[tuple[Begun, dict[str, int]]]:
-    """Three robots, with their domains by name."""
+    """Open three robots; yield the record of what begins on them, and their domains by name."""
     begun = Begun()
     if kind == "real":
         engines = begun.engines = Engines(folder, DOMAIN, 3)
@@ -124,40 +125,15 @@ def clock_at(offset: Path) -> tuple[str, ...]:
 Fault = Callable[[RunnerProcess, random.Random, Path], None]
 
 
-def until(what: str, true: Callable[[], Any], seconds: float = 30) -> None:
-    """Wait until it is so."""
-    deadline = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.05)
-
-
 class Scene:
-    """One led run, and what is asked of the runner that leads it."""
+    """One led run, as a client of the runner that leads it."""
 
     def __init__(self, client: httpx.Client, begun: Begun, domains: dict[str, int]) -> None:
         self.client = client
         self.begun = begun
-        for name, domain in domains.items():
-            asked = {"name": name, "domain": domain, "led": True}
-            client.post("/api/robots", json=asked).raise_for_status()
-        until("not all robots answer", self._answering)
-        start = client.post("/api/runs", content=body(as_led(watch("watch"), override=ACCEPTED)))
-        assert start.status_code == 201, start.text
-        self.run = start.json()["id"]
-        deadline = time.monotonic() + 30
-        while len(begun.times()) <= 4:
-            dead = begun.engines.dead() if begun.engines is not None else []
-            assert time.monotonic() < deadline, (
-                dead,
-                self.shown()["alarms"],
-                self.shown()["state"],
-            )
-            time.sleep(0.05)
-
-    def _answering(self) -> bool:
-        robots = self.client.get("/api/robots").json()
-        return len(robots) >= 3 and all(each["state"] == "answering" for each in robots)
+        register(client, domains)
+        self.run = started(client, as_led(watch("watch"), override=ACCEPTED))["id"]
+        until("no turns are taken", lambda: len(begun.times()) > 4, shown=self.shown)
 
     def shown(self) -> dict[str, Any]:
         """Return the run as the runner shows it."""
@@ -165,27 +141,22 @@ class Scene:
         return found
 
     def wait_until_held(self) -> None:
-        """Wait until nothing further begins."""
-        deadline = time.monotonic() + 15
-        while (found := self.shown())["held"] is None:
-            assert time.monotonic() < deadline, (found["state"], found["alarms"])
-            time.sleep(0.05)
+        """Wait until the runner shows that nothing further begins."""
+        until("it is not held", lambda: self.shown()["held"] is not None, 15, self.shown)
 
     def go_on(self) -> None:
         """Let it go on, and see that robots take turns again."""
         at = time.time()
         since = {"since": self.shown()["held"]["since"]}
-        way, deadline = f"/api/runs/{self.run}/go_on", time.monotonic() + 15
-        while not (answer := self.client.post(way, json=since)).is_success:
-            assert time.monotonic() < deadline, answer.text  # a robot may be late to answer
-            time.sleep(0.5)
-        until("nothing goes on", lambda: len(self.begun.since(at)) > 3)
+        way = f"/api/runs/{self.run}/go_on"
+        post = self.client.post  # a robot may be late to answer
+        until("it may not go on", lambda: post(way, json=since).is_success, 15, self.shown)
+        until("nothing goes on", lambda: len(self.begun.since(at)) > 3, shown=self.shown)
 
     def stop(self) -> str:
         """Stop it; return its state once it has ended. Nothing may begin after that."""
         self.client.post(f"/api/runs/{self.run}/stop").raise_for_status()
-        until(f"it does not end: {self.shown()}", lambda: self.shown()["ended_at"] is not None)
-        return str(self.shown()["state"])
+        return str(over(self.client, self.run)["state"])
 
 
 @pytest.mark.parametrize("fault", [frozen, killed, moved], ids=lambda each: each.__name__)
@@ -250,7 +221,11 @@ def test_a_stop_that_was_pressed_while_the_runner_stood_still_works(
                 os.kill(runner.pid, signal.SIGCONT)
                 thawed = time.time()
                 pressed.join()
-                until("it is not stopped", lambda: scene.shown()["state"] == "stopped")
+                until(
+                    "it is not stopped",
+                    lambda: scene.shown()["state"] == "stopped",
+                    shown=scene.shown,
+                )
                 time.sleep(0.5)
                 assert begun.since(thawed + LATE_S) == []
         finally:

@@ -17,6 +17,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +31,12 @@ pytest.importorskip(
 
 from action_assistant.runner.emulator.messages import LogMessage, Said
 from action_assistant.umrf.model import ENTRY, ENTRY_CONDITIONS, Graph, Relation
-from ros.led_engines import ACCEPTED, PLAYERS, Engines, as_led, working
+from ros.led_engines import ACCEPTED, PLAYERS, Engines, as_led, register, working
 from ros.robots import LOSSLESS, RobotProcess, robot
 from runner.harness import sequence
-from runner.process import RunnerProcess, body
+from runner.process import RunnerProcess, over, started
 from support.real_engine import IS_HERE
+from support.waiting import until
 
 CLICKS = int(os.environ.get("TEST_STOP_CLICKS", "1"))
 VALUES = os.environ.get("TEST_STOP_VALUES", "")
@@ -59,7 +61,7 @@ def at_once(number: int) -> Graph:
 
 
 class Heard:
-    """When robots have heard a stop, in seconds UTC by robot."""
+    """Records when robots hear a stop, in seconds UTC by robot."""
 
     def __init__(self) -> None:
         self.at: dict[str, list[float]] = defaultdict(list)
@@ -68,7 +70,7 @@ class Heard:
         self.thaw: Callable[[], None] = lambda: None
 
     def by(self, name: str) -> Callable[[Said], None]:
-        """Return what notes the stops that an emulated robot logs."""
+        """Return a listener that notes the stops in the log of an emulated robot."""
 
         def told(said: Said) -> None:
             if isinstance(said, LogMessage) and said.text.startswith("Received request to stop"):
@@ -77,7 +79,7 @@ class Heard:
         return told
 
     def after(self, name: str, clicked: float) -> float | None:
-        """Return how many ms after the click this robot has heard a stop first."""
+        """Return the time from the click until this robot has heard a stop, in ms; None if it has not."""
         if self.engines is not None:
             robot = list(PLAYERS.values()).index(name)
             times = [
@@ -93,7 +95,7 @@ class Heard:
 
 @contextmanager
 def three_robots(kind: str, domains: list[int], folder: Path, *, freezes: bool) -> Iterator[Any]:
-    """Yield three robots, and the domain of each by name."""
+    """Open three robots; yield the record of the stops that they hear, and their domains by name."""
     heard = Heard()
     with ExitStack() as opened:
         if kind == "real":
@@ -122,13 +124,16 @@ def three_robots(kind: str, domains: list[int], folder: Path, *, freezes: bool) 
         yield heard, names
 
 
-def until(client: httpx.Client, run: str, true: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    """Wait until a run, as the runner shows it, meets a condition."""
-    deadline = time.monotonic() + 30
-    while not true(found := client.get(f"/api/runs/{run}").json()):
-        assert time.monotonic() < deadline, found
-        time.sleep(0.02)
-    return dict(found)
+def shown(client: httpx.Client, run: str) -> dict[str, Any]:
+    """Return a run or piece as the runner shows it."""
+    found: dict[str, Any] = client.get(f"/api/runs/{run}").json()
+    return found
+
+
+def all_move(run: dict[str, Any]) -> bool:
+    """Return whether all three actions of a run are shown as running."""
+    states = [each["state"] for each in run["actions"].values()]
+    return states == ["RUNNING"] * 3
 
 
 def of_events(client: httpx.Client, run: str, kind: str) -> list[float]:
@@ -168,15 +173,7 @@ def test_a_stop_reaches_every_robot_at_once(
     with three_robots(kind, domains, tmp_path, freezes=freezes) as (heard, names):
         try:
             with runner.client() as client:
-                for name, domain in names.items():
-                    asked = {"name": name, "domain": domain, "led": True}
-                    client.post("/api/robots", json=asked).raise_for_status()
-                deadline = time.monotonic() + 30
-                while any(
-                    each["state"] != "answering" for each in client.get("/api/robots").json()
-                ):
-                    assert time.monotonic() < deadline
-                    time.sleep(0.1)
+                register(client, names)
                 for number in range(CLICKS):
                     _click(client, number, heard, listening, times, freezes=freezes)
         finally:
@@ -199,29 +196,21 @@ def _click(
     freezes: bool,
 ) -> None:
     """Start a run, stop it once all robots move, and add its times in ms after the click."""
-    asked = as_led(at_once(number), override=ACCEPTED)
-    started = client.post("/api/runs", content=body(asked))
-    assert started.status_code == 201, started.text
-    run = started.json()["id"]
-    shown = until(
-        client,
-        run,
-        lambda found: (
-            len(found["actions"]) == 3
-            and all(each["state"] == "RUNNING" for each in found["actions"].values())
-        ),
-    )
-    pieces = {each["robot"]: each["piece"] for each in shown["actions"].values()}
+    run = started(client, as_led(at_once(number), override=ACCEPTED))["id"]
+    show = partial(shown, client, run)
+    until("not all robots move", lambda: all_move(show()), shown=show)
+    actions = show()["actions"].values()
+    pieces = {each["robot"]: each["piece"] for each in actions}
     if freezes:
         heard.freeze()
     clicked = time.time()
     client.post(f"/api/runs/{run}/stop").raise_for_status()
     for name in listening:
-        until(client, pieces[name], lambda found: found["ended_at"] is not None)
+        over(client, pieces[name])
     if freezes:
-        assert client.get(f"/api/runs/{run}").json()["ended_at"] is None, "a frozen robot is proven"
+        assert show()["ended_at"] is None, "a frozen robot is proven"
         heard.thaw()
-    until(client, run, lambda found: found["state"] == "stopped")
+    assert over(client, run)["state"] == "stopped"
     for name in listening:
         after = heard.after(name, clicked)
         assert after is not None, name

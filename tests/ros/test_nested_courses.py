@@ -21,8 +21,9 @@ pytest.importorskip(
 
 from ros.robots import RobotProcess
 from support.product import Product, running
-from support.real_engine import answers, browser, until
+from support.real_engine import answers, browser
 from support.recordings import CORPUS, NO_CORPUS, calls_of, facts, family
+from support.waiting import until
 
 OURS = ("sub_seq", "sub_error", "sub_fast", "sub_params", "sub_halt", "sub_stop")
 #: Graphs of the engine's own repository: they stand where its files are.

@@ -21,15 +21,13 @@ pytest.importorskip(
 
 from action_assistant.errors import Refused
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.links.port import Registration
-from action_assistant.runner.links.ros2.availability import ros2_reach
-from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import PieceBegan, PieceEnded, Published
 from action_assistant.runner.runs.views import time as as_text
 from action_assistant.runner.start.admission import GoOnRequest
-from ros.led_engines import ACCEPTED, PLAYERS, as_led, clock_us, watch
+from ros.led_engines import ACCEPTED, PLAYERS, as_led, watch
+from ros.led_runner import is_over, led_runner
 from ros.robots import RobotProcess
-from runner.harness import ANN, BEN, MemoryJournal, at_once
+from runner.harness import ANN, BEN, MemoryJournal
 
 SECONDS = float(os.environ.get("TEST_ROUGH_S", "60"))
 ROUGH = os.environ.get("TEST_ROUGH", "20 0.05 4").split()
@@ -78,10 +76,7 @@ def test_led_runs_over_a_rough_network(tmp_path: Path, monkeypatch: pytest.Monke
         pressed = time.monotonic()
         if run in control.open:
             await control.stop(run, BEN)
-        with anyio.move_on_after(60):
-            while run in control.open:  # noqa: ASYNC110
-                await anyio.sleep(0.02)
-        if run in control.open:
+        if not await is_over(control, run, 60):
             failed.append(f"{run} cannot be stopped: {control.open[run].run}")
             return
         proven.append(time.monotonic() - pressed)
@@ -100,26 +95,15 @@ def test_led_runs_over_a_rough_network(tmp_path: Path, monkeypatch: pytest.Monke
         count[f"ended {journal.history(run).state}"] += 1
 
     async def main() -> None:
-        reach = ros2_reach(clock_us, {"ROS_DOMAIN_ID": "30"})
-        assert not isinstance(reach, str), reach
-        robots, journal = Robots(reach=reach), MemoryJournal()
-        try:
-            async with ExecutionService.opened(
-                journal, robots, clock_us=clock_us, run_in_worker=at_once
-            ) as control:
-                for name, domain in names.items():
-                    await control.register(Registration(name=name, domain=domain, led=True), ANN)
-                until = time.monotonic() + SECONDS
-                while time.monotonic() < until:
-                    try:
-                        await lead(control, journal, until)
-                    except Refused as refused:
-                        count["start refused"] += 1
-                        last.append(refused.detail)
-                        await anyio.sleep(1)
-        finally:
-            with anyio.CancelScope(shield=True):
-                await reach.aclose()
+        async with led_runner(names) as (control, journal):
+            until = time.monotonic() + SECONDS
+            while time.monotonic() < until:
+                try:
+                    await lead(control, journal, until)
+                except Refused as refused:
+                    count["start refused"] += 1
+                    last.append(refused.detail)
+                    await anyio.sleep(1)
 
     last: list[str] = []
     with ExitStack() as opened:

@@ -6,11 +6,9 @@ Needs ENGINE_LAB, the folder of a built engine, and UMRF_SHARED, which has the p
 import os
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import httpx
 import pytest
@@ -22,13 +20,6 @@ IS_HERE = bool(os.environ.get("ENGINE_LAB")) and PROGRAM.exists()
 needs_engine = pytest.mark.skipif(
     not IS_HERE, reason="the real engine is not here (ENGINE_LAB, UMRF_SHARED)"
 )
-
-
-def until(what: str, true: Callable[[], Any], seconds: float = 40) -> None:
-    deadline = time.monotonic() + seconds
-    while not true():
-        assert time.monotonic() < deadline, what
-        time.sleep(0.1)
 
 
 def browser(product: Product, name: str) -> httpx.Client:
