@@ -90,7 +90,7 @@ def test_each_outcome_is_that_of_the_code(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(
     not (Path(os.environ.get("ENGINE_LAB", "")) / "actions" / "ox_unset").exists(),
-    reason="OxUnset is not here: an action with an output that its code never sets",
+    reason="the real engine is not here with OxUnset, an action that never sets its output",
 )
 def test_an_output_that_is_never_set_keeps_no_run_open(tmp_path: Path) -> None:
     engines = Engines(tmp_path, DOMAIN)
