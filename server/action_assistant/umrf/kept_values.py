@@ -25,7 +25,7 @@ from action_assistant.umrf.model import (
     Remap,
     Signature,
 )
-from action_assistant.umrf.parameters import NATIVE
+from action_assistant.umrf.parameters import NATIVE, fits
 from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_of
 
 #: The action of the helper package. An engine destroys the actions of a graph from the last name to the
@@ -35,23 +35,23 @@ KEEPER_PACKAGE: Final = "zz_keep_values"
 #: The required input of a keeper that nobody gives.
 NEVER: Final = "never_given"
 #: Outputs that one keeper takes. It has an input of each native type for each of them.
-PLACES: Final = 4
+_OUTPUTS_EACH: Final = 4
 #: Bytes of the values of one action, as the robot writes them; more are refused.
 MOST_BYTES: Final = 64 * 1024
-#: Inputs of a keeper, by name: the place of the output among those of the keeper, and the type. The engine
+#: Inputs of a keeper, by name: the index of the output among those of the keeper, and the type. The engine
 #: renames outputs in place and finds the others only while their order stays: so these names come before
-#: every usual one, and are ordered by place first.
-SLOTS: Final[Mapping[str, tuple[int, str]]] = {
-    f"A{place}_{kind}": (place, kind) for place in range(PLACES) for kind in sorted(NATIVE)
+#: every usual one, and are ordered by index first.
+_INPUT_TYPES: Final[Mapping[str, tuple[int, str]]] = {
+    f"A{index}_{kind}": (index, kind) for index in range(_OUTPUTS_EACH) for kind in sorted(NATIVE)
 }
 #: Arrows that hand values on, each with these outputs and their types.
-Handing: TypeAlias = Sequence[tuple[Relation, dict[str, str]]]
+ValueArrows: TypeAlias = Sequence[tuple[Relation, dict[str, str]]]
 _TAKEN: Final = frozenset({"run", "stop", "pause", "restart"})  # responses that take values
 
 
 def keeper(number: int = 0, key: Key = KEEPER) -> Action:
     """Return the action of the helper package, as its file describes it."""
-    leaves = {name: kind for name, (_, kind) in SLOTS.items()} | {NEVER: "string"}
+    leaves = {name: kind for name, (_, kind) in _INPUT_TYPES.items()} | {NEVER: "string"}
     return Action(
         key=key,
         name=KEEPER,
@@ -64,7 +64,7 @@ def keeper(number: int = 0, key: Key = KEEPER) -> Action:
 def has_keeper(known: Mapping[str, Signature]) -> bool:
     """Return whether an engine that has indexed these actions has the helper package."""
     found = known.get(KEEPER)
-    wanted = {name: kind for name, (_, kind) in SLOTS.items()} | {NEVER: "string"}
+    wanted = {name: kind for name, (_, kind) in _INPUT_TYPES.items()} | {NEVER: "string"}
     return found is not None and found.inputs == wanted and not found.outputs
 
 
@@ -74,11 +74,11 @@ def is_keeper(node: str) -> bool:
 
 
 class KeptOutput(msgspec.Struct, frozen=True):
-    """An output of an action that a keeper takes. `place`: the key of its value in `kept_in`."""
+    """An output of an action that a keeper takes. `key`: that of its value in `KeptValues.values`."""
 
     name: str
     type: str
-    place: str
+    key: str
 
 
 def kept_outputs(action: Action) -> tuple[KeptOutput, ...]:
@@ -88,15 +88,15 @@ def kept_outputs(action: Action) -> tuple[KeptOutput, ...]:
     if action.name == KEEPER or not any(slot.type in NATIVE for slot in outputs.values()):
         return ()
     found: list[KeptOutput] = []
-    for number in range(-(-len(outputs) // PLACES)):
+    for number in range(-(-len(outputs) // _OUTPUTS_EACH)):
         try:
-            places = renamed(outputs, _remap(tuple(outputs), _types(action), number), SLOTS)
+            inputs = renamed(outputs, _remap(tuple(outputs), _types(action), number), _INPUT_TYPES)
         except RemapUnknown:
             return ()
-        for slot, name in places.items():
-            place, kind = SLOTS[slot]
+        for taken_as, name in inputs.items():
+            index, kind = _INPUT_TYPES[taken_as]
             if outputs[name].type == kind:
-                found.append(KeptOutput(name, kind, f"{number * PLACES + place}_{kind}"))
+                found.append(KeptOutput(name, kind, f"{number * _OUTPUTS_EACH + index}_{kind}"))
     wanted = [name for name, slot in outputs.items() if slot.type in NATIVE]
     return tuple(found) if [each.name for each in found] == wanted else ()
 
@@ -107,7 +107,7 @@ def with_keepers(piece: Graph, action: Action, *, taken_on_false: bool) -> Graph
     outputs = slots_of(action.outputs)
     keepers: list[Action] = []
     arrows: list[Relation] = []
-    for number in range(-(-len(outputs) // PLACES)):
+    for number in range(-(-len(outputs) // _OUTPUTS_EACH)):
         key = f"{action.key}-{KEEPER}-{number}"
         keepers.append(keeper(number, key))
         arrows.append(
@@ -139,22 +139,22 @@ def _types(action: Action) -> dict[str, str]:
 def _remap(outputs: tuple[str, ...], types: Mapping[str, str], number: int) -> tuple[Remap, ...]:
     """Return the names of the sorted outputs at the keeper with this number. The outputs that other
     keepers take get names that keep the order and are no inputs."""
-    first = number * PLACES
+    first = number * _OUTPUTS_EACH
     names: list[Remap] = []
     for index, output in enumerate(outputs):
         if index < first:
             name = f"!{index:06d}"
-        elif index < first + PLACES:
+        elif index < first + _OUTPUTS_EACH:
             name = f"A{index - first}_{types[output] if types[output] in NATIVE else 'other'}"
         else:
-            name = f"A{PLACES}_{index:06d}"
+            name = f"A{_OUTPUTS_EACH}_{index:06d}"
         names.append(Remap(output, name))
     return tuple(names)
 
 
 class KeptValues(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The values that the keepers of a graph hold: JSON texts by place and type (`0_number`). `wrong`:
-    why some are missing, as part of a sentence."""
+    """The values that the keepers of a graph hold: JSON texts by index and type of the output
+    (`0_number`). `wrong`: why some are missing, as part of a sentence."""
 
     values: dict[str, str] = {}
     wrong: str = ""
@@ -184,13 +184,13 @@ def kept_in(keepers: Mapping[int, bytes]) -> KeptValues:
             inputs = _INPUTS.decode(text)
         except (msgspec.DecodeError, RecursionError, UnicodeError):
             return KeptValues(wrong="its values cannot be read")
-        for name, (place, kind) in SLOTS.items():
+        for name, (index, kind) in _INPUT_TYPES.items():
             leaf = inputs.get(name)
             if leaf is None or leaf.pvf_value is msgspec.UNSET:
                 continue
-            if leaf.pvf_type != kind or not _fits(kind, leaf.pvf_value):
+            if leaf.pvf_type != kind or not fits(kind, leaf.pvf_value):
                 return KeptValues(wrong=f"a value that it gave is no {kind}")
-            found[f"{number * PLACES + place}_{kind}"] = as_json(leaf.pvf_value)
+            found[f"{number * _OUTPUTS_EACH + index}_{kind}"] = as_json(leaf.pvf_value)
     return _TOO_LARGE if sum(map(len, found.values())) > MOST_BYTES else KeptValues(found)
 
 
@@ -204,24 +204,12 @@ def is_given(text: bytes) -> bool:
     return never is None or never.pvf_value is not msgspec.UNSET
 
 
-def _fits(kind: str, value: Any) -> bool:
-    match kind:
-        case "string":
-            return isinstance(value, str)
-        case "bool":
-            return isinstance(value, bool)
-        case "number":
-            return isinstance(value, int | float) and not isinstance(value, bool)
-        case _:
-            return isinstance(value, list) and all(_fits(kind[:-1], each) for each in value)
-
-
 def as_json(value: Any) -> str:
     """Return a value of a parameter as JSON text."""
     return msgspec.json.encode(value).decode()
 
 
-def handing(graph: Graph) -> Iterator[tuple[Relation, dict[str, str]]]:
+def value_arrows(graph: Graph) -> Iterator[tuple[Relation, dict[str, str]]]:
     """Yield each arrow that hands values from action to action, with these outputs and their types."""
     actions = {action.key: action for action in graph.actions if not action.missing}
     for relation in graph.relations:
@@ -247,7 +235,7 @@ def takes(relation: Relation, outcomes: tuple[Precondition, ...] = PRECONDITIONS
     return any(relation.conditions.answer(outcome) in _TAKEN for outcome in outcomes)
 
 
-def taken_on_false(graph: Graph, arrows: Handing) -> frozenset[Key]:
+def taken_on_false(graph: Graph, arrows: ValueArrows) -> frozenset[Key]:
     """Return the keys of the actions whose values somebody takes after they have ended with false. The
     exit of a graph takes those of the actions before it. `arrows`: all that hand values on."""
     handed = {each.parent for each, _ in arrows}
@@ -256,7 +244,7 @@ def taken_on_false(graph: Graph, arrows: Handing) -> frozenset[Key]:
     return frozenset(each.parent for each in taking if takes(each, ("on_false",)))
 
 
-def receiving(graph: Graph, arrows: Handing) -> dict[Key, frozenset[str]]:
+def receiving(graph: Graph, arrows: ValueArrows) -> dict[Key, frozenset[str]]:
     """Return the flat names of the inputs that an arrow may hand a value to, by key of their action.
     `arrows`: all that hand values on."""
     actions = {action.key: action for action in graph.actions if not action.missing}
@@ -270,7 +258,9 @@ def receiving(graph: Graph, arrows: Handing) -> dict[Key, frozenset[str]]:
     return {key: frozenset(names) for key, names in found.items()}
 
 
-def hindered(graph: Graph, arrows: Handing) -> Iterator[tuple[Relation, dict[str, str], str]]:
+def unreadable_arrows(
+    graph: Graph, arrows: ValueArrows
+) -> Iterator[tuple[Relation, dict[str, str], str]]:
     """Yield each arrow whose values cannot be handed from one piece to another, with its outputs and
     their types, and the reason as the end of a sentence. `arrows`: all that hand values on."""
     actions = {action.key: action for action in graph.actions if not action.missing}
@@ -300,7 +290,7 @@ def hindered(graph: Graph, arrows: Handing) -> Iterator[tuple[Relation, dict[str
         yield relation, handed, why
 
 
-def named(names: Collection[str]) -> str:
+def names_in_words(names: Collection[str]) -> str:
     """Return the names of parameters in words, the first three of them."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(f"“{name}”" for name in list(names)[:3]) + more

@@ -69,7 +69,7 @@ def _played(action: Action, inside: Inside) -> Iterator[tuple[str, str]]:
             left += [(child, actor) for child in reversed(graph.actions) if not child.missing]
 
 
-def performers(graph: Graph, inside: Inside) -> frozenset[str]:
+def actors_in(graph: Graph, inside: Inside) -> frozenset[str]:
     """Return the actors of a graph, "" for actions without one, with those of the actions inside."""
     real = (action for action in graph.actions if not action.missing)
     return frozenset[str]().union(*(actors_of(action, inside) for action in real))
@@ -167,16 +167,16 @@ def outcome_of_subgraph(
     of a graph is that of the action which reached its exit. That action is not known, so that the
     outcome counts only if every action that may have been it has the same one.
     """
-    told = outcome_of(*states)
+    by_states = outcome_of(*states)
     may_be = _results_of(_part_of(piece, action), action.name, seen, inside, 0)
-    match told:
+    match by_states:
         case "on_true":
-            return told if told in may_be else None
+            return by_states if by_states in may_be else None
         case "on_false":
             left = may_be - {"on_true"}
             return next(iter(left - {"on_stopped"}), None) if len(left) == 1 else None
         case _:
-            return told
+            return by_states
 
 
 def _part_of(around: str, action: Action) -> str:
@@ -204,12 +204,12 @@ def _results_of(
         for action in graph.actions
         if not action.missing
     }
-    told = _with_bypassed(graph, ends, again)
+    passed = _with_bypassed(graph, ends, again)
     return frozenset(
         outcome
         for each in graph.relations
         if each.child == EXIT and each.parent != ENTRY
-        for outcome in told.get(each.parent, _NONE)
+        for outcome in passed.get(each.parent, _NONE)
         if each.conditions.answer(outcome) != "ignore"
     )
 
@@ -238,11 +238,11 @@ def _with_bypassed(
 ) -> dict[Key, frozenset[Precondition]]:
     """Return the outcomes that each action can have passed on: its own, and those that went past it.
     An action in a loop (`again`) can have had any outcome before its last one."""
-    told = dict(ends)
+    passed = dict(ends)
     arrows = [
         (each.parent, each.child, outcome)
         for each in graph.relations
-        if each.parent in told and each.child in told
+        if each.parent in passed and each.child in passed
         for outcome in PRECONDITIONS
         if each.conditions.answer(outcome) == "bypass"
     ]
@@ -250,8 +250,8 @@ def _with_bypassed(
     while is_changed:
         is_changed = False
         for parent, child, outcome in arrows:
-            passes = outcome in told[parent] or parent in again
-            if passes and outcome not in told[child]:
-                told[child] |= {outcome}
+            passes = outcome in passed[parent] or parent in again
+            if passes and outcome not in passed[child]:
+                passed[child] |= {outcome}
                 is_changed = True
-    return told
+    return passed

@@ -98,14 +98,14 @@ def without_value(parameter: Parameter) -> Parameter:
 NATIVE: Final = ("string", "number", "bool", "strings", "numbers", "bools")
 
 
-def fits(kind: str, value: Json) -> bool:
-    """Return whether the engine can read `value` as a parameter of type `kind`; False for every
-    type that is not native to the engine."""
+def fits(kind: str, value: object) -> bool:
+    """Return whether the engine can read a JSON value as a parameter of type `kind`; False for every
+    type that is not native to the engine. Numbers may be `Number` or plain ones."""
     match kind:
         case "string":
             return isinstance(value, str)
         case "number":
-            return isinstance(value, Number)
+            return isinstance(value, Number | float | int) and not isinstance(value, bool)
         case "bool":
             return isinstance(value, bool)
         case "strings" | "numbers" | "bools":

@@ -11,7 +11,7 @@ from typing import Final
 
 import msgspec
 
-from action_assistant.umrf.kept_values import handing, hindered, named
+from action_assistant.umrf.kept_values import names_in_words, unreadable_arrows, value_arrows
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -87,14 +87,14 @@ def handed_by(graph: Graph, actions: Collection[Key]) -> tuple[Obstacle, ...]:
     helper package on the robot that carries them out."""
     return tuple(
         Obstacle(code="values-across", text=_hands(graph, arrow, handed), aid=arrow.child)
-        for arrow, handed in handing(graph)
+        for arrow, handed in value_arrows(graph)
         if arrow.parent in actions
     )
 
 
 def _values_across(graph: Graph) -> Iterator[Obstacle]:
     """Yield each arrow whose values no helper package can hand from one piece to another."""
-    for arrow, handed, why in hindered(graph, tuple(handing(graph))):
+    for arrow, handed, why in unreadable_arrows(graph, tuple(value_arrows(graph))):
         text = f"{_hands(graph, arrow, handed)}: {why}"
         yield Obstacle(code="values-across", text=text, aid=arrow.child)
 
@@ -102,7 +102,7 @@ def _values_across(graph: Graph) -> Iterator[Obstacle]:
 def _hands(graph: Graph, arrow: Relation, outputs: Collection[str]) -> str:
     """Return in words that an arrow hands these outputs on."""
     names = {action.key: action.full_name for action in graph.actions}
-    return f"{names[arrow.parent]} hands {named(outputs)} to {names[arrow.child]}"
+    return f"{names[arrow.parent]} hands {names_in_words(outputs)} to {names[arrow.child]}"
 
 
 def _spontaneous(graph: Graph) -> Iterator[Obstacle]:

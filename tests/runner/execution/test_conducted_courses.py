@@ -24,7 +24,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Override, PieceEnded, RunEvent
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
-from action_assistant.umrf.kept_values import handing, keeper
+from action_assistant.umrf.kept_values import keeper, value_arrows
 from action_assistant.umrf.model import (
     ENTRY,
     ENTRY_CONDITIONS,
@@ -184,7 +184,7 @@ def with_values(
         relations.append(each)
     graph = msgspec.structs.replace(graph, actions=actions, relations=tuple(relations))
     handed = {
-        each.parent for each, _ in handing(graph)
+        each.parent for each, _ in value_arrows(graph)
     }  # else only the exit takes it, unread on false
     told = {
         f"{each.name}_0": [

@@ -19,10 +19,10 @@ from action_assistant.runner.start.admission import GoOnRequest, GroupRequest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.kept_values import (
     KEEPER_PACKAGE,
-    handing,
-    hindered,
     keeper,
     kept_outputs,
+    unreadable_arrows,
+    value_arrows,
 )
 from action_assistant.umrf.model import EXIT, Conditions, Graph, Parameter, Relation
 from action_assistant.umrf.semantics import Behaviour
@@ -282,7 +282,7 @@ def test_an_arrow_is_refused_where_the_engine_would_lose_a_renamed_output(
     odd = tuple(parameter(name, "string") for name in names)
     graph = relay(((), odd), (odd, ()))
     assert kept_outputs(graph.actions[0]) == ()
-    ((arrow, _, why),) = hindered(graph, tuple(handing(graph)))
+    ((arrow, _, why),) = unreadable_arrows(graph, tuple(value_arrows(graph)))
     assert (arrow.parent, arrow.child) == tuple(each.key for each in graph.actions)
     assert "under other names" in why
 

@@ -12,7 +12,7 @@ import msgspec
 from action_assistant.runner.execution.conducted_steps import Step
 from action_assistant.runner.runs.events import PieceEnded
 from action_assistant.runner.start.piece_texts import PieceText
-from action_assistant.umrf.kept_values import KeptOutput, kept_outputs, named
+from action_assistant.umrf.kept_values import KeptOutput, kept_outputs, names_in_words
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.semantics import Returned
 
@@ -82,7 +82,7 @@ class PieceValues:
         if not ended.unset or ended.how == "unsent" or (ended.node, ended.unset) in self._said:
             return ""
         self._said.add((ended.node, ended.unset))
-        names = named(ended.unset)
+        names = names_in_words(ended.unset)
         known = (
             "has ended without giving" if ended.how == "shape" else "has ended, without a sight of"
         )
@@ -106,7 +106,7 @@ class PieceValues:
         if how != "shape" or step.run.kept.wrong:
             return GivenOutputs(unset=names if text.is_taken else ())
         kept = step.run.kept.values
-        values = {each.name: kept[each.place] for each in outputs if each.place in kept}
+        values = {each.name: kept[each.key] for each in outputs if each.key in kept}
         return GivenOutputs(values, tuple(name for name in names if name not in values))
 
 

@@ -32,8 +32,8 @@ from action_assistant.umrf.laps import Laps, laps
 from action_assistant.umrf.led_steps import as_one_step
 from action_assistant.umrf.led_subgraphs import (
     Inside,
+    actors_in,
     graphs_within,
-    performers,
     players,
     subgraph_obstacles,
 )
@@ -337,7 +337,7 @@ def prepared_pieces(
     graph that cannot run as pieces."""
     whole = prepared(request, facts, run, approved=approved)
     graph, inside = codec.read(whole.umrf).graph, graphs_in(whole.subgraphs)
-    _check_robots(request.robots, performers(graph, inside))
+    _check_robots(request.robots, actors_in(graph, inside))
     hindering = (*subgraph_obstacles(graph, inside, request.robots), *obstacles(graph))
     if hindering:
         raise Conflict(

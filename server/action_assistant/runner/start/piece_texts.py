@@ -15,9 +15,9 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import dump, parse_small
 from action_assistant.umrf.kept_values import (
     as_json,
-    handing,
     receiving,
     taken_on_false,
+    value_arrows,
     with_keepers,
 )
 from action_assistant.umrf.led_subgraphs import Inside, graphs_within
@@ -80,7 +80,7 @@ def piece_texts(umrf: str, subgraphs: Sequence[RunSubgraph]) -> dict[str, PieceT
 def texts_of(graph: Graph, inside: Inside, stamp: codec.Stamp) -> dict[str, PieceText]:
     """Return the pieces of a graph, by full name of their action. `stamp`: its run is replaced in each
     text."""
-    arrows = tuple(handing(graph))
+    arrows = tuple(value_arrows(graph))
     inputs, on_false = receiving(graph, arrows), taken_on_false(graph, arrows)
     taken = frozenset(each.parent for each, _ in arrows)
     texts: dict[str, PieceText] = {}

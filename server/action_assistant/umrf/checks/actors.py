@@ -16,7 +16,7 @@ from action_assistant.umrf.checks.places import Subject, joined, more
 from action_assistant.umrf.checks.subgraphs import Resolution, SubGraphs, at_action, place_inside
 from action_assistant.umrf.components import Mask, nodes_in, reachable
 from action_assistant.umrf.facts import EngineFacts
-from action_assistant.umrf.kept_values import KEEPER_PACKAGE, handing, hindered
+from action_assistant.umrf.kept_values import KEEPER_PACKAGE, unreadable_arrows, value_arrows
 from action_assistant.umrf.laps import repeated
 from action_assistant.umrf.model import (
     ENTRY,
@@ -267,9 +267,11 @@ def _check_values(
 ) -> None:
     """Report each arrow whose values no robot shows, each that hands values to an action of another
     actor, and once all those that hand them to one of the same actor."""
-    handed = tuple(handing(subject.graph))
+    handed = tuple(value_arrows(subject.graph))
     outputs = {(each.parent, each.child): set(names) for each, names in handed}
-    refused = {(each.parent, each.child): why for each, _, why in hindered(subject.graph, handed)}
+    refused = {
+        (each.parent, each.child): why for each, _, why in unreadable_arrows(subject.graph, handed)
+    }
     own: list[Relation] = []
     for relation in arrows:
         ends = relation.parent, relation.child
