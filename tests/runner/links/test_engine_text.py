@@ -195,6 +195,6 @@ def test_an_engine_that_is_emulated_shows_kept_values_as_a_real_one() -> None:
         )
         ended = "ERROR" if result == "on_error" else "FINISHED"
         assert (shown.state, shown.nodes) == (state, {"Work_0": ended})
-        got = {each.name: shown.kept.values.get(each.place) for each in kept_outputs(action)}
+        got = {each.name: shown.kept.values.get(each.key) for each in kept_outputs(action)}
         wanted = {name: None if result == "on_error" else as_json(VALUES[name]) for name in VALUES}
         assert got == wanted
