@@ -59,7 +59,7 @@ def _completed(place: str, text: str, found: dict[str, str]) -> str:
     if place == "index.md":
         return f"{text}\n\n{pages.navigation(set(found))}\n"
     if place == "decisions/index.md":
-        records = sorted(each for each in found if each.startswith("decisions/0"))
+        records = sorted(each for each in found if each.startswith("decisions/") and each != place)
         lines = [f"- [{pages.numbered(found[each], each)}]({Path(each).name})" for each in records]
         return f"{text}\n\n" + "\n".join(lines)
     if pages.LIST in text:
