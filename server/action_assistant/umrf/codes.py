@@ -234,11 +234,13 @@ def table() -> str:
     """Return a Markdown table of the codes of all problems that graphs and their texts can have,
     for the documentation."""
     lines = [
-        "| code | severity | what it is | what happens | fix |",
-        "|---|---|---|---|---|",
+        "| code | severity | what it is | what happens |",
+        "|---|---|---|---|",
     ]
     for name, code in CODES.items():
         severity = " or ".join(code.severities)
-        fixes = ", ".join(f"`{fix}`" for fix in code.fixes)
-        lines.append(f"| `{name}` | {severity} | {code.meaning} | {code.consequence} | {fixes} |")
+        happens = code.consequence
+        if code.fixes:
+            happens += f" (fix: {', '.join(f'`{fix}`' for fix in code.fixes)})"
+        lines.append(f"| `{name}` | {severity} | {code.meaning} | {happens} |")
     return "\n".join(lines) + "\n"
