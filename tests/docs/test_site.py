@@ -116,7 +116,9 @@ def test_every_document_is_a_page_that_the_navigation_or_a_list_leads_to() -> No
     linked = {unquote(urlsplit(each).path) for each in pages()[SITE / "index.html"].links}
     assert {f"{name}.html" for name in names} <= linked
     decisions = {unquote(each) for each in pages()[SITE / "decisions" / "index.html"].links}
-    assert {f"{path.stem}.html" for path in (ROOT / "docs/decisions").glob("[0-9]*.md")} <= decisions
+    assert {
+        f"{path.stem}.html" for path in (ROOT / "docs/decisions").glob("[0-9]*.md")
+    } <= decisions
 
 
 def test_every_route_and_shape_of_both_processes_is_told() -> None:
