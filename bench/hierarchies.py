@@ -14,8 +14,8 @@ from action_assistant.umrf.semantics import simulate
 from umrf import best_of
 
 TITLE = "Hierarchies: chains in chains, the middle of each is the next level"
-SIZES: Final = (100, 1_000, 3_000)  # actions of all levels
-LEVELS: Final = (1, 2, 5)
+SIZES: Final = (100, 300, 1_000, 3_000)  # actions of all levels
+LEVELS: Final = (1, 2, 3, 5)
 ALWAYS: Final = ["on_true -> run", "on_false -> run", "on_error -> run", "on_stopped -> ignore"]
 
 

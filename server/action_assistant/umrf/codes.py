@@ -3,6 +3,7 @@
 Checks may report only these; the table in the documentation is made from them.
 """
 
+from collections.abc import Iterator
 from typing import Final, Literal, TypeAlias
 
 import msgspec
@@ -231,16 +232,35 @@ def rank(problem: Problem) -> tuple[Severity, int]:
 
 
 def table() -> str:
-    """Return a Markdown table of the codes of all problems that graphs and their texts can have,
-    for the documentation."""
-    lines = [
-        "| code | severity | what it is | what happens |",
-        "|---|---|---|---|",
-    ]
+    """Return Markdown tables of the codes of all problems that graphs and their texts can have, for
+    the documentation: what cannot be read, what the engine's parser refuses, and the others."""
+    return "\n".join(
+        (
+            *_alike("unreadable", "error: nothing is read"),
+            *_alike("refused", "error: the engine refuses the graph"),
+            "| code | severity | what it is | what happens |",
+            "|---|---|---|---|",
+            *(
+                f"| `{name}` | {' or '.join(code.severities)} | {code.meaning} |"
+                f" {code.consequence}{_fixes(code)} |"
+                for name, code in CODES.items()
+                if code.kind not in ("unreadable", "refused")
+            ),
+            "",
+        )
+    )
+
+
+def _alike(kind: Kind, consequence: str) -> Iterator[str]:
+    """Yield the lines of the table of one kind whose codes all have the same consequence."""
+    yield f"| code | {consequence} |"
+    yield "|---|---|"
     for name, code in CODES.items():
-        severity = " or ".join(code.severities)
-        happens = code.consequence
-        if code.fixes:
-            happens += f" (fix: {', '.join(f'`{fix}`' for fix in code.fixes)})"
-        lines.append(f"| `{name}` | {severity} | {code.meaning} | {happens} |")
-    return "\n".join(lines) + "\n"
+        if code.kind == kind:
+            yield f"| `{name}` | {code.meaning}{_fixes(code)} |"
+    yield ""
+
+
+def _fixes(code: Code) -> str:
+    """Return the names of the fixes of a code in brackets; empty without fixes."""
+    return f" (fix: {', '.join(f'`{fix}`' for fix in code.fixes)})" if code.fixes else ""
