@@ -57,8 +57,8 @@ class PackageBuild(msgspec.Struct, frozen=True):
 
 
 def last_builds(workspace: Path) -> tuple[PackageBuild, ...]:
-    """Return the result of every package in the last colcon build. Raise CannotStart if there is no
-    log of one."""
+    """Return the result of every package in the last colcon build of a workspace. Raise CannotStart
+    if it has no log of one."""
     latest = workspace / "log" / "latest_build"
     events = latest / "events.log"
     try:
@@ -90,8 +90,8 @@ def _build(
 def errors_of(said: str, source: Path | None) -> tuple[BuildError, ...]:
     """Return the errors in `said`, the output of the build of one package. If no line of the output
     is recognised as an error, return one error with the last three lines. `source`: the source
-    folder of the package, to which the paths of files in errors are made relative; None if it is
-    not known."""
+    folder of the package, to which the paths of files in errors are made relative; None if unknown.
+    """
     found = list(dict.fromkeys(_errors(said, source)))
     if not found:
         lines = [line.strip() for line in said.splitlines() if line.strip()]

@@ -35,14 +35,16 @@ def command(
     text: str,
     example: str,
 ) -> argparse.ArgumentParser:
-    """Add a sub-command that needs a running server, and return its parser."""
+    """Add a sub-command that needs a running server, and return its parser. `text`: the help;
+    `example`: its arguments in an example."""
     parser = commands.add_parser(name, help=text, description=text)
     add_server(parser, example)
     return parser
 
 
 def add_server(parser: argparse.ArgumentParser, example: str) -> None:
-    """Add the options by which a command finds its server, and an example to the help."""
+    """Add the options by which a command finds its server, and an example (its arguments) to the
+    help."""
     parser.epilog = f"example: {parser.prog} {example}".rstrip()
     parser.add_argument(
         "--url",
@@ -68,17 +70,18 @@ class Server:
         return str(self._client.base_url).rstrip("/")
 
     def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
-        """Send a request to the editor, and return its answer. Raise RequestRefused, with one
-        sentence, if it is refused."""
+        """Send a request to the editor, wait for the answer and return it. `body`: further
+        arguments of httpx. Raise RequestRefused, with one sentence, if it is refused."""
         return _asked(self._client, method, path, **body)
 
     def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
-        """Send a request to the runner, and return its answer."""
+        """Send a request to the runner, wait for the answer and return it. `body`: further
+        arguments of httpx. Raise RequestRefused, with one sentence, if it is refused."""
         return _asked(self._client, method, self._runner_url + path, **body)
 
     def graph_id(self, asked: str) -> str:
-        """Return the id of the graph with this id or name. Raise RequestRefused unless exactly one
-        matches."""
+        """Return the id of the graph with the id or name `asked`. Raise RequestRefused unless
+        exactly one graph matches."""
         graphs = self.editor("GET", "/api/graphs").json()
         if any(graph["id"] == asked for graph in graphs):
             return asked
@@ -112,7 +115,7 @@ def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "http
 
 def sentence(answer: "httpx.Response") -> str:
     """Return title and detail of a refusal in one line, with the place in the request if it names
-    one. If the body is no such refusal, return the URL and the status code."""
+    one. If the body is no refusal of this program, return the URL and the status code."""
     try:
         problem = answer.json()
         place = (problem.get("where") or {}).get("path", "")
@@ -133,12 +136,9 @@ def running(options: argparse.Namespace) -> Iterator[Server]:
 
 
 def reach(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments of an httpx client that talks to the server which a command is meant
-    for.
-
-    The client sends the token only after the server has proven that it knows the token. Raise
-    CannotStart if the data folder holds no token that can be read.
-    """
+    """Return the arguments of an httpx client for the server that a command (its options) is meant
+    for. The client sends the token only after the server has proven that it knows the token. Raise
+    CannotStart if the data folder has no token that can be read."""
     from action_assistant.commands.token_proof import AfterProof
 
     data = options.data.resolve()
@@ -154,7 +154,8 @@ def reach(options: argparse.Namespace) -> dict[str, Any]:
 
 
 def _here(trust: ssl.SSLContext) -> str:
-    """Return the URL of the server on this computer, which may run with --tls or without."""
+    """Return the URL of the server on this computer, http or https, which is tried. `trust`: the
+    certificates to accept."""
     port = settings.port()
     with (
         contextlib.suppress(OSError),
@@ -166,7 +167,8 @@ def _here(trust: ssl.SSLContext) -> str:
 
 
 def decoded(answer: "httpx.Response", kind: type[T]) -> T:
-    """Decode the body of an answer. Raises CannotStart for a server whose answers have another form."""
+    """Decode the JSON body of an answer as this type. Raise CannotStart for a server whose answers
+    have another form."""
     try:
         return msgspec.json.decode(answer.content, type=kind)
     except msgspec.DecodeError as error:

@@ -46,7 +46,8 @@ class _Version(msgspec.Struct):
 
 
 def _diff(options: argparse.Namespace) -> int:
-    """Run the command; return 0 if the two are equal, 1 if they differ, 2 if one cannot be read."""
+    """Run the command with these options; return 0 if the two are equal, 1 if they differ. Raise
+    CannotStart (exit code 2) if one cannot be read."""
     given = [options.before, options.after]
     try:
         if all(Path(each).is_file() for each in given):
@@ -78,8 +79,8 @@ def _on_server(server: Server, given: list[str]) -> Difference:
 
 
 def _place(server: Server, asked: str) -> _Moment | _Version:
-    """Read an argument of the command: a graph, `GRAPH@SEQ`, or a version, which is fetched with
-    its UMRF. Raise RequestRefused if the server knows none of these."""
+    """Parse an argument of the command: a graph, `GRAPH@SEQ`, or a version, which is fetched with
+    its UMRF. Raise RequestRefused if the server has none of these."""
     name, at, seq = asked.rpartition("@")
     try:
         if at and seq.isdecimal():
@@ -94,7 +95,8 @@ def _place(server: Server, asked: str) -> _Moment | _Version:
 
 
 def _fetched(server: Server, place: str | _Moment | _Version) -> tuple[str, bytes]:
-    """Return the name and the text of one side of a comparison."""
+    """Return the name and the UMRF text of one side of a comparison: a path of a file, a graph or a
+    version."""
     match place:
         case str():
             return place, file_text(Path(place))
@@ -107,7 +109,8 @@ def _fetched(server: Server, place: str | _Moment | _Version) -> tuple[str, byte
 
 
 def _of_texts(before: tuple[str, bytes], after: tuple[str, bytes]) -> Difference:
-    """Compare two files. Actions are matched by name, since files have no other identity."""
+    """Compare two UMRF files, each given as name and text. Actions are matched by name, since files
+    have no other identity."""
     return difference((0, by_name(_graph(*before))), (0, by_name(_graph(*after))))
 
 

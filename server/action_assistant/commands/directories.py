@@ -26,49 +26,51 @@ class Owner(NamedTuple):
 
 
 class Directory(Protocol):
-    """One open folder. Every method raises OSError, also for a name that is not exactly one
+    """One open folder. All methods that take a `name` raise OSError if it is not exactly one
     component of a path."""
 
     def names(self) -> list[str]:
-        """Return the names of all entries."""
+        """Return the names of all entries of the folder."""
 
     def status(self, name: str) -> os.stat_result:
-        """Return the status of an entry, of a link that of the link itself."""
+        """Return the status of the entry `name`; of a link the status of the link itself."""
 
     def below(self, name: str, *, make: bool) -> "Directory":
-        """Open a folder inside this one; with `make` create it if it is missing. The caller closes
-        it."""
+        """Open the folder `name` inside this one; with `make` create it if it is missing. The
+        caller closes it."""
 
     def read(self, name: str) -> tuple[bytes, int]:
-        """Return the content of a file, and its mode."""
+        """Return the content and the mode (permissions) of the file `name`."""
 
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write a new file durably, all of it or nothing. If it cannot be given to `owner`, the
-        rights of the group are removed instead."""
+        """Write a new file durably, all of it or nothing. `mode`: its permissions, None for the
+        default; `owner`: None for this user. If this user may not give it to `owner`, the rights of
+        the group are removed instead."""
 
     def complete(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write the rest of a file that has the beginning of this content, to the disk."""
+        """Append to the file `name`, which has the beginning of this content, the part that it
+        lacks, durably; set mode and owner as `write_new` does."""
 
     def link(self, old: str, new: str) -> None:
-        """Give a file a second, unused name, durably."""
+        """Give the file `old` a second name, `new`, which must be unused; durably."""
 
     def replace(self, new: str, name: str) -> None:
-        """Give a file the name of another, on the disk when this returns."""
+        """Rename the file `new` to `name`, replacing an existing file, durably."""
 
     def remove(self, name: str) -> None:
-        """Delete a file, on the disk when this returns."""
+        """Delete the file `name` durably."""
 
     def close(self) -> None:
         """Release the directory and its descriptor, if it holds one."""
 
 
 def opened(root: Path) -> Directory:
-    """Open an existing folder; its own path may lead through a symbolic link. Raise OSError if it
-    cannot be opened."""
+    """Open the existing folder `root`, whose own path may lead through a symbolic link. Raise
+    OSError if it cannot be opened."""
     return HeldDirectory.opened(root) if HOLDS else NamedDirectory.opened(root)
 
 
@@ -80,7 +82,7 @@ class HeldDirectory:
 
     @classmethod
     def opened(cls, root: Path) -> Self:
-        """Open the folder at a path. Raise OSError if it cannot be opened."""
+        """Open the folder at the path `root`. Raise OSError if it cannot be opened."""
         return cls(os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC))
 
     def names(self) -> list[str]:
@@ -88,11 +90,11 @@ class HeldDirectory:
             return [each.name for each in entries]
 
     def status(self, name: str) -> os.stat_result:
-        """Return the status of an entry."""
+        """Return the status of an entry, not following a link."""
         return os.stat(_component(name), dir_fd=self._at, follow_symlinks=False)
 
     def below(self, name: str, *, make: bool) -> Self:
-        """Open a subdirectory; create it first with `make`. Raise OSError for a link."""
+        """Open the subdirectory `name`; with `make` create it first. Raise OSError for a link."""
         _component(name)
         if make:
             with suppress(FileExistsError):
@@ -101,7 +103,7 @@ class HeldDirectory:
         return type(self)(os.open(name, flags, dir_fd=self._at))
 
     def read(self, name: str) -> tuple[bytes, int]:
-        """Return the content of a file."""
+        """Return the content and the mode of a regular file. Raise OSError for any other entry."""
         flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
         _refuse_special(self.status(name))  # opening a device may do something
         with os.fdopen(os.open(name, flags, dir_fd=self._at), "rb") as file:
@@ -110,7 +112,8 @@ class HeldDirectory:
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write a new file and flush it to disk. Raise FileExistsError where the name is taken."""
+        """Write a new file as the protocol says, and flush it to disk. Raise FileExistsError where
+        the name is taken."""
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         at_first = 0o666 if mode is None else 0o600
         file = os.open(_component(name), flags, at_first, dir_fd=self._at)
@@ -138,7 +141,7 @@ class HeldDirectory:
                 os.fchmod(file, mode if _given(file, owner) else mode & ~stat.S_IRWXG)
 
     def link(self, old: str, new: str) -> None:
-        """Give a file a second name."""
+        """Give the file `old` a second name, `new`."""
         names = _component(old), _component(new)
         os.link(*names, src_dir_fd=self._at, dst_dir_fd=self._at, follow_symlinks=False)
         os.fsync(self._at)
@@ -150,12 +153,12 @@ class HeldDirectory:
         os.fsync(self._at)  # the steps reach the disk in their order, too
 
     def remove(self, name: str) -> None:
-        """Delete a file of this directory."""
+        """Delete the file `name` from this directory."""
         os.unlink(_component(name), dir_fd=self._at)
         os.fsync(self._at)
 
     def close(self) -> None:
-        """Close the descriptor of the directory."""
+        """Close the descriptor of this directory."""
         os.close(self._at)
 
 
@@ -167,7 +170,7 @@ class NamedDirectory:
 
     @classmethod
     def opened(cls, root: Path) -> Self:
-        """Return the folder at a path. Raise OSError if it cannot be listed."""
+        """Return the folder at the path `root`. Raise OSError if it cannot be listed."""
         os.scandir(root).close()
         return cls(root)
 
@@ -175,11 +178,11 @@ class NamedDirectory:
         return [path.name for path in self._path.iterdir()]
 
     def status(self, name: str) -> os.stat_result:
-        """Return the status of an entry."""
+        """Return the status of an entry, not following a link."""
         return (self._path / _component(name)).lstat()
 
     def below(self, name: str, *, make: bool) -> Self:
-        """Open a subdirectory; create it first with `make`. Raise OSError for a link."""
+        """Open the subdirectory `name`; with `make` create it first. Raise OSError for a link."""
         path = self._path / _component(name)
         if make:
             path.mkdir(exist_ok=True)
@@ -190,7 +193,7 @@ class NamedDirectory:
         return type(self)(path)
 
     def read(self, name: str) -> tuple[bytes, int]:
-        """Return the content of a file."""
+        """Return the content and the mode of a regular file. Raise OSError for any other entry."""
         path = self._path / _component(name)
         _refuse_link(path)
         if path.exists() and not path.is_file():
@@ -201,7 +204,8 @@ class NamedDirectory:
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write a new file durably. `owner` is ignored, since this system has no such owners."""
+        """Write a new file as the protocol says. `owner` is ignored, since this system has no such
+        owners."""
         path = self._path / _component(name)
         try:
             with path.open("xb") as out:
@@ -225,7 +229,7 @@ class NamedDirectory:
             _write_rest(half, content)
 
     def link(self, old: str, new: str) -> None:
-        """Give a file a second name."""
+        """Give the file `old` a second name, `new`."""
         os.link(self._path / _component(old), self._path / _component(new))
 
     def replace(self, new: str, name: str) -> None:
@@ -234,11 +238,11 @@ class NamedDirectory:
         (self._path / _component(new)).replace(self._path / name)
 
     def remove(self, name: str) -> None:
-        """Delete a file of this directory."""
+        """Delete the file `name` from this directory."""
         (self._path / _component(name)).unlink()
 
     def close(self) -> None:
-        """Do nothing: this kind holds no folder open."""
+        """Do nothing: this kind has no open descriptor."""
 
 
 _NO_FILE: Final = "it is no file"
@@ -274,7 +278,8 @@ def _component(name: str) -> str:
 
 
 def _given(file: int, owner: Owner | None) -> bool:
-    """Give a file to its owner; False where this user may not."""
+    """Make `owner` the owner of an open file (a descriptor); return False if this user may not do
+    so."""
     found = os.fstat(file)
     if owner is None or owner == (found.st_uid, found.st_gid):
         return True
@@ -286,8 +291,8 @@ def _given(file: int, owner: Owner | None) -> bool:
 
 
 def _write_rest(half: BinaryIO, content: bytes) -> None:
-    """Append to a file the part of `content` that it lacks. Raise OSError if the file holds
-    anything else or cannot be written."""
+    """Append to the open file `half` the part of `content` that it lacks, and flush it. Raise
+    OSError if the file has anything but the beginning of `content` or cannot be written."""
     _refuse_special(os.fstat(half.fileno()))
     there = half.read(len(content) + 1)
     if not content.startswith(there):

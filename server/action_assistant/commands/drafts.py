@@ -105,7 +105,8 @@ def _merge(options: argparse.Namespace) -> int:
 
 
 def _merged(server: Server, below: str, preview: "MergePreview", asked: dict[str, Any]) -> int:
-    """Merge what the preview showed, and return the exit code."""
+    """Merge as the preview showed, print the result and return the exit code. `below`: the path of
+    the draft in the API; `asked`: the request of the preview."""
     from action_assistant.editor.history.drafts.draft_merges import MergedDraft
 
     moments = {"seq": preview.seq, "draft_seq": preview.draft_seq}
@@ -115,7 +116,8 @@ def _merged(server: Server, below: str, preview: "MergePreview", asked: dict[str
 
 
 def _choices(words: Iterable[str]) -> dict[str, str]:
-    """Return the side that was chosen for each place. Raise CannotStart for a malformed argument."""
+    """Parse arguments such as `PLACE=draft`; return the chosen side by place of the conflict. Raise
+    CannotStart for a malformed argument."""
     found = {}
     for each in words:
         place, equals, side = each.rpartition("=")

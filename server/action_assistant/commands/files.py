@@ -27,10 +27,8 @@ _COMMANDS: Final = frozenset({"stop", "pause", "resume"})
 
 
 class CheckVerdict(msgspec.Struct, frozen=True):
-    """The problems that `check` found in one file, with their places.
-
-    `notes` say what reading the file translated or left out.
-    """
+    """The problems that `check` found in one file, with their places. `notes`: remarks on what was
+    translated or dropped when the file was read."""
 
     file: str
     dialect: str | None
@@ -112,7 +110,7 @@ def _command(text: str) -> tuple[float, str, str | None]:
 
 
 def file_text(path: Path) -> bytes:
-    """Return the content of a file. Raise CannotStart if it cannot be read."""
+    """Return the content of the file `path`. Raise CannotStart if it cannot be read."""
     try:
         return path.read_bytes()
     except OSError as error:
@@ -120,13 +118,13 @@ def file_text(path: Path) -> bytes:
 
 
 def refusal(name: Path | str, error: codec.Unreadable) -> str:
-    """Return the reason why a text cannot be read, with its place."""
+    """Return the line that says why the file `name` cannot be read, with the place of the fault."""
     within = f" at {error.path}" if error.path else ""
     return f"{name}:{error.line}:{error.column}: {error.message}{within}"
 
 
 def _at(where: Where) -> str:
-    """Return a place in words: line and column, then the JSON pointer."""
+    """Return a place in words: line and column, then the JSON pointer if it is not the whole text."""
     return f"line {where.line}, column {where.column}{': ' if where.path else ''}{where.path}"
 
 
@@ -184,9 +182,9 @@ def _as_sub_graph(problem: Problem) -> Problem:
 
 
 def _given(paths: Sequence[Path]) -> dict[str, Graph]:
-    """Return the graphs of several files by graph name, since one may be a sub-graph of another.
-    Files that cannot be read as a graph are skipped; of several graphs of one name, the first
-    counts. Raise CannotStart if a file cannot be opened."""
+    """Return the graphs in the files `paths` by graph name, since one may be a sub-graph of
+    another. Files that cannot be read as a graph are skipped; of several graphs of one name, the
+    first counts. Raise CannotStart if a file cannot be opened."""
     found: dict[str, Graph] = {}
     for path in paths:
         try:
@@ -237,10 +235,8 @@ def _convert(options: argparse.Namespace) -> int:
 
 def _with_examples(path: Path, graph: Graph) -> Graph:
     """Return the graph in which each input, for which the checks offer to take its declared example
-    as value, has this value. Print the names of these inputs to stderr.
-
-    `path`: the file of the graph, printed before each name.
-    """
+    as value, has this value. Print the names of the inputs to stderr. `path`: the file of the
+    graph, printed before each name."""
     offered = [problem for problem in checks.check(graph) if problem.fix == "take-example"]
     for problem in offered:
         name = problem.where.path.partition("/input_parameters/")[2].replace("/", "::")
@@ -309,7 +305,7 @@ def _print_unknown(
     options: argparse.Namespace, reading: codec.Reading, actions: Mapping[str, Signature] | None
 ) -> None:
     """Print which actions the engine lacks, or has with other parameters, since its refusal does
-    not name them."""
+    not name them. `reading`: the file as read; `actions`: those of the engine, None if unknown."""
     for problem in checks.check_reading(reading, actions, graphs=_library(options.graphs)):
         if problem.code in {"unknown-action", "signature"}:
             print(f"{options.file}: {problem.message} ({_at(problem.where)})", file=sys.stderr)

@@ -34,7 +34,7 @@ class GivenGraph(NamedTuple):
 
 
 def given_graph(path: Path) -> GivenGraph:
-    """Read the graph of a file. Raise CannotStart if an engine would refuse the file."""
+    """Read the graph of the file `path`. Raise CannotStart if an engine would refuse the file."""
     try:
         reading = codec.read(file_text(path))
     except codec.Unreadable as error:
@@ -47,8 +47,8 @@ def given_graph(path: Path) -> GivenGraph:
 
 
 def given_graphs(paths: Iterable[Path]) -> dict[str, GivenGraph]:
-    """Return the graphs of files and folders, by name; the first of equal names counts. In a
-    folder, a file that is no graph is skipped with a message."""
+    """Return the graphs in files and folders (`paths`), by name; the first of equal names counts.
+    In a folder, a file that is no graph is skipped with a message."""
     found: dict[str, GivenGraph] = {}
     for path in paths:
         for given in _below(path) if path.is_dir() else [given_graph(path)]:
@@ -101,7 +101,8 @@ COMMANDS: Final = {"flatten": _add_flatten}
 
 
 def _flatten(options: argparse.Namespace) -> int:
-    """Run the command; return 1 if no single graph does the same as the hierarchy."""
+    """Run the command with these options; return the exit code, 1 if no single graph does the same
+    as the hierarchy."""
     top = given_graph(options.file)
     given = given_graphs(options.graphs)
     known = actions_below(options.actions).keys() if options.actions else frozenset[str]()
@@ -129,7 +130,8 @@ def _flatten(options: argparse.Namespace) -> int:
 
 
 def _told(reason: FlatteningReason, top: GivenGraph, given: Mapping[str, GivenGraph]) -> str:
-    """Return a line with a reason and the place of its action in the file of its graph."""
+    """Return a line with a reason and the place of its action in the file of its graph. `top`: the
+    outer graph; `given`: the others by name."""
     if not reason.at:
         return f"{top.path}: {reason.message} ({reason.code})"
     last = reason.at[-1]

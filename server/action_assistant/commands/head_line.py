@@ -31,7 +31,8 @@ _NEW_KEY: Final = "openssl genpkey -algorithm ed25519 -out"
 
 
 class HeadLine(msgspec.Struct, frozen=True):
-    """A line that was read. `key`: the public key of its signature in base64, "" where it has none."""
+    """A parsed line of `verify --head`. `heads`: the end of each log; `key`: the public key of its
+    signature in base64, "" where it has none."""
 
     time: str
     heads: dict[Branch, LogHead]
@@ -39,7 +40,8 @@ class HeadLine(msgspec.Struct, frozen=True):
 
 
 def written(time: str, heads: Mapping[Branch, LogHead], key: Ed25519PrivateKey | None) -> str:
-    """Return the line, signed if there is a key."""
+    """Return the line of `verify --head` for the ends of the logs at this time, signed if there is
+    a key."""
     named = (f"{branch} {head.position} {head.digest}" for branch, head in sorted(heads.items()))
     line = " ".join((_MARK, "1", time, *named))
     if key is None:
@@ -50,12 +52,9 @@ def written(time: str, heads: Mapping[Branch, LogHead], key: Ed25519PrivateKey |
 
 def read(text: str, key: Ed25519PublicKey | None) -> HeadLine:
     """Parse a line of `verify --head`, and verify its signature, if it has one, with the public key
-    that stands in the line.
-
-    With `key`, the line must be signed by exactly this key. Raises CannotStart if the text is no
-    such line, if its signature does not match, or if `key` is given and the line is unsigned or
-    signed by another key.
-    """
+    in the line. With `key`, the line must be signed by exactly this key. Raise CannotStart if the
+    text is no such line, if its signature does not match, or if `key` is not None and the line is
+    unsigned or signed by another key."""
     found = _LINE.fullmatch(text.strip())
     if found is None:
         raise CannotStart("That is no line of `verify --head`: a part of it may be missing.")
@@ -77,8 +76,8 @@ def read(text: str, key: Ed25519PublicKey | None) -> HeadLine:
 
 
 def signing_key(path: Path, data: Path) -> Ed25519PrivateKey:
-    """Read the owner's private ed25519 key, a PEM file outside of the data folder. Raise
-    CannotStart if the file is not such a key."""
+    """Read the owner's private ed25519 key from the PEM file `path`, which must be outside of the
+    data folder. Raise CannotStart if the file is not such a key."""
     text = _key_file(path, data)
     try:
         key = serialization.load_pem_private_key(text, password=None)
@@ -90,8 +89,8 @@ def signing_key(path: Path, data: Path) -> Ed25519PrivateKey:
 
 
 def proving_key(path: Path, data: Path) -> Ed25519PublicKey:
-    """Read the public ed25519 key from a PEM file with a public or private key. Raise CannotStart
-    if the file is not such a key."""
+    """Read the public ed25519 key from the PEM file `path`, with a public or private key, outside
+    of the data folder. Raise CannotStart if the file is not such a key."""
     text = _key_file(path, data)
     if b"PRIVATE KEY" in text:
         return signing_key(path, data).public_key()
@@ -105,8 +104,8 @@ def proving_key(path: Path, data: Path) -> Ed25519PublicKey:
 
 
 def _key_file(path: Path, data: Path) -> bytes:
-    """Read a key file. Raise CannotStart if it lies in the data folder, where whoever alters the
-    logs could also sign them, or cannot be read."""
+    """Read the key file `path`. Raise CannotStart if it cannot be read or lies in the data folder,
+    where any person who alters the logs could also sign them."""
     if path.resolve().is_relative_to(data.resolve()):
         raise CannotStart(
             f"{path} is in the data folder: whoever can alter the logs could sign anew. Keep the key "

@@ -125,17 +125,14 @@ def _verify(options: argparse.Namespace) -> int:
 
 
 def _say(sentence: str, is_aside: bool) -> None:
-    """Print a sentence; with `is_aside` to stderr, since stdout then holds a line that programs
-    keep."""
+    """Print a sentence; with `is_aside` to stderr, since stdout then has only a line for programs."""
     print(sentence, file=sys.stderr if is_aside else sys.stdout)
 
 
 def _lines(given: str | None) -> list[str]:
-    """Return the lines of `verify --head` that the option --against names.
-
-    `given` is one such line itself, or the path of a file of such lines; None stands for an absent
-    option and gives no lines. Raises CannotStart if the file cannot be read or has no line.
-    """
+    """Return the lines of `verify --head` that the option --against names. `given` is one such line
+    itself, or the path of a file of such lines; None stands for an absent option and gives no
+    lines. Raise CannotStart if the file cannot be read or has no line."""
     if given is None:
         return []
     if "action-assistant-heads" in given:
@@ -152,8 +149,8 @@ def _lines(given: str | None) -> list[str]:
 
 
 def _strange(journal: "_KnownJournal") -> list[str]:
-    """Return sentences about objects in the schema of a journal that are not ours. A database on a
-    server is not checked, since it may have other users."""
+    """Return sentences about objects in the schema of a journal that are not this program's. A
+    database on a server is not checked, since it may have other users."""
     if not journal.url.startswith("sqlite:"):
         return []
     path = Path(make_url(journal.url).database or "")
@@ -164,9 +161,9 @@ def _strange(journal: "_KnownJournal") -> list[str]:
 
 
 async def _head(journal: Journal, branch: Branch, position: int, data: Path) -> heads.LogHead:
-    """Return the head of the log of a branch after the event at `position`: a digest of the heads
-    of all its streams then, also of archived ones. Raise OSError or Refused if an archive cannot be
-    read."""
+    """Return the end of the log of a branch after the event at `position`, with a digest over the
+    ends of all its streams then, also of archived ones. `data`: the data folder. Raise OSError or
+    Refused if an archive cannot be read."""
     from action_assistant.runner.archives import archive_file
 
     folder = settings.keep(data).folder
@@ -183,7 +180,8 @@ async def _head(journal: Journal, branch: Branch, position: int, data: Path) -> 
 async def _is_as_then(
     journal: Journal, branch: Branch, line: "head_line.HeadLine", events: int, data: Path
 ) -> bool:
-    """Return whether the log still begins as a line of `verify --head` says, and print the result."""
+    """Return whether the log of a branch, which has `events` events now, still begins as a line of
+    `verify --head` says, and print the result. `data`: the data folder."""
     then = line.heads.get(branch)
     if then is None:
         print(f"{branch}: the line of {line.time} does not speak of it")
@@ -227,7 +225,7 @@ class _KnownJournal(NamedTuple):
 
 
 def _journals(options: argparse.Namespace) -> list[_KnownJournal]:
-    """Return every journal of the data folder. Raise CannotStart if there is none."""
+    """Return all journals of the data folder. Raise CannotStart if there are none."""
     from action_assistant.editor.log import database_location
     from action_assistant.editor.log.graph_events import fold as editor_fold
     from action_assistant.runner.projection import fold as runner_fold
@@ -250,8 +248,9 @@ def _for_each(
     journals: Sequence[_KnownJournal],
     handler: Callable[[Branch, Journal], Awaitable[bool]],
 ) -> int:
-    """Call `handler` for every journal; return 0 if each call returned True, else 1. Raise
-    CannotStart if a journal cannot be opened."""
+    """Open each journal in turn and call `handler` with it; return the exit code: 0 if each call
+    returned True, else 1. `data`: the data folder. Raise CannotStart if a journal cannot be opened.
+    """
 
     async def one(branch: Branch, url: str, fold: Fold) -> bool:
         journal = await Journal.open(url, branch=branch, fold=fold, copies=data / FOLDER)

@@ -23,7 +23,7 @@ def _add_serve(both: argparse.ArgumentParser) -> None:
 
 
 def add_serve_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options of `serve`, which a service takes as well."""
+    """Add the options of `serve` to a parser; `service install` has them as well."""
     _address(parser, port=settings.port())
     _database(parser, switch=True)
     _sharing(parser)
@@ -195,8 +195,8 @@ def _host(options: argparse.Namespace) -> str:
 def _identity(
     chosen: settings.EditorSettings | settings.RunnerSettings, page_port: int
 ) -> "TlsIdentity | None":
-    """Return the certificate that a process serves, for all addresses at which it can be reached;
-    None without --tls. `page_port` is the port at which people open the page."""
+    """Return the certificate that a process with these settings serves, for all addresses at which
+    it can be reached; None without --tls. `page_port` is the port at which people open the page."""
     if not chosen.tls:
         return None
     from action_assistant.web.network.addresses import addresses_of

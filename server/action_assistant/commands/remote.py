@@ -74,7 +74,8 @@ def _add_run(run: argparse.ArgumentParser) -> None:
 
 
 def _robots(text: str) -> dict[str, str]:
-    """Read `Scout=David,Carrier=Carol`. Raise ArgumentTypeError if it is anything else."""
+    """Parse `Scout=David,Carrier=Carol` into robots by actor. Raise ArgumentTypeError for another
+    text."""
     pairs = [each.rpartition("=") for each in text.split(",")]
     robots = {actor: robot for actor, _, robot in pairs}
     if len(robots) < len(pairs) or any(not equals or not robot for _, equals, robot in pairs):
@@ -159,7 +160,7 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _watch(server: Server, run: str) -> int:
-    """Print each change until the run has ended."""
+    """Print each change of a run until it has ended, and return the exit code for its end."""
     from action_assistant.runner.runs.views import RunShown
 
     seen: dict[str, str] = {}
@@ -203,8 +204,9 @@ def verdict(run: "RunShown") -> tuple[int, str]:
 
 
 def insisting(server: Server, method: str, path: str) -> Any:
-    """Send a request about a Stop, and repeat it while the connection fails. Raise RequestRefused
-    if it is refused, CannotStart after some seconds without an answer."""
+    """Send a request about a Stop to the runner and return the answer's JSON; repeat it while the
+    connection fails. Raise RequestRefused if it is refused, CannotStart after some seconds without
+    an answer."""
     deadline = time.monotonic() + _INSIST_S
     while True:
         try:
@@ -251,7 +253,8 @@ def _stop(options: argparse.Namespace) -> int:
 
 
 def _is_run(server: Server, run: str) -> bool:
-    """Return False if this is the id of a group. Raise CannotStart if the server does not answer."""
+    """Return whether an id is that of a run; False if it is the id of a group. Raise CannotStart if
+    the server does not answer."""
     try:
         insisting(server, "GET", f"/api/runs/{run}")
     except RequestRefused:
@@ -260,8 +263,9 @@ def _is_run(server: Server, run: str) -> bool:
 
 
 def stopped_as(run: Run, *, was_over: bool) -> str:
-    """Return in words how a run is at rest that somebody wanted to stop: only a run that its robot has
-    proven to be stopped is called that. `was_over`: it had ended before."""
+    """Return in words how a run that a person wanted to stop came to rest: only a run that its
+    robot has proven to be stopped is called stopped. `run`: as JSON; `was_over`: it had ended
+    before."""
     named, state = f"run {run['number']} of {run['graph_name']}", run["state"]
     if seen := run["at_rest"]:
         who = seen["by"]["name"] if seen["by"] else "the runner"
@@ -282,7 +286,8 @@ def _unconfirmed(run: Run) -> str:
 
 
 def _unproven(stopped: dict[str, list[str]], robots: list[dict[str, Any]]) -> list[str]:
-    """Return one sentence for each graph started by others that is not proven to be at rest."""
+    """Return one sentence for each graph that another program has started and that is not proven to
+    be at rest. `stopped`: the graphs by robot; `robots`: the robots as JSON."""
     known = {robot["name"]: robot for robot in robots}
     found: list[str] = []
     for name, graphs in stopped.items():

@@ -116,8 +116,8 @@ def _line(robot: "Robot") -> str:
 
 
 def _profile(path: Path) -> dict[str, Any]:
-    """Read a robot's profile from a JSON file. Raise CannotStart if it cannot be read or is no JSON
-    object."""
+    """Read a robot's profile from the JSON file `path`. Raise CannotStart if it cannot be read or
+    is no JSON object."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
     except OSError as error:

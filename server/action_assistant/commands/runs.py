@@ -82,7 +82,8 @@ COMMANDS: Final = {"runs": _add_runs}
 
 
 def _go_on(options: argparse.Namespace) -> int:
-    """Let a held run go on, as it is held now."""
+    """Run the command that lets a held run go on, and return the exit code. Raise RequestRefused if
+    it is not held."""
     path = f"/api/runs/{options.run}"
     with running(options) as server:
         held = server.runner("GET", path).json()["held"]
@@ -110,7 +111,8 @@ def _runs(options: argparse.Namespace) -> int:
 
 
 def _at_rest(options: argparse.Namespace) -> int:
-    """Record a person's word that a run is at rest, where no engine can prove it."""
+    """Run the command that records a person's statement that a run is at rest, where no engine can
+    prove it; return the exit code."""
     with running(options) as server:
         path = f"/api/runs/{options.run}/at_rest"
         answer = server.runner("POST", path, json={"how": options.how})
@@ -143,8 +145,8 @@ class VerifyVerdict(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def _verify(options: argparse.Namespace) -> int:
-    """Simulate every expected run again, with its graph of then and with the present one, and print
-    the verdicts. Return 0 if all go the same course, else 1."""
+    """Run the command: simulate every expected run again, with its graph of then and with the
+    present one, and print the verdicts. Return 0 if all go the same course, else 1."""
     with running(options) as server:
         verdicts = list(_verdicts(server, options))
     if options.json:
@@ -174,8 +176,8 @@ def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVer
 
 
 def _now(server: Server, each: "Expectation", graph: str) -> VerifyVerdict:
-    """Compare an expected run with the present state of its graph; the verdict is negative if the
-    graph does not exist any more."""
+    """Compare an expected run (`each`) with the present state of its graph (an id); the verdict is
+    negative if the graph does not exist any more."""
     try:
         umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
     except RequestRefused as error:
@@ -204,7 +206,7 @@ def _verdict(each: "Expectation", umrf: bytes, against: Literal["then", "now"]) 
 
 
 def _add_since(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command `runs since`."""
+    """Add the command `runs since` to the sub-commands."""
     since = command(
         runs,
         "since",
@@ -244,8 +246,8 @@ def _since(options: argparse.Namespace) -> int:
 
 
 def _seq(server: Server, run: dict[str, Any]) -> int:
-    """Return the change number (seq) of the graph that a run was started from. Raise RequestRefused
-    if the run has no version of a graph."""
+    """Return the change number (seq) of the graph that a run (as JSON) was started from. Raise
+    RequestRefused if the run has no version of a graph."""
     if run["graph"] is None or run["version"] is None:
         raise RequestRefused("This run is of no version of a graph here.")
     version = server.editor("GET", f"/api/versions/{run['version']}").json()
@@ -254,8 +256,8 @@ def _seq(server: Server, run: dict[str, Any]) -> int:
 
 
 def _last_good(server: Server, run: dict[str, Any]) -> int:
-    """Return the change number (seq) of the graph in the last earlier run that went well. Raise
-    RequestRefused if there is no such run."""
+    """Return the change number (seq) of the graph in the last run before `run` (as JSON) that went
+    well. Raise RequestRefused if there is no such run."""
     query = {"graph": run["graph"]}
     for each in server.runner("GET", "/api/runs", params=query).json():
         went_well = each["state"] == "finished" and each["result"] in {None, "on_true"}
@@ -282,7 +284,7 @@ def _print_partings(found: "SinceWhen", difference: Difference) -> None:
 
 
 def _add_archives(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the commands of this module to `runs`."""
+    """Add the commands about archives to the sub-commands of `runs`."""
     archive = command(
         runs,
         "archive",
@@ -375,7 +377,7 @@ def _restore(options: argparse.Namespace) -> int:
 
 
 def _add_copy(runs: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
-    """Add the command `runs copy`."""
+    """Add the command `runs copy` to the sub-commands."""
     copy = runs.add_parser(
         "copy",
         help="copy runs into the schema action_assistant_runs of a Postgres database, for your own "

@@ -14,12 +14,10 @@ _API: Final = "/api/"
 
 
 class AfterProof(httpx.Auth):
-    """Adds the token to requests, once the server at an address has answered a challenge.
-
-    A stranger who listens at an address that we only suppose to be our server (`supposed`) might
-    pass the challenge on to the real one. So the answer has to name the very address that we are
-    connected to.
-    """
+    """Adds the token to requests, once the server at an address has answered a challenge. A
+    stranger who listens at an address that we only suppose to be our server (`supposed`) might pass
+    the challenge on to the real one. So the answer has to name the very address that the client is
+    connected to."""
 
     requires_response_body = True
 
@@ -29,8 +27,9 @@ class AfterProof(httpx.Auth):
         self._proven: set[str] = set()
 
     def auth_flow(self, request: httpx.Request) -> Generator[httpx.Request, httpx.Response, None]:
-        """Add the token to a request, after a challenge if the server was not proven yet. Raise
-        CannotStart if the server does not prove that it holds the token."""
+        """Add the token to a request, after a challenge if the server was not proven yet. It is a
+        generator of requests, as httpx wants it. Raise CannotStart if the server does not prove
+        that it holds the token."""
         base = str(request.url).partition(_API)[0]
         if base not in self._proven:
             challenge = secrets.token_urlsafe(32)

@@ -57,8 +57,8 @@ class ShownGraph(msgspec.Struct, frozen=True):
 
 
 def changes(before: ShownGraph, after: ShownGraph) -> list[GraphChange]:
-    """Return the differences between two states, one sentence each. A difference without a sentence
-    of its own, for example of an order, is described as a change of the graph."""
+    """Return the differences between two states of a graph, one sentence each. A difference without
+    a sentence of its own, for example of an order, is described as a change of the graph."""
     found = [
         *_of_graph(difference((0, before.graph), (0, after.graph))),
         *_of_texts("note", dict(before.graph.notes), dict(after.graph.notes)),
@@ -202,7 +202,8 @@ class Lines:
         self._as_json = as_json
 
     def change(self, seq: int, who: list[str], change: GraphChange) -> None:
-        """Print one change to stdout."""
+        """Print one change to stdout. `seq`: the number of the moment; `who`: the names of the
+        people who made it."""
         now = datetime.now().astimezone()
         if self._as_json:
             about = {"time": now.isoformat(timespec="milliseconds"), "seq": seq, "who": who}
@@ -212,7 +213,7 @@ class Lines:
         print(one_line(line), flush=True)
 
     def news(self, text: str) -> None:
-        """Print one line to stderr, since programs read stdout."""
+        """Print one line about the connection to stderr, since programs read stdout."""
         print(one_line(text), file=sys.stderr, flush=True)
 
 
@@ -237,12 +238,12 @@ class WatchedGraph:
         self._seq = 0
 
     def begin_anew(self) -> None:
-        """Drop the document, since the server has another history now."""
+        """Drop the document, since the server has another history now (an epoch)."""
         self.doc.unobserve(self._subscription)
         self._begin()
 
     def enter(self) -> None:
-        """Note that a connection begins; no change is printed until it is in sync."""
+        """Call this when a connection begins; no change is printed until it is in sync."""
         self.in_sync = False
         self._greeted = False
 
@@ -282,7 +283,7 @@ class WatchedGraph:
                     self._names[entry.client] = state.user.name
 
     def _reach(self, seq: int) -> None:
-        """Print what changed up to a sequence number, of which everything was received."""
+        """Print what has changed up to the change `seq`, once all of it was received."""
         self._seq = seq
         if not self._greeted and self._told is not None:
             self._lines.news(f"Connected again, at moment {seq}.")
@@ -336,8 +337,9 @@ class QuietSocket(HttpxWebsocket):
             self._end(error)
 
     async def recv(self) -> bytes:
-        """Return the next message, after the graph has heard it. An error is stored as the end of
-        the connection before it is raised, since the provider that calls this drops it."""
+        """Return the next message of the room, after the watched graph has processed it. An error
+        is stored as the end of the connection before it is raised, since the provider that calls
+        this drops it."""
         try:
             message: bytes = await super().recv()
             self._graph.hear(message)
@@ -360,8 +362,8 @@ def _watch(options: argparse.Namespace) -> int:
 
 
 async def _follow(options: argparse.Namespace, graph: str) -> None:
-    """Follow the room, and reconnect after each lost connection. Raise RequestRefused or
-    CannotStart where reconnecting cannot help."""
+    """Follow the room of a graph without end, and reconnect after each lost connection. Raise
+    RequestRefused or CannotStart where reconnecting cannot help."""
     lines = Lines(as_json=options.json)
     watched = WatchedGraph(lines)
     failures = 0
@@ -380,7 +382,7 @@ async def _follow(options: argparse.Namespace, graph: str) -> None:
 
 
 async def _visit(options: argparse.Namespace, graph: str, watched: WatchedGraph) -> Exception:
-    """Stay in the room until the connection ends; return the reason."""
+    """Stay in the room of a graph until the connection ends; return the error that ended it."""
     watched.enter()
     # Anew each time: while the server was away, anybody may have taken its place, and has to prove
     # itself before it is sent the token.
@@ -416,7 +418,8 @@ async def _read(response: httpx.Response) -> None:
 
 
 def _raise_if_final(why: Exception, *, again: bool) -> None:
-    """Raise a reason against which reconnecting cannot help."""
+    """Raise the reason why a connection ended if reconnecting cannot help; do nothing for others.
+    `again`: the room was entered before."""
     match why:
         case WebSocketUpgradeError() if why.response.status_code in _FINAL:
             raise RequestRefused(sentence(why.response))

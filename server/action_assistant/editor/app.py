@@ -56,8 +56,9 @@ SMALL: Final = 100_000
 async def open_services(
     settings: EditorSettings, revoked: Revocations | None = None
 ) -> AsyncIterator[EditorServices]:
-    """Open the services of the editor without its HTTP side, and close them afterwards. Raise
-    CannotStart if the database cannot be used."""
+    """Return a context with the services of the editor, without its HTTP side; they are closed at
+    its end. `revoked`: the revoked sessions and links, None to read them. Raise CannotStart if the
+    database cannot be used."""
     revoked = revoked or Revocations(settings.data)
     journal = await Journal.open(settings.database, branch="editor", fold=h.fold, at_once=True)
     try:
@@ -91,8 +92,8 @@ async def open_services(
 
 
 def create_app(settings: EditorSettings) -> ASGIApp:
-    """Return the editor as an ASGI application. Raise CannotStart if its database or data folder
-    cannot be used."""
+    """Return the editor as an ASGI application, and prepare its database. Raise CannotStart if the
+    database or the data folder cannot be used."""
     database_location.check(settings.data, settings.database, switch=settings.switch_database)
     Journal.prepare(settings.database, "editor", copies=settings.data / before_upgrade.FOLDER)
     database_location.check(settings.data, settings.database, switch=settings.switch_database)
@@ -169,8 +170,8 @@ def _routes(
 
 
 async def _greet(services: EditorServices, folder: Path) -> None:
-    """Import the graphs in `folder`, which are shipped with the program, as examples. The caller
-    does so only for a new catalogue. A file that cannot be read is logged and skipped."""
+    """Import the graphs in `folder`, which are shipped with the program, as examples. Call it only
+    for a new catalogue. A file that cannot be read is logged and skipped."""
     files = [path async for path in anyio.Path(folder).glob("*.umrf.graph.json")]
     for path in sorted(files, reverse=True):  # the last one made stands first in the list
         try:
@@ -191,12 +192,12 @@ class WatchedEditor(Watched):
         super().__init__(services.journal, lanes, (services.rooms.metrics,), {})
 
     def activity(self) -> Activity:
-        """Return how many sockets and rooms are open."""
+        """Return how many sockets and rooms of the editor are open."""
         rooms = self._rooms.open_rooms()
         return Activity(sockets=sum(len(room.members) for room in rooms), rooms=len(rooms))
 
     def families(self) -> Iterator[Family]:
-        """Yield the metrics of rooms and their sockets."""
+        """Yield the metrics of the editor's rooms and their sockets."""
         now, metrics = self.activity(), self._rooms.metrics
         yield Family("rooms", "Graphs that somebody has open.", now.rooms or 0)
         yield Family("sockets", "Sockets in rooms.", now.sockets)

@@ -31,7 +31,7 @@ from action_assistant.web.network.connection_limits import ConnectionLimits
 
 
 class EditorServices:
-    """The services, put together around a journal that is open."""
+    """The services of the editor, built around an open journal."""
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class EditorServices:
 
 
 class EditorState:
-    """Holds the services once they are open: routes are made before the journal is."""
+    """Holds the services once they are open, since routes are made before the journal is opened."""
 
     def __init__(self) -> None:
         self._services: EditorServices | None = None

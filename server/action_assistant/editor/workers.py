@@ -35,8 +35,8 @@ _NICE: Final = 5
 
 
 class EditorWorkers:
-    """The lanes of an editor. `files`: imports and simulations. `graphs`: reading of stored graphs.
-    `edits`: trials of large updates."""
+    """The lanes of an editor: queues of jobs with worker processes of their own. `files`: imports
+    and simulations. `graphs`: reading of stored graphs. `edits`: trials of large updates."""
 
     def __init__(self) -> None:
         threads = CapacityLimiter(8)
@@ -47,14 +47,14 @@ class EditorWorkers:
     @classmethod
     @asynccontextmanager
     async def opened(cls) -> "AsyncIterator[EditorWorkers]":
-        """Yield the lanes, with workers kept ready inside of the `async with`."""
+        """Return a context with the lanes, during which their worker processes are kept ready."""
         lanes = cls()
         async with kept_warm(lanes.files, lanes.graphs, lanes.edits):
             yield lanes
 
 
 def encoded(kind: type[T], answer: bytes) -> T:
-    """Return the JSON that a worker wrote for a value of the type `kind`, so that a route can send
-    it unchanged: the event loop neither decodes nor encodes it. The result has the type `kind` for
-    the type checker only."""
+    """Return `answer`, the JSON of a value of the type `kind` that a worker wrote, in a form that a
+    route can send unchanged, so that the event loop neither decodes nor encodes it. The result has
+    the type `kind` for the type checker only."""
     return cast("T", msgspec.Raw(answer))

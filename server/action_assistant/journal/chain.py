@@ -17,7 +17,8 @@ _TYPES: Final = (str, int, str, str, int, bytes, int, bytes)
 
 
 class Head(msgspec.Struct, frozen=True, gc=False):
-    """The last event of a stream: its `seq`, and the chain up to it (16 bytes)."""
+    """The end of a stream: the number (`seq`) of its last event, and the chain of hashes up to it
+    (16 bytes)."""
 
     seq: int
     chain: bytes
@@ -27,7 +28,8 @@ NOTHING: Final = Head(0, START)
 
 
 class Damage(msgspec.Struct, frozen=True):
-    """A stream is sound before `seq` and not at it. Without a stream: the file itself is damaged."""
+    """A fault of a stream: its events before `seq` are sound, that one is not. Without a stream:
+    the file itself is damaged."""
 
     stream: str
     seq: int
@@ -54,11 +56,8 @@ class StoredColumns(NamedTuple):
 
 
 def linked(before: bytes, stream: str, events: StoredColumns) -> int:
-    """Return how many of these events, counted from the first, continue the chain that ends at
-    `before`.
-
-    The result is that of `link` for each event, in half the time.
-    """
+    """Return how many events of a stream, counted from the first, continue the chain of hashes that
+    ends at `before`. The result is that of `link` for each event, in half the time."""
     told = {
         pair: _names(stream, *pair) for pair in set(zip(events.kinds, events.authors, strict=True))
     }
@@ -74,19 +73,17 @@ def linked(before: bytes, stream: str, events: StoredColumns) -> int:
 
 @lru_cache(maxsize=1024)
 def _names(*texts: str) -> bytes:
-    """Encode the texts that most links of a stream share. Damaged text must not raise here: the
-    check reports it."""
+    """Encode the texts that most links of a stream share. Damaged text must not raise an error
+    here: the check reports it."""
     # Damaged text has to be told, not to fail.
     encoded = [text.encode("utf-8", "surrogateescape") for text in texts]
     return b"".join(pack(">I", len(data)) + data for data in encoded)
 
 
 class Inspector:
-    """Checks all stored events in the order of their positions, and collects damage.
-
-    `removed`: reads from an event which stream it removes from the log, and the end of that stream;
-    None for other events.
-    """
+    """Checks all stored events in the order of their positions, and collects damage. `removed`:
+    returns which stream an event removes from the log, and the end of that stream; None for other
+    events."""
 
     def __init__(
         self, removed: Callable[[Event], tuple[str, Head] | None] = lambda _: None
@@ -101,7 +98,7 @@ class Inspector:
         self._gap: Damage | None = None  # the first
 
     def see(self, row: Sequence[Any]) -> None:
-        """Check the next event, given as its eight columns in the database."""
+        """Check the next stored event. `row`: its eight columns in the database."""
         self.seen += 1
         self._position += 1
         stream = row[0] if isinstance(row[0], str) else repr(row[0])
@@ -127,7 +124,7 @@ class Inspector:
             self._take_out(*taken)
 
     def _take_out(self, stream: str, end: Head) -> None:
-        """Note that a stream was removed from the log and ended at `end`. Its first events may
+        """Record that a stream was removed from the log and ended at `end`. Its first events may
         still be in the log."""
         here = self._heads.get(stream, NOTHING)
         if here.seq > end.seq or (here.seq == end.seq and here.chain != end.chain):
@@ -155,8 +152,8 @@ class Inspector:
         return sorted(self._damages.values(), key=lambda each: (each.stream, each.seq))
 
     def _written(self, ends: Iterable[Sequence[Any]]) -> dict[str, Head]:
-        """Return the heads of streams as the database has them. A value of the wrong type is noted
-        as damage."""
+        """Return the end of each stream as stored in the database (`ends`: rows). A value of the
+        wrong type is recorded as damage."""
         heads = {}
         for stream, seq, chain in ends:
             if (type(stream), type(seq), type(chain)) == (str, int, bytes):

@@ -55,7 +55,7 @@ class QuickCommits:
         self._slow = self._far_too_slow = 0
 
     def took(self, seconds: float) -> None:
-        """Note the duration of a commit in seconds."""
+        """Count a commit that took so many seconds."""
         if len(self._last) == _REMEMBERED:
             self._count(self._last[0][0], -1)
         self._last.append((seconds, time.monotonic()))
@@ -94,16 +94,17 @@ class CommitMetrics(Collector):
         self._last = 0.0  # seconds since 1970
 
     def submitted(self, jobs: int) -> None:
-        """Count jobs that wait for the writer."""
+        """Count `jobs` more jobs that wait for the writer."""
         self._submitted += jobs
 
     def begins(self) -> None:
-        """Note the begin of a transaction."""
+        """Record that a transaction begins now."""
         self._busy_since = time.monotonic()
 
     def over(self, jobs: int, stored: Sequence[Sequence[Event]]) -> None:
-        """Note the end of a transaction of `jobs` jobs. `stored`: the events of each job that was
-        not refused. If all were refused, nothing was written, so it says nothing of the disk."""
+        """Record the end of a transaction of `jobs` jobs. `stored`: the events of each job that was
+        not refused. If all were refused, nothing was written, so that the disk's speed is not
+        measured."""
         if stored and self._busy_since is not None:
             took = time.monotonic() - self._busy_since
             self._seconds.observe(took)
@@ -114,7 +115,7 @@ class CommitMetrics(Collector):
         self._ended(jobs)
 
     def failed(self, jobs: int, why: str) -> None:
-        """Count a transaction that failed."""
+        """Count a transaction of `jobs` jobs that failed for the reason `why`."""
         self.failing = why
         self.quick.took(self.busy_s)
         self._failures += 1
@@ -126,7 +127,7 @@ class CommitMetrics(Collector):
 
     @property
     def waiting(self) -> int:
-        """The number of submitted jobs without an outcome."""
+        """The number of submitted jobs that have no outcome yet."""
         return self._submitted - self._done
 
     @property

@@ -20,32 +20,33 @@ Before: TypeAlias = Callable[[Connection, Branch, str], object]
 
 
 def no_copy(connection: Connection, branch: Branch, revision: str) -> None:
-    """Make no copy before an upgrade: the database is a copy itself, or new."""
+    """Do nothing: make no copy before an upgrade, since the database is a copy itself, or new."""
 
 
 class WriterSession(Protocol):
-    """The writing connection. One thread at a time uses it, only inside `run`."""
+    """The connection that writes. One thread at a time uses it, only inside `run`."""
 
     connection: Connection
 
     def run(self, work: Callable[[], T]) -> T:
-        """Do work that uses this session."""
+        """Call `work`, which uses this session, in the way that the database needs, and return its
+        result."""
 
     def alive(self) -> bool:
         """Return whether the connection still existed when it was last used."""
 
     def begin(self) -> None:
-        """Begin a transaction that locks out other writers."""
+        """Begin a transaction that locks out all other writers."""
 
     def say(self, command: str) -> None:
-        """Execute a command without a result: COMMIT, SAVEPOINT …"""
+        """Execute a command of SQL without a result, such as COMMIT or SAVEPOINT."""
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
-        """Write events with their chain, and the new ends of their streams: all or nothing. A transaction
-        of its own, which is committed, if none is open."""
+        """Write events, each with its link of the hash chain, and the new ends of their streams:
+        all or nothing. If no transaction is open, this is one of its own, which is committed."""
 
     def close(self) -> None:
-        """Close the connection, whatever its state is."""
+        """Close the connection, whatever its state is; an open transaction is rolled back."""
 
 
 class Database(Protocol):
@@ -74,53 +75,54 @@ class Database(Protocol):
         """Return all exception types that the driver raises."""
 
     def open(self, branch: Branch, before: Before = no_copy) -> WriterSession:
-        """Take the lock of the only writer, migrate the tables, and connect. Call `before` if
-        tables are about to change. Raise CannotStart if the database cannot be used or another
-        process holds the lock."""
+        """Take the lock of the only writer, bring the tables of the branch to this version, and
+        connect. `before` is called if tables are about to change. Raise CannotStart if the database
+        cannot be used or another process holds the lock."""
 
     def look(self, question: Callable[[Connection], object]) -> None:
         """Call `question` with a connection to the existing database; create and change nothing.
         Raise CannotStart if the database cannot be read."""
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
-        """Run a change of the schema in one transaction. Raise CannotStart if the database cannot
-        be used."""
+        """Call `upgrade`, which changes the schema, in one transaction, and return its result.
+        Raise CannotStart if the database cannot be used."""
 
     def connect(self) -> WriterSession:
         """Connect again after a failure. The unfinished transaction of the last session has ended
         then."""
 
     def lost(self, error: Exception) -> bool:
-        """Return whether a fault is that of the database, so that nothing can be written, and not
-        of the statement."""
+        """Return whether an error is the fault of the database, so that nothing can be written, and
+        not of the statement."""
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
-        """Read, without waiting for the writer."""
+        """Call `question` with a connection that reads, and return its result; it does not wait for
+        the writer."""
 
     async def at_one_moment(self, question: Callable[[Connection], T]) -> T:
-        """Answer a question from one consistent snapshot, while others write. Nothing is changed,
-        not even the tables of an older version."""
+        """Call `question` with a connection that reads one consistent snapshot, while others write,
+        and return its result. Nothing is changed, not even the tables of an older version."""
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
-        """Return a page of stored events, unchecked and with their chain, after the position
-        `after`; and the position for the next page."""
+        """Return a page of stored events, unchecked and with their links of the hash chain, after
+        the position `after`; and the position for the next page."""
 
     def bytes_in_use(self, connection: Connection) -> dict[str, int]:
         """Return the size in bytes of the database and, if it has one, of its write-ahead log,
         under the keys `database` and `wal`. Raise OSError if a file cannot be read."""
 
     def complaints(self, connection: Connection) -> list[str]:
-        """Return the faults that the database itself finds in its files."""
+        """Return the faults that the database itself finds in its files, as sentences."""
 
     async def close(self) -> None:
-        """Close the connections that read."""
+        """Close all connections that read."""
 
     def disown(self) -> None:
         """Release the lock, so that another process may write."""
 
 
 def cause_of(error: Exception) -> str:
-    """Return the text of a fault without a full stop."""
+    """Return the text of an error of a database or disk, without a full stop."""
     cause: object = error.orig if isinstance(error, DBAPIError) else error
     if isinstance(cause, OSError) and cause.errno is not None:
         return os.strerror(cause.errno)

@@ -34,19 +34,18 @@ def database_of(url: str) -> Database:
 
 
 def migrate(url: str, branch: Branch, revision: str = "head") -> str:
-    """Upgrade the database and return its revision. Raise CannotStart if it cannot be used or
-    belongs to another process.
-
-    All of it is one transaction: killed half-way, the database is unchanged.
-    """
+    """Upgrade the database `url` of a branch to a revision, "head" for the newest, and return its
+    revision then. All of it is one transaction: if the process is killed, the database is
+    unchanged. Raise CannotStart if it cannot be used or belongs to another process."""
     database = database_of(url)
     database.look(recognize)
     return database.migrate(upgrade_to(branch, revision))
 
 
 def ask_once(url: str, question: Callable[[Connection], T]) -> T:
-    """Answer a question from one consistent snapshot of a database; create and change nothing. Call
-    it only where no event loop runs. Raise CannotStart if the database cannot be read."""
+    """Call `question` with a connection to the database `url` that reads one consistent snapshot,
+    and return its result; create and change nothing. It blocks: call it only where no event loop
+    runs. Raise CannotStart if the database cannot be read."""
     database = database_of(url)
     try:
         return asyncio.run(_asked_once(database, question))
@@ -55,8 +54,9 @@ def ask_once(url: str, question: Callable[[Connection], T]) -> T:
 
 
 def ask_from_worker(url: str, question: Callable[[Connection], T]) -> T:
-    """Answer a question in a worker process, from one consistent snapshot of the database that
-    another process writes. Raise Unavailable if it cannot be read."""
+    """Call `question`, in a worker process, with a connection to the database `url` that reads one
+    consistent snapshot while another process writes, and return its result. Raise Unavailable if it
+    cannot be read."""
     database = database_of(url)
     try:
         return asyncio.run(_asked_once(database, question))

@@ -32,7 +32,7 @@ BareEvent: TypeAlias = tuple[bytes, str | None, int | None]
 
 
 class Draft(msgspec.Struct, frozen=True, gc=False):
-    """An event before the journal has given it a place and a time."""
+    """An event that is to be stored: the journal gives it a number, a position and a time."""
 
     kind: str
     author: str
@@ -49,7 +49,7 @@ class Addition(msgspec.Struct, frozen=True):
 
 
 def bare(events: Iterable[Event], usual: str) -> list[BareEvent]:
-    """Return the body, kind and time of events; kind and time are None for events of the kind
+    """Return (body, kind, time) of each event; kind and time are None for events of the kind
     `usual`."""
     return [(e.body, *((None, None) if e.kind == usual else (e.kind, e.at))) for e in events]
 

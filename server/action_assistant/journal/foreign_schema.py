@@ -60,22 +60,23 @@ class Findings(NamedTuple):
     altered: tuple[str, ...]
 
     def sentences(self) -> list[str]:
-        """Return one sentence for each finding."""
+        """Return one sentence for each object that was found."""
         strange = [f"{each} was not made by this program" for each in self.strangers]
         return [*strange, *self.altered]
 
 
 def look(path: Path, branch: Branch) -> Findings:
-    """Compare the schema of a journal with ours, without changing it. An empty file has no
-    findings. Raise CannotStart for a database of another program, sqlite3.Error if it cannot be
-    read."""
+    """Compare the schema of the journal in the SQLite file `path` with the schema of this program,
+    without changing it. An empty file has no findings. Raise CannotStart for a database of another
+    program, sqlite3.Error if it cannot be read."""
     with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as connection:
         return _compared(connection, branch)
 
 
 def remove_strangers(path: Path, branch: Branch) -> list[str]:
-    """Drop from the copy of a journal all objects that are not ours; return them in words. Raise
-    CannotStart if one of our objects is altered, sqlite3.Error if the file cannot be read."""
+    """Drop all objects from the schema of the copy of a journal (`path`) that are not this
+    program's; return them in words. Raise CannotStart if an object of this program is altered,
+    sqlite3.Error if the file cannot be read."""
     with closing(sqlite3.connect(path, isolation_level=None)) as connection:
         found = _compared(connection, branch)
         if found.altered:
@@ -113,14 +114,14 @@ def _compared(connection: sqlite3.Connection, branch: Branch) -> Findings:
 
 
 def _may_go(found: SchemaObject, ours: Iterable[SchemaObject]) -> bool:
-    """Return whether a foreign object can be dropped by its name: if it is a trigger, or no object
-    of ours has the same name."""
+    """Return whether an object of another program can be dropped by its name: it is a trigger, or
+    no object of this program (`ours`) has the same name."""
     return found.kind == "trigger" or found.name not in {each.name for each in ours}
 
 
 def _revision(connection: sqlite3.Connection, branch: Branch) -> str | None:
-    """Return the schema revision that a journal states; the newest one if it states none; None if
-    this version of the program does not know the revision."""
+    """Return the schema revision that the journal of a branch states; the newest one if it states
+    none; None if this version of the program does not know the revision."""
     found: set[object] = set()
     # A view of this name could go on for ever.
     kind = connection.execute("SELECT type FROM sqlite_master WHERE name = ?", [VERSIONS.name])
@@ -134,7 +135,7 @@ def _revision(connection: sqlite3.Connection, branch: Branch) -> str | None:
 
 @cache
 def _shapes_of(branch: Branch, revision: str) -> dict[SchemaObject, _Shape]:
-    """Return the objects of an empty journal of this revision."""
+    """Return the objects in the schema of an empty journal of a branch at this revision."""
     engine = create_engine("sqlite://", poolclass=NullPool, isolation_level="AUTOCOMMIT")
     with engine.connect() as connection:
         upgrade_to(branch, revision)(connection)

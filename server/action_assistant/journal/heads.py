@@ -25,7 +25,8 @@ ReadKept = Callable[[str], Iterable[Event]]
 
 
 class LogHead(msgspec.Struct, frozen=True):
-    """The end of a log: its last position, and the digest of all heads in hex."""
+    """The end of a log: the position of its last event, and a digest over the ends of all its
+    streams, in hex."""
 
     position: int
     digest: str
@@ -34,18 +35,18 @@ class LogHead(msgspec.Struct, frozen=True):
 async def head_at(
     journal: JournalReader, branch: Branch, position: int, read_kept: ReadKept
 ) -> LogHead:
-    """Return the head of the log of a branch after the event at `position`: a digest of the heads
-    of all its streams then. Streams that were archived since are read by `read_kept`. Raise OSError
-    or Refused if an archive cannot be read."""
+    """Return the end of the log of a branch after the event at `position`, with a digest over the
+    ends of all its streams then. `read_kept`: reads the events of streams that were archived since.
+    Raise OSError or Refused if an archive cannot be read."""
     return LogHead(
         position, digest_of(branch, position, await heads_at(journal, position, read_kept))
     )
 
 
 async def heads_at(journal: JournalReader, position: int, read_kept: ReadKept) -> dict[str, Head]:
-    """Return the head of each stream as of the event at `position`. Streams that were removed since
-    are read by `read_kept`. Raise OSError or Refused if one cannot be read, Unavailable if the
-    journal cannot."""
+    """Return the end (number and hash) of each stream as of the event at `position`. `read_kept`:
+    reads the events of streams that were removed since. Raise OSError or Refused if one cannot be
+    read, Unavailable if the journal cannot."""
     last = (
         select(_event.stream, func.max(_event.seq).label("seq"))
         .where(_event.position <= position)
@@ -68,17 +69,15 @@ async def heads_at(journal: JournalReader, position: int, read_kept: ReadKept) -
 
 
 def digest_of(branch: Branch, position: int, heads: dict[str, Head]) -> str:
-    """Return the SHA-256 of all heads, in hex."""
+    """Return the SHA-256, in hex, over a branch, a position and the ends of all streams (`heads`)."""
     parts = sorted((stream, head.seq, head.chain) for stream, head in heads.items())
     return hashlib.sha256(msgspec.msgpack.encode((branch, position, parts))).hexdigest()
 
 
 def _end(events: Iterable[Event], position: int) -> Head:
-    """Return the head of one stream as it was at `position` of the log.
-
-    `events`: all events of the stream, oldest first. Events after `position` are ignored; if there
-    are no others, the head is `NOTHING`.
-    """
+    """Return the end (number and hash) of one stream as it was at `position` of the log. `events`:
+    all events of the stream, oldest first. Events after `position` are ignored; if there are no
+    others, the result is `NOTHING`."""
     head = NOTHING
     for event in events:
         if event.position > position:

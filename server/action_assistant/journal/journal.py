@@ -54,7 +54,8 @@ _head, _snapshot = editor_head.c, editor_snapshot.c
 
 
 def _before(copies: Path | None) -> Before:
-    """Keep a copy in that folder before tables change."""
+    """Return the function that copies the journal into the folder `copies` before tables change;
+    for None one that makes no copy."""
     return no_copy if copies is None else partial(keep_copy, copies)
 
 
@@ -104,7 +105,8 @@ class Follower:
 
 
 class Journal(JournalReader):
-    """The log of one process, the only writer of its database; readers never wait for writes."""
+    """The log of one process, which is the only writer of its database; readers never wait for
+    writes."""
 
     def __init__(
         self,
@@ -128,7 +130,8 @@ class Journal(JournalReader):
 
     @staticmethod
     def prepare(url: str, branch: Branch, *, copies: Path | None = None) -> None:
-        """Raise CannotStart if `open` would: to be called before a server is begun."""
+        """Open the journal of a branch, bring its tables to this version, and close it again, so
+        that errors appear before a server begins. Blocks. Raise CannotStart as `open` does."""
         database = database_of(url)
         try:
             database.open(branch, _before(copies)).close()
@@ -145,13 +148,12 @@ class Journal(JournalReader):
         copies: Path | None = None,
         at_once: bool = False,
     ) -> "Journal":
-        """Open a journal, and bring its tables to this version.
-
-        `url`: sqlite:///PATH or postgresql://… `copies`: the folder for a copy before an upgrade;
-        None makes no copy. `at_once`: the event loop may wait for a local disk while that is quick;
-        not for a process that must always answer. Raise CannotStart if the database is foreign,
-        newer, in use, not reached, not writable, or does not store commits durably.
-        """
+        """Open the journal of a branch, and bring its tables to this version. `url`: sqlite:///PATH
+        or postgresql://… `fold`: turns events into statements for the tables. `copies`: the folder
+        for a copy before an upgrade; None makes no copy. `at_once`: the event loop may wait for a
+        local disk while that is quick; not for a process that must always answer. Raise CannotStart
+        if the database is another program's, newer, in use, not reached, not writable, or does not
+        store commits durably."""
         database = database_of(url)
         return await cls.on(database, branch=branch, fold=fold, copies=copies, at_once=at_once)
 
@@ -165,8 +167,8 @@ class Journal(JournalReader):
         copies: Path | None = None,
         at_once: bool = False,
     ) -> "Journal":
-        """Open a journal in a database. Raise CannotStart if the database cannot be used or another
-        process holds it."""
+        """Open the journal of a branch in a database; the other parameters are those of `open`.
+        Raise CannotStart if the database cannot be used or another process holds it."""
         try:
             session = await asyncio.to_thread(database.open, branch, _before(copies))
         except BaseException:
@@ -178,13 +180,15 @@ class Journal(JournalReader):
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Append events; return the newest seq after COMMIT. Raise Conflict if the stream has
-        another end than `expected`, Unavailable if the journal cannot be written."""
+        """Append events to a stream, wait for the COMMIT, and return the number of the last one.
+        Raise Conflict if the stream has another end than `expected` (None: any), Unavailable if the
+        journal cannot be written."""
         (newest,) = await self.append_all([Addition(stream, tuple(drafts), expected)])
         return newest
 
     async def append_all(self, additions: Sequence[Addition]) -> list[int]:
-        """Add events to several streams at once, all or none; the newest seq of each."""
+        """Append events to several streams in one transaction, all or none; wait for the COMMIT,
+        and return the newest seq of each stream. The errors are those of `append`."""
         return await self._write(
             lambda transaction: [transaction.add(addition) for addition in additions]
         )
@@ -192,17 +196,15 @@ class Journal(JournalReader):
     def append_then(
         self, addition: Addition, done: Callable[[int | None, BaseException | None], None]
     ) -> None:
-        """Append without waiting.
-
-        `done` is called on the loop after COMMIT, with the newest seq or with the exception that
-        `append` would raise. It must not raise. Raise Unavailable if the journal is closed.
-        """
+        """Append events to one stream without waiting. `done` is called on the loop after COMMIT,
+        with the newest seq or with the exception that `append` would raise. It must not raise.
+        Raise Unavailable if the journal is closed."""
         is_brief = sum([len(draft.body) for draft in addition.drafts]) <= _BRIEF
         self._queue(Job(lambda transaction: transaction.add(addition), done, is_brief=is_brief))
 
     def follow(self) -> AbstractAsyncContextManager[AsyncIterator[Event]]:
-        """Yield the events that are committed from now on, in order. Memory is bounded: a slow
-        reader reads the log later."""
+        """Return a context with an iterator over the events that are committed from now on, in
+        order. Memory is bounded: a slow reader reads the log later."""
         return self._following()
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
@@ -231,11 +233,11 @@ class Journal(JournalReader):
         *,
         parts: Sequence[StreamRemoved] = (),
     ) -> int:
-        """Record that a stream is kept elsewhere from now on; return the number of that event, by
-        which `delete_some` may delete the stream. `parts`: other streams that go with it, whose
-        numbers follow in their order. `also` returns another addition for the same transaction,
-        given that number. Raise Conflict if a stream has another end, Unavailable if the journal
-        cannot be written."""
+        """Record that a stream is in an archive from now on (`removed`); return the number of that
+        event, by which `delete_some` may delete the stream. `parts`: other streams that go with it,
+        whose numbers follow in their order. `also` returns another addition for the same
+        transaction, from that number. Raise Conflict if a stream has another end than stated,
+        Unavailable if the journal cannot be written."""
         streams = (removed, *parts)
         drafts = tuple(Draft(each.kind, "", msgspec.json.encode(each)) for each in streams)
 
@@ -250,8 +252,9 @@ class Journal(JournalReader):
         return await self._write(say)
 
     async def delete_some(self, stream: str, by: int) -> bool:
-        """Delete some events of a stream that was taken out; return whether any are left. Raise
-        Conflict if the removal is not recorded, Unavailable if the journal cannot be written."""
+        """Delete some events of a stream that was taken out, and its snapshots; return whether any
+        events are left. `by`: the number that `take_out` returned. Raise Conflict if the removal is
+        not recorded, Unavailable if the journal cannot be written."""
         return await self._write(
             lambda transaction: delete_some(transaction.connection, stream, by)
         )
@@ -276,11 +279,9 @@ class Journal(JournalReader):
         return await self._write(again)
 
     async def verify(self, tell: Callable[[int], None] = lambda _: None) -> list[Damage]:
-        """Return the first damage of each stream; an empty list for a sound log.
-
-        Every changed and every missing event is found. `tell` is called with the number of events
-        read so far. If the journal cannot be read, that is the last damage of the list.
-        """
+        """Return the first damage of each stream; an empty list for a sound log. Every changed and
+        every missing event is found. `tell` is called with the number of events read so far. If the
+        journal cannot be read, that is the last damage of the list."""
         inspector = Inspector(taken_out)
         after = 0
         try:
@@ -313,7 +314,7 @@ class Journal(JournalReader):
 
     @property
     def metrics(self) -> CommitMetrics:
-        """Return the metrics of the writer."""
+        """Return the metrics of the writer's commits."""
         return self._writer.metrics
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
@@ -418,7 +419,8 @@ class Journal(JournalReader):
             self._followers.discard(follower)
 
     async def _heard(self, follower: Follower, last: int) -> AsyncIterator[Event]:
-        """Yield new events from memory, or from the database if the queue overflowed."""
+        """Yield new events after the position `last` from the queue of a follower, or from the
+        database if the queue overflowed, until the journal is closed."""
         while True:
             found = await follower.next()
             if found is None:
@@ -434,8 +436,9 @@ class Journal(JournalReader):
 
 
 class JournalProbe:
-    """Tests a journal on request, once a second at most. `write` commits something on the writer's
-    thread, `read` asks beside it; `is_alive` returns whether that thread lives."""
+    """Tests whether a journal can be written and read, on request, once a second at most. `write`
+    commits something on the writer's thread, `read` asks beside it; `is_alive` returns whether that
+    thread lives."""
 
     def __init__(
         self, branch: Branch, write: OnConnection, read: OnConnection, is_alive: Callable[[], bool]
@@ -470,7 +473,7 @@ class JournalProbe:
         return parts
 
     def close(self) -> None:
-        """Cancel the tests under way."""
+        """Cancel the tests that are under way."""
         self._writing.cancel()
         self._reading.cancel()
 
@@ -483,7 +486,8 @@ class JournalProbe:
 
 
 async def _tried(way: OnConnection, question: Callable[[Connection], Any]) -> str:
-    """Return the reason why a question failed, or the text for success."""
+    """Ask a question on a connection in this `way`; return the reason why that failed, or the text
+    for success."""
     try:
         said: str | None = await way(question)
     except Unavailable as error:
@@ -492,7 +496,8 @@ async def _tried(way: OnConnection, question: Callable[[Connection], Any]) -> st
 
 
 def _leave_no_trace(connection: Connection) -> None:
-    """Write and delete a row, so that the commit has to reach the disk as that of an edit does."""
+    """Write and delete a row, as a test, so that the commit has to reach the disk as that of an
+    edit does."""
     table = editor_snapshot
     connection.execute(insert(table).values(_PROBE_ROW))
     connection.execute(delete(table).where(table.c.stream == _PROBE_ROW["stream"]))

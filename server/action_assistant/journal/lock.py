@@ -22,8 +22,9 @@ class Holder(NamedTuple):
 
 
 def own(path: Path) -> int:
-    """Lock a database for this process; return the descriptor of the lock, whose closing releases
-    it. Raise CannotStart if another process holds the lock or the folder cannot be written.
+    """Lock the database file `path` for this process; return the descriptor of the lock, whose
+    closing releases it. Raise CannotStart if another process holds the lock or the folder cannot be
+    written.
 
     Earlier versions made lock files that other users could open and hold. Such a lock is replaced
     if a process of another user (not root) holds it, since that process cannot write our files.
@@ -44,13 +45,13 @@ def own(path: Path) -> int:
 
 
 def holder(path: Path) -> Holder | None:
-    """Return the process that has locked a database; None if no process is known to hold it. Linux
-    shows it for visible processes."""
+    """Return the process that has locked the database file `path`; None if no process is known to
+    hold it. Linux shows it for visible processes."""
     return _holder(path.with_name(f"{path.name}.lock"))
 
 
 def is_program(pid: int) -> bool:
-    """Return whether a process runs this program, by its command line."""
+    """Return whether the process `pid` runs this program, by its command line."""
     try:
         words = Path(f"/proc/{pid}/cmdline").read_bytes()
     except OSError:
@@ -74,7 +75,8 @@ def _taken(lock: Path) -> int | None:
 
 
 def _taken_from_a_stranger(lock: Path, path: Path) -> int | None:
-    """Replace the lock file of another user; one of our processes at a time does so."""
+    """Replace the lock file of another user, and return the descriptor of the new lock; None if
+    another process of ours was faster."""
     guard = opener(str(lock.with_name(f"{lock.name}.new")), os.O_RDWR | os.O_CREAT)
     try:
         posix.wait_for_lock(guard)
@@ -92,8 +94,8 @@ def _is_a_strangers(holder: Holder | None, path: Path) -> bool:
 
 
 def _user_of(pid: int) -> int:
-    """Return the real user of a process, also of one that hides. Raise OSError, ValueError or
-    IndexError if it cannot be read."""
+    """Return the real user of the process `pid`, also of one that hides. Raise OSError, ValueError
+    or IndexError if it cannot be read."""
     told = Path(f"/proc/{pid}/status").read_text()
     (uid,) = [line.split()[1] for line in told.splitlines() if line.startswith("Uid:")]
     return int(uid)

@@ -30,7 +30,8 @@ _SHORT_COMMIT: Final = 8
 
 
 def revisions_of(branch: str) -> list[str]:
-    """Return every revision that this program knows, oldest first."""
+    """Return every revision of the tables of a branch (editor or runner) that this program knows,
+    oldest first."""
     names = (_OURS.match(path.name) for path in (paths.migrations() / branch).glob("*.py"))
     return sorted(
         (name[0] for name in names if name), key=lambda name: int(name.rpartition("_")[2])
@@ -40,9 +41,9 @@ def revisions_of(branch: str) -> list[str]:
 def upgrade_to(
     branch: Branch, revision: str = "head", *, before: Before = no_copy
 ) -> Callable[[Connection], str]:
-    """Return a function that brings the schema to `revision` and returns the revision it ends at.
-    It calls `before` if existing tables are about to change, and raises CannotStart for a
-    database of another process or of a newer version."""
+    """Return a function that brings the schema of a branch to `revision` and returns the revision
+    it ends at. It calls `before` if existing tables are about to change, and raises CannotStart for
+    a database of the other branch or of a newer version."""
 
     def upgrade(connection: Connection) -> str:
         name = _name_of(connection)
@@ -63,7 +64,8 @@ def upgrade_to(
 
 
 def _upgraded(connection: Connection, branch: Branch, current: set[str], revision: str) -> str:
-    """Bring a database to `revision`, and return the revision it has then."""
+    """Bring the database of a branch from the revisions `current` to `revision`, and return the
+    revision it has then."""
     newest = revisions_of(branch)[-1]
     if current == {newest} == {revision}:
         return newest
@@ -77,7 +79,8 @@ def _upgraded(connection: Connection, branch: Branch, current: set[str], revisio
 
 
 def alembic_config(connection: Connection, branch: str) -> "Config":
-    """Return Alembic's configuration with our scripts and an open connection."""
+    """Return Alembic's configuration with the scripts of this program for a branch, and an open
+    connection."""
     from alembic.config import Config
 
     folder = paths.migrations()
@@ -91,7 +94,7 @@ def alembic_config(connection: Connection, branch: str) -> "Config":
 
 
 def run_scripts(connection: Connection, branch: str, revision: str) -> str:
-    """Run Alembic's scripts up to a revision, and return it."""
+    """Run Alembic's scripts of a branch up to a revision, and return the revision then."""
     # Alembic takes longer to import than a start has otherwise to do with the database.
     from alembic import command
     from alembic.runtime.migration import MigrationContext
@@ -102,8 +105,9 @@ def run_scripts(connection: Connection, branch: str, revision: str) -> str:
 
 
 def recognize(connection: Connection) -> set[str]:
-    """Return the revisions of a database of ours; an empty set for an empty database. Change
-    nothing. Raise CannotStart for a database of another program or of a newer version."""
+    """Return the stored revisions of a database of this program; an empty set for an empty
+    database. Change nothing. Raise a subclass of CannotStart: AnothersDatabase for a database of
+    another program, NewerSchema for one of a newer version."""
     name = _name_of(connection)
     current = _current(connection)
     if _is_foreign(connection, current):
@@ -118,7 +122,8 @@ def recognize(connection: Connection) -> set[str]:
 
 
 def _newer(connection: Connection, name: str, revision: str) -> str:
-    """Return a sentence about a database of a newer version: its version, ours, and the ways out."""
+    """Return a sentence about a database of a newer version: that version, this one, and the ways
+    out."""
     writer = last_writer(connection)
     newest = revisions_of(revision.partition("_")[0])[-1]
     return (
@@ -131,14 +136,14 @@ def _newer(connection: Connection, name: str, revision: str) -> str:
 
 
 def _current(connection: Connection) -> set[str]:
-    """Return the revisions that a database has stored."""
+    """Return the revisions that are stored in a database."""
     if not inspect(connection).has_table(VERSIONS.name):
         return set()
     return set(map(str, connection.scalars(select(VERSIONS.c.version_num))))
 
 
 def _name_of(connection: Connection) -> str:
-    """Return the path of a SQLite file, or the name of a database on a server."""
+    """Return the path of the SQLite file of a connection, or the name of the database on a server."""
     if connection.dialect.name != "sqlite":
         return str(connection.engine.url.database)
     row = connection.exec_driver_sql("PRAGMA database_list").first()
@@ -150,9 +155,9 @@ def _is_foreign(connection: Connection, current: set[str]) -> bool:
     that the database has stored.
 
     That is so if the database has tables but no stored revision, a revision of another form than
-    ours, or no table `event` with our columns. In a SQLite file all tables count; on a server only
-    those that have the name of one of our tables. A SQLite file with an application id also belongs
-    to another program.
+    this program's, or no table `event` with its columns. In a SQLite file all tables count; on a
+    server only tables that have the name of one of this program's. A SQLite file with an
+    application id also belongs to another program.
     """
     there = set(inspect(connection).get_table_names()) - {VERSIONS.name}
     if connection.dialect.name == "sqlite":
@@ -182,7 +187,8 @@ class ProgramVersion(NamedTuple):
 
 
 def last_writer(connection: Connection) -> ProgramVersion | None:
-    """Return the version that wrote last; None if no version was stored."""
+    """Return the version of this program that wrote to a database last; None if no version was
+    stored."""
     if not inspect(connection).has_table(written_by.name):
         return None
     row = connection.execute(_LAST_WRITER).first()
@@ -190,7 +196,8 @@ def last_writer(connection: Connection) -> ProgramVersion | None:
 
 
 def sign(connection: Connection, revision: str) -> None:
-    """Store that this version writes from now on. Nothing is written if it was the last writer."""
+    """Store that this version, with this revision of the tables, writes from now on. Nothing is
+    written if it was the last writer."""
     if not inspect(connection).has_table(written_by.name):
         return  # brought to an earlier revision, by a test
     row = connection.execute(_LAST_WRITER).first()

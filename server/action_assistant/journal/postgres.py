@@ -91,11 +91,11 @@ class PostgresSession:
         return not self._raw.is_closed()
 
     def begin(self) -> None:
-        """Open a transaction on the server."""
+        """Open a transaction on the server, for this session."""
         self.say("BEGIN")
 
     def say(self, command: str) -> None:
-        """Execute a command without a result."""
+        """Execute a command of SQL without a result."""
         await_only(self._raw.execute(command))
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
@@ -152,7 +152,9 @@ class Postgres:
         )
 
     def open(self, branch: Branch, before: Before = no_copy) -> PostgresSession:
-        """Lock the database for this process, check that it stores commits durably, and migrate."""
+        """Lock the database for this process, check that it stores commits durably, bring the
+        tables of the branch to this version, and connect. `before` is called if tables are about to
+        change."""
         session = self.own(branch)
         try:
             self.migrate(upgrade_to(branch, before=before))
@@ -162,8 +164,8 @@ class Postgres:
         return session
 
     def own(self, branch: Branch) -> PostgresSession:
-        """Lock the database for this process, whatever tables it has, and connect. Raise
-        CannotStart if it cannot be used or another process holds the lock."""
+        """Lock the database for this process as the writer of a branch, whatever tables it has, and
+        connect. Raise CannotStart if it cannot be used or another process holds the lock."""
         mark = hashlib.sha256(f"action-assistant journal {branch}".encode()).digest()
         self._key = int.from_bytes(mark[:8], "big", signed=True)
         try:
@@ -172,12 +174,12 @@ class Postgres:
             raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
 
     def look(self, question: Callable[[Connection], object]) -> None:
-        """Do nothing: the check is made inside of the transaction that changes the tables, and no
-        other code alters them."""
+        """Do nothing, not even call `question`: the check is made inside of the transaction that
+        changes the tables, and no other code alters them."""
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
-        """Run a change of the schema in one transaction. Raise CannotStart if the database cannot
-        be used."""
+        """Call `upgrade`, which changes the schema, in one transaction, and return its result.
+        Raise CannotStart if the database cannot be used."""
 
         async def change() -> T:
             engine = create_async_engine(self._url, poolclass=NullPool)
@@ -216,7 +218,8 @@ class Postgres:
             await asyncio.sleep(0.05)
 
     def lost(self, error: Exception) -> bool:
-        """Return whether a fault is that of the server or the connection, and not of the statement."""
+        """Return whether an error is the fault of the server or the connection, and not of the
+        statement."""
         cause: Any = error.orig if isinstance(error, DBAPIError) else error
         if isinstance(error, DBAPIError) and error.connection_invalidated:
             return True
@@ -224,7 +227,7 @@ class Postgres:
         return state is None or str(state).startswith(_SERVER)
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
-        """Read, on a connection that is not the writer's."""
+        """Call `question` with a connection that is not the writer's, and return its result."""
         async with self._readers.connect() as connection:
             return await connection.run_sync(question)
 
@@ -237,7 +240,8 @@ class Postgres:
             return await connection.run_sync(question)
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
-        """Return a page of stored events with their chain, and the position for the next page."""
+        """Return a page of stored events after the position `after`, with their links of the hash
+        chain, and the position for the next page."""
         columns = editor_event.c
         chosen = select(*(columns[name] for name in (*Event.__struct_fields__, "chain")))
         chosen = chosen.where(columns.position > after).order_by(columns.position).limit(_PAGE)
@@ -245,7 +249,8 @@ class Postgres:
         return list(rows), rows[-1][6] if rows else after
 
     def bytes_in_use(self, connection: Connection) -> dict[str, int]:
-        """Return the bytes of the database. The write-ahead log belongs to the whole server."""
+        """Return the size of the database in bytes. The write-ahead log belongs to the whole
+        server, and is not included."""
         asked = "SELECT pg_database_size(current_database())"
         return {"database": int(connection.exec_driver_sql(asked).scalar_one())}
 
@@ -255,7 +260,7 @@ class Postgres:
         return []
 
     async def close(self) -> None:
-        """Close the connections that read."""
+        """Close all connections that read."""
         await self._readers.dispose()
 
     def disown(self) -> None:
@@ -279,7 +284,8 @@ class Postgres:
 
 
 def weakness(connection: Connection) -> str:
-    """Return why nothing may be written to a database; "" if nothing is wrong. Only reads."""
+    """Return the sentence why nothing may be written to a database, by the settings of its server;
+    "" if nothing is wrong. It only reads."""
     for name, (allowed, why) in _SETTINGS.items():
         if name == _READ_ONLY:  # as whoever only looks has it
             value = "on" if connection.execute(select(func.pg_is_in_recovery())).scalar() else "off"

@@ -55,10 +55,11 @@ _KEPT: Final = select(_snapshot.seq, _snapshot.proof, _snapshot.state).where(
 
 
 class JournalReader:
-    """Reads events from a database. Subclasses decide how a question reaches it."""
+    """Reads events from a database. Subclasses decide, by `_ask`, how a question reaches it."""
 
     async def _ask(self, question: Callable[[Connection], T]) -> T:
-        """Return the answer to a question. Raise Unavailable if the database cannot be read."""
+        """Call `question` with a connection, and return its result; subclasses define this. Raise
+        Unavailable if the database cannot be read."""
         raise NotImplementedError
 
     async def read(
@@ -72,9 +73,9 @@ class JournalReader:
         return await self._events(chosen.order_by(_event.seq).limit(limit))
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
-        """Return the events of a stream with `after < seq <= upto`, in order. `usual`: the kind
-        that most of these events have. The list is shorter than `upto - after` if events are
-        missing."""
+        """Return the events of a stream with `after < seq <= upto`, in order, as (body, kind, at).
+        Kind and time are None for events of the kind `usual`. The list is shorter than `upto -
+        after` if events are missing."""
         place = {"stream": stream, "usual": usual, "after": after, "upto": upto}
         return cast("list[BareEvent]", await self.plain_rows(_BARE, place))
 
@@ -101,7 +102,8 @@ class JournalReader:
     async def plain_rows(
         self, statement: Select[Any], values: Mapping[str, Any] | None = None
     ) -> list[Sequence[Any]]:
-        """Return many rows as the driver gives them, without conversion of values."""
+        """Return the rows of a query as the driver returns them, which is quicker for many rows.
+        `values`: as for `query`."""
         return await self._ask(lambda connection: _plain(connection.execute(statement, values)))
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
@@ -164,7 +166,7 @@ def following(position: int, limit: int) -> Select[Any]:
 
 
 def body_of(connection: Connection, stream: str, seq: int) -> bytes:
-    """Return the body of an event; empty bytes if there is no such event."""
+    """Return the body of the event `seq` of a stream; empty bytes if there is no such event."""
     return connection.execute(_BODY, {"stream": stream, "seq": seq}).scalar() or b""
 
 

@@ -33,7 +33,7 @@ class StreamRemoved(msgspec.Struct, frozen=True):
 
     @property
     def end(self) -> Head:
-        """Return the head at which the stream ended."""
+        """Return the end of the stream (number and hash) at its removal."""
         return Head(self.seq, bytes.fromhex(self.chain))
 
 

@@ -98,22 +98,22 @@ class SqliteSession:
         return work()
 
     def alive(self) -> bool:
-        """Return True: a file does not disconnect."""
+        """Return True always: a file does not disconnect."""
         return True
 
     def begin(self) -> None:
-        """Open a transaction, locked from the start."""
+        """Open a transaction, with the write lock from the start."""
         self._raw.execute("BEGIN IMMEDIATE")
 
     def say(self, command: str) -> None:
-        """Execute a command without a result."""
+        """Execute a command of SQL without a result."""
         self._raw.execute(command)
         if command == "COMMIT":
             self._checkpoints.committed()
 
     def store(self, events: Sequence[tuple[Event, bytes]]) -> None:
         """Write events, each with its link of the hash chain. In the same transaction a trigger
-        writes the new heads of their streams."""
+        writes the new ends of their streams."""
         rows = [
             (e.stream, e.seq, e.kind, e.author, e.at, e.body, e.position, link)
             for e, link in events
@@ -140,12 +140,10 @@ class SqliteSession:
 
 
 class Checkpoints:
-    """Copies the write-ahead log of a SQLite file into the file, on a thread with a connection of its own.
-
-    A commit that does it itself, as SQLite has it, waits for two more syncs of the disk and for all pages since the
-    last time. A passive checkpoint holds up no commit. What a commit promises does not depend on it: its pages are
-    in the log, which was synced.
-    """
+    """Copies the write-ahead log of a SQLite file into the file (a checkpoint), on a thread with a
+    connection of its own. A commit that does so itself, as SQLite's default is, waits for two more
+    syncs of the disk and for all pages since the last time. A passive checkpoint holds up no
+    commit. Commits stay durable without it: their pages are in the log, which was synced."""
 
     def __init__(self, path: Path, driver: Any) -> None:
         self._path = path
@@ -155,7 +153,8 @@ class Checkpoints:
         self._thread: threading.Thread | None = None
 
     def committed(self) -> None:
-        """Note that something was committed. Returns at once."""
+        """Start a checkpoint in the background if none is due; call this after each commit. Returns
+        at once."""
         if self._due.is_set():
             return
         self._due.set()
@@ -185,8 +184,8 @@ class Checkpoints:
             engine.dispose()
 
     def _copied(self, engine: Engine) -> int:
-        """Copy the write-ahead log into the database, again after commits in between. Once all of
-        it is copied, the next commit restarts the log. Return its number of pages."""
+        """Copy the write-ahead log into the database by `engine`, again after commits in between.
+        Once all of it is copied, the next commit restarts the log. Return its number of pages."""
         pages = 0
         try:
             with engine.connect() as connection:
@@ -202,7 +201,7 @@ class Checkpoints:
 
 @lru_cache(_ROWS)
 def _insert_of(rows: int) -> str:
-    """Return an INSERT of this many events."""
+    """Return the text of an INSERT of so many events."""
     return _INSERT + ", ".join(["(?, ?, ?, ?, ?, ?, ?, ?)"] * rows)
 
 
@@ -227,7 +226,9 @@ class Sqlite:
         self.address: Final = f"sqlite:///{self._path.absolute()}"
 
     def open(self, branch: Branch, before: Before = no_copy) -> SqliteSession:
-        """Lock the file for this process, since two writers would damage the log; then migrate."""
+        """Lock the file for this process, since two writers would damage the log; then bring the
+        tables of the branch to this version, and connect. `before` is called if tables are about to
+        change. Raise CannotStart if the file cannot be used or another process holds the lock."""
         self.look(recognize)
         self._lock = own(self._path)
         self.migrate(upgrade_to(branch, before=before))
@@ -238,7 +239,8 @@ class Sqlite:
 
     def look(self, question: Callable[[Connection], object]) -> None:
         """Call `question` with a read-only connection to the file, if it exists. A normal
-        connection would already change the file's journal mode."""
+        connection would already change the file's journal mode. Raise CannotStart if it cannot be
+        read."""
         if not self._path.exists():
             return
         with _readable(self._path) as path:
@@ -254,8 +256,8 @@ class Sqlite:
                 engine.dispose()
 
     def migrate(self, upgrade: Callable[[Connection], T]) -> T:
-        """Run a change of the schema in one transaction. Raise CannotStart if the file cannot be
-        used."""
+        """Call `upgrade`, which changes the schema, in one transaction, and return its result.
+        Raise CannotStart if the file cannot be used."""
         self._make()
         engine = sqlite_engine(self._path, wait=2 * _WAIT, module=self._driver)
         try:
@@ -267,7 +269,8 @@ class Sqlite:
             engine.dispose()
 
     def _make(self) -> None:
-        """Create an empty file if there is none; SQLite gives the files beside it the same rights."""
+        """Create an empty file if it does not exist, only for this user; SQLite gives the files
+        beside it the same rights. Raise CannotStart if it cannot be created."""
         try:
             os.close(opener(str(self._path), os.O_RDWR | os.O_CREAT))
         except OSError as error:
@@ -278,14 +281,14 @@ class Sqlite:
         return SqliteSession(self._path, self._driver)
 
     def lost(self, error: Exception) -> bool:
-        """Return whether a fault is that of the file, and not of the statement."""
+        """Return whether an error is the fault of the file, and not of the statement."""
         return not isinstance(
             error,
             IntegrityError | ProgrammingError | InterfaceError | DataError | UnicodeDecodeError,
         )
 
     async def ask(self, question: Callable[[Connection], T]) -> T:
-        """Answer a question on a thread that reads."""
+        """Call `question` with a connection, on a thread that reads, and return its result."""
 
         def asked() -> T:
             with self._engine.connect() as connection:
@@ -306,8 +309,8 @@ class Sqlite:
         return await self.ask(asked)
 
     def scan(self, connection: Connection, after: int) -> tuple[list[Sequence[Any]], int]:
-        """Return a page of stored events, also those whose text is damaged, and the position for
-        the next page."""
+        """Return a page of stored events after the position `after`, even if their text is damaged,
+        and the position for the next page."""
         raw: Any = connection.connection.dbapi_connection
         plain, raw.text_factory = raw.text_factory, _lenient
         try:
@@ -317,7 +320,7 @@ class Sqlite:
         return [row[:8] for row in rows], rows[-1][8] if rows else after
 
     def bytes_in_use(self, connection: Connection) -> dict[str, int]:
-        """Return the bytes of the file and of its write-ahead log."""
+        """Return the size in bytes of the file and of its write-ahead log."""
         del connection
         log = self._path.with_name(f"{self._path.name}-wal")
         return {
@@ -326,12 +329,12 @@ class Sqlite:
         }
 
     def complaints(self, connection: Connection) -> list[str]:
-        """Return the faults that SQLite finds in the file."""
+        """Return the faults that SQLite finds in the file, as its own texts."""
         found = connection.exec_driver_sql("PRAGMA integrity_check").scalars().all()
         return [text for text in found if text != "ok"]
 
     async def close(self) -> None:
-        """Close the connections that read."""
+        """Close all connections that read."""
         await asyncio.to_thread(self._threads.shutdown)
         self._engine.dispose()
 
@@ -347,8 +350,8 @@ class Sqlite:
 
 
 def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
-    """Return an engine that uses SQLite's own transactions, also for schema changes. They take the
-    write lock at BEGIN, and wait for it for up to `wait` seconds."""
+    """Return an engine for the file `path` that uses SQLite's own transactions, also for schema
+    changes. They take the write lock at BEGIN, and wait for it for up to `wait` seconds."""
     engine = create_engine(
         f"sqlite:///{path}", poolclass=NullPool, connect_args={"timeout": wait}, **options
     )
@@ -368,8 +371,8 @@ def sqlite_engine(path: Path, *, wait: float, **options: Any) -> Engine:
 
 @contextmanager
 def _readable(path: Path) -> Iterator[Path]:
-    """Yield the path of a file to read. If it has a hot rollback journal, that is applied to a
-    copy, whose path is yielded."""
+    """Return a context with the path of a file to read. If the file has a hot rollback journal (of
+    a process that was killed), that is applied to a copy, whose path it is then."""
     undone = path.with_name(f"{path.name}-journal")
     if not undone.exists() or not undone.stat().st_size:
         yield path
@@ -384,10 +387,8 @@ def _readable(path: Path) -> Iterator[Path]:
 
 
 def inspected(path: Path) -> tuple[int, list[Damage]]:
-    """Return the number of events in a file and their damages, at any revision of its tables.
-
-    The file is not changed. Raise sqlite3.Error.
-    """
+    """Return the number of events in the SQLite file `path` and their damages, at any revision of
+    its tables. The file is not changed. Raise sqlite3.Error if it cannot be read."""
     inspector, after = Inspector(taken_out), 0
     with closing(sqlite3.connect(f"{path.as_uri()}?mode=ro", uri=True)) as database:
         database.execute("BEGIN")
@@ -402,8 +403,8 @@ def inspected(path: Path) -> tuple[int, list[Damage]]:
 
 
 def unchanged(path: Path) -> str:
-    """Return the URL for reading a file without changing it. If its write-ahead log is empty, no
-    lock and no index file are made either."""
+    """Return the URL for reading the SQLite file `path` without changing it. If its write-ahead log
+    is empty, no lock and no index file are made either."""
     log = path.with_name(f"{path.name}-wal")
     waits = log.exists() and log.stat().st_size > 0
     return f"sqlite:///file:{quote(str(path))}?uri=true&" + ("mode=ro" if waits else "immutable=1")

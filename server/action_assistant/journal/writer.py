@@ -77,7 +77,7 @@ class Transaction:
         self.last: tuple[Event, bytes] | None = None
 
     def start(self) -> None:
-        """Begin with the next jobs."""
+        """Begin a new transaction for the next jobs."""
         self.last = None
         self.committing = False
         if len(self._heads) > _KNOWN:
@@ -93,8 +93,9 @@ class Transaction:
         return self._session.connection
 
     def add(self, addition: Addition) -> int:
-        """Append to one stream and fold; return the newest seq. Raise Conflict if the stream has
-        another end than `expected`, BadInput if a text cannot be stored."""
+        """Append events to one stream and fold them into the tables; return the newest seq. Raise
+        Conflict if the stream has another end than `expected`, BadInput if a text cannot be stored.
+        """
         stream = addition.stream
         _check_text(stream)
         for each in addition.drafts:
@@ -118,11 +119,13 @@ class Transaction:
         return head.seq
 
     def end(self, stream: str) -> Head:
-        """Return the head of a stream, with the events that earlier jobs of this transaction added."""
+        """Return the end of a stream (number and hash), with the events that earlier jobs of this
+        transaction added."""
         return self._head(stream)
 
     def attempt(self, job: Job[Any], database: Database) -> Outcome:
-        """Run one job and return its outcome. Raise only what prevents storing anything at all."""
+        """Run one job and return its outcome. An error of the job is in the outcome; only an error
+        that prevents storing anything at all is raised."""
         position = self._position
         self._before.clear()
         try:
@@ -191,10 +194,9 @@ class Transaction:
 
 
 class Writer:
-    """The only writer of a database. Jobs that wait during a commit form the next transaction.
-
-    `tell` is called on the writer's thread after each commit or failure, once for all its jobs.
-    """
+    """The only writer of a database, with a thread of its own. Jobs that wait during a commit form
+    the next transaction. `tell` is called on the writer's thread after each commit or failure, once
+    for all its jobs."""
 
     def __init__(
         self,
@@ -221,13 +223,13 @@ class Writer:
         self._jobs.put(jobs)
 
     def commit(self, jobs: Sequence[Job[Any]]) -> JobOutcomes:
-        """Commit jobs on this thread and return their outcomes. Call it only after `tell` has
-        reported the outcomes of all jobs submitted before."""
+        """Commit jobs on this thread, which blocks, and return their outcomes. Call it only after
+        `tell` has reported the outcomes of all jobs submitted before."""
         self.metrics.submitted(len(jobs))
         return self._commit(jobs)
 
     def is_quick(self, jobs: Sequence[Job[Any]]) -> bool:
-        """Return whether `commit` would be quick with these jobs (decision 94)."""
+        """Return whether `commit` is expected to be quick with `jobs` (decision 94)."""
         return (
             self._database.is_local
             and self.metrics.quick.are_quick
@@ -239,7 +241,7 @@ class Writer:
 
     @property
     def is_alive(self) -> bool:
-        """Return whether the writer's thread runs."""
+        """Return whether the writer's thread still runs."""
         return self._thread.is_alive()
 
     def close(self) -> None:
@@ -298,8 +300,8 @@ class Writer:
     def _settled(
         self, transaction: Transaction | None, done: list[Outcome], jobs: int, error: Exception
     ) -> list[Outcome]:
-        """Return the outcomes of jobs whose transaction failed: all stored, none stored, or
-        unknown."""
+        """Return the outcomes of `jobs` jobs whose transaction failed with `error`: all stored
+        (`done`), none stored, or unknown."""
         text = f"Nothing can be stored at the moment: {cause_of(error)}."
         if transaction is not None and transaction.committing and transaction.last is not None:
             match self._stored(*transaction.last):
@@ -362,7 +364,7 @@ def _check_text(text: str) -> None:
 
 
 def _told(error: Exception) -> Exception:
-    """Return the exception that a caller gets for the failure of its job."""
+    """Return the exception that a caller gets if its job failed with `error`."""
     if isinstance(error, IntegrityError):
         return Conflict(f"This is in the way of something that is already stored: {error.orig}.")
     if isinstance(error, DBAPIError):

@@ -62,8 +62,9 @@ _SWITCH_S: Final = 0.0005
 async def open_services(
     settings: RunnerSettings, services: RunnerServices | None = None
 ) -> AsyncIterator[RunnerServices]:
-    """Open all services of the routes, and close them afterwards. Raise CannotStart if the database
-    or a folder cannot be used."""
+    """Return a context in which all services of the routes are open; they are closed at its end.
+    `services`: the object to fill, None for a new one. Raise CannotStart if the database or a
+    folder cannot be used."""
     services = services or RunnerServices()
     if settings.behaviours is not None:
         services.behaviours = BehaviourFolder.opened(settings.behaviours)
@@ -113,7 +114,8 @@ async def _executing(
     recordings: Recordings,
     storage: StoragePaths,
 ) -> AsyncIterator[ExecutionService]:
-    """Open workers, robots and the service that drives runs on them."""
+    """Return a context in which workers, robots and the service that drives runs on them are open.
+    Other services are set in `services`."""
     async with (
         RunnerWorkers.opened() as workers,
         _asking(workers, storage, archive_store) as queries,
@@ -156,8 +158,8 @@ async def _executing(
 async def _asking(
     workers: RunnerWorkers, storage: StoragePaths, archive_store: ArchiveStore
 ) -> AsyncIterator[tuple[WorkerQueries, WorkerQueries]]:
-    """Yield the queries for people, and those for the runner itself, which never queue behind those
-    of people."""
+    """Return a context with two services for questions about stored runs: one for people, and one
+    for the runner itself, whose questions never wait behind those of people."""
     async with anyio.create_task_group() as tasks:
         background = BackgroundTasks(tasks)
         yield (
@@ -169,7 +171,8 @@ async def _asking(
 
 @asynccontextmanager
 async def _closing(reach: Reach | str) -> AsyncIterator[None]:
-    """Close the reach of robots at the end, after everything else."""
+    """Return a context that closes the robots' `reach` at its end; a text (why there is none) needs
+    no closing."""
     try:
         yield
     finally:
@@ -186,7 +189,7 @@ def _keep(settings: RunnerSettings) -> Keep:
 
 
 def _folders(settings: RunnerSettings) -> dict[str, Path]:
-    """Return the folders that are kept beside the database, by their use."""
+    """Return the folders of the runner's files (archive, recordings), by their use."""
     return {"archive": _keep(settings).folder, "recordings": settings.data / "recordings"}
 
 
@@ -195,8 +198,8 @@ def _database(settings: RunnerSettings) -> str:
 
 
 def create_app(settings: RunnerSettings) -> ASGIApp:
-    """Return the runner as an ASGI application. Raise CannotStart if the database or the folder of
-    behaviours cannot be used."""
+    """Return the runner as an ASGI application, and prepare its database. Raise CannotStart if the
+    database or the folder of behaviours cannot be used."""
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
     for robot, folder in settings.index_folders.items():

@@ -33,7 +33,7 @@ _AS_REQUESTED: Final = set(run.c.keys()) & set(Requested.__struct_fields__)
 
 
 def fold(event: Event) -> Sequence[Executable]:
-    """Return the statements that an event means for the tables."""
+    """Return the statements by which a stored event changes the tables."""
     if event.kind == RobotRegistered.kind:
         return (_robot(msgspec.json.decode(event.body, type=RobotRegistered)),)
     if annotations.is_about(event.stream):
@@ -93,8 +93,8 @@ def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
 
 
 def _open_again(id_: str, moves: MovesAgain) -> Sequence[Executable]:
-    """Return the statements that reopen a run that was over, with an alarm, and have it summed up
-    for reviews again at its next end."""
+    """Return the statements that reopen a run that was over, with an alarm, and have its totals
+    computed again after its next end."""
     text = msgspec.json.encode({"code": "moves_again", "at": moves.at, "text": moves.text})
     more = func.json_insert(run.c.summary, "$.alarms[#]", func.json(text.decode()))
     summary = func.json_remove(more, "$.proof_at", "$.unknown_since", "$.detail", "$.at_rest")
@@ -119,7 +119,8 @@ def _run(asked: Requested) -> Executable:
 
 
 def _first_summary(asked: Requested) -> dict[str, object]:
-    """Return the summary of a run before anything else is known of it."""
+    """Return the summary of a run right after its request: without alarms, and with its group and
+    robots if it has any."""
     summary: dict[str, object] = {"alarms": []}
     if asked.group is not None:
         summary["group"] = asked.group

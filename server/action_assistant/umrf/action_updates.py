@@ -51,8 +51,9 @@ def is_like(use: Action, known: Action) -> bool:
 
 
 def suggested(graph: Graph, known: Action) -> Renames:
-    """Return the renames that are likely because, over all uses together, exactly one parameter of
-    a type was removed and exactly one parameter of this type was added."""
+    """Return the renames of parameters that are likely between the library action `known` and its
+    uses in a graph: over all uses together, exactly one parameter of a type was removed and exactly
+    one of this type was added."""
     uses = uses_of(graph, known.name)
     return Renames(
         _swapped([use.inputs for use in uses], known.inputs),
@@ -150,8 +151,9 @@ def _swapped(
 def _sources(
     use: tuple[Parameter, ...], known: tuple[Parameter, ...], renames: Mapping[str, str]
 ) -> dict[str, Parameter]:
-    """Return, for each path of a library parameter, the parameter of the use from which it comes;
-    new parameters of the library are absent."""
+    """Return, for each path of a library parameter (`known`), the parameter of the use from which
+    its value comes: that of the same path, or that of the old path by `renames`. New parameters are
+    absent."""
     had = {parameter.path: parameter for parameter in use}
     known_paths = {parameter.path for parameter in known}
     found = {path: parameter for path, parameter in had.items() if path in known_paths}
@@ -173,9 +175,9 @@ def _parameters(
 
 
 def _text(use: str, known: str) -> str:
-    """Return the text of a parameter with the library's type, limits and descriptions, and with all
-    other members, such as the value, of the use. A value that does not fit a new type is left
-    out."""
+    """Return the JSON text of a parameter with the type, limits and descriptions of the library
+    (`known`), and with all other members, such as the value, of the use. A value that does not fit
+    a new type is removed."""
     mine, new = parse_small(use), parse_small(known)
     if not isinstance(mine, dict) or not isinstance(new, dict):
         return known if _defined(mine) != _defined(new) else use

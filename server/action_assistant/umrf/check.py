@@ -44,12 +44,11 @@ def check(
     graphs: Mapping[str, Graph] | None = None,
     resolution: Resolution = CERTAIN,
 ) -> list[Problem]:
-    """Return every problem of a graph: errors first, then by rank. Never raises.
-
-    `library`: the actions that the engine has, by name. `graphs`: the graphs that the engine has
-    indexed and can run as sub-graphs, by name; `resolution` tells how these names were resolved. If
-    `library` or `graphs` is None, it is unknown, and no problem is reported that depends on it.
-    """
+    """Return all problems of a graph, the errors first, then by rank. No graph makes it raise an
+    error. `library`: the actions that the engine has, by name; `facts`: its build. `graphs`: the
+    graphs that the engine has indexed and can run as sub-graphs, by name; `resolution`: how these
+    names were resolved. If `library` or `graphs` is None, it is unknown, and no problem is reported
+    that depends on it."""
     subject = Subject(graph, facts)
     check_structure(subject)
     flow = check_flow(subject, set(graphs or ()) - set(library or ()))
@@ -66,8 +65,8 @@ def check_reading(
     facts: EngineFacts = PINNED,
     graphs: Mapping[str, Graph] | None = None,
 ) -> list[Problem]:
-    """Return every problem of a file that was read, with its place in the file: problems of the
-    text, and problems of the graph in the text. `library` and `graphs` are as in `check`."""
+    """Return all problems of a file that was read, with their places in the file: problems of the
+    text, and problems of the graph in it. `library`, `facts` and `graphs` are as in `check`."""
     found = check(reading.graph, library, facts, graphs)
     problems = [*reading.problems, *reading.placed(found)]
     return sorted(problems, key=rank)
@@ -85,8 +84,8 @@ def check_written(
 
 
 def check_action(reading: ActionReading) -> list[Problem]:
-    """Return every problem of a file that describes one action, with its place in this file, errors
-    first."""
+    """Return all problems of a file that describes one action (`reading`: the file as read), with
+    their places in it, errors first."""
     graph = Graph(name=reading.action.name or "action", actions=(reading.action,))
     subject = Subject(graph, PINNED)
     check_structure(subject)
@@ -96,8 +95,8 @@ def check_action(reading: ActionReading) -> list[Problem]:
 
 
 def refused_by_parser(reading: Reading) -> list[Problem]:
-    """Return the problems for which the engine's parser refuses a file. The engine can run nothing
-    of a refused file."""
+    """Return the problems for which the engine's parser refuses a file (`reading`: the file as
+    read). The engine can run no part of a refused file."""
     subject = Subject(reading.graph, PINNED)
     check_structure(subject)
     ends = {ENTRY, EXIT}
@@ -135,7 +134,7 @@ def forbids_start(problem: Problem) -> bool:
 
 
 def is_final(problem: Problem) -> bool:
-    """Return whether nobody can override this error: its own code is final, or the code of the
-    problem in a sub-graph that the error reports."""
+    """Return whether no person can override this error: its own code is final, or that of the
+    problem in a sub-graph which it reports."""
     inner = problem.inside.code if problem.inside is not None else problem.code
     return problem.severity == "error" and not FINAL.isdisjoint({problem.code, inner})

@@ -223,8 +223,8 @@ QUIET: Final = frozenset({"H3", "values-across"})
 
 
 def rank(problem: Problem) -> tuple[Severity, int]:
-    """Return the key by which problems are sorted: first the severity, then the rank of the code,
-    the gravest first."""
+    """Return the key by which problems are sorted: errors before warnings, then the gravest code
+    first."""
     code = problem.code
     if code in QUIET:
         return problem.severity, len(_WORST) + 1

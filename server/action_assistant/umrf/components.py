@@ -86,7 +86,7 @@ def reachable(ways: Sequence[Sequence[int]]) -> list[Mask]:
 
 
 def nodes_in(mask: Mask) -> Iterator[int]:
-    """Yield the numbers of the nodes that a bit mask holds, the smallest first."""
+    """Yield the numbers of the nodes in a bit mask, the smallest first."""
     while mask:
         lowest = mask & -mask
         yield lowest.bit_length() - 1

@@ -119,8 +119,8 @@ def _relations(old: Graph, new: Graph) -> Iterable[RelationChange]:
 
 
 def _when(relation: Relation | None) -> tuple[tuple[str, str], ...]:
-    """Return pairs of outcome and response of an arrow, without responses that ignore the outcome;
-    nothing for an arrow from the entry."""
+    """Return pairs of outcome and response of an arrow, except for responses that ignore the
+    outcome; () for None or an arrow from the entry."""
     if relation is None or relation.parent == ENTRY:
         return ()
     says: dict[str, str] = msgspec.structs.asdict(relation.conditions)
@@ -137,15 +137,16 @@ def _notes(old: Graph, new: Graph) -> Iterable[NoteChange]:
 
 
 def _note_text(note: JsonText) -> str:
-    """Return the text that people read in a note or frame; empty if it has none."""
+    """Return the text that people read in a note or frame on the canvas, given its JSON text; "" if
+    it has none."""
     found = parse_small(note)
     text = found.get("text") if isinstance(found, dict) else None
     return text if isinstance(text, str) else ""
 
 
 def _but_place(note: JsonText) -> dict[str, Any] | JsonText:
-    """Return the members of a note without its position and size; a note that is no JSON object is
-    returned unchanged."""
+    """Return the members of a note on the canvas (JSON text) without its position and size; a note
+    that is no JSON object is returned unchanged."""
     found = parse_small(note)
     if not isinstance(found, dict):
         return note

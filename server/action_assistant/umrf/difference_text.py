@@ -49,7 +49,7 @@ def by_name(graph: Graph) -> Graph:
 
 def without_looks(found: Difference) -> Difference:
     """Return the part of a difference that can change what a robot does: without positions,
-    waypoints, notes and frames."""
+    waypoints, and notes and frames on the canvas."""
     actions = (replace(a, fields=_meant(a.fields)) for a in found.actions)
     relations = (replace(r, fields=_meant(r.fields)) for r in found.relations)
     return replace(
@@ -62,13 +62,13 @@ def without_looks(found: Difference) -> Difference:
 
 
 def is_same(found: Difference) -> bool:
-    """Return whether a difference is empty, so that the two states are equal."""
+    """Return whether a difference is empty, that is, whether the two states are equal."""
     return not (found.fields or found.actions or found.relations or found.notes)
 
 
 def lines(found: Difference) -> Iterator[str]:
-    """Yield the lines of text that describe a difference: first the changes that a robot notices,
-    then the changes that only concern the drawing."""
+    """Yield the lines of text that describe a difference: first the changes that can change what a
+    robot does, then the changes of the drawing."""
     meant = without_looks(found)
     if meant.fields:
         yield "~ graph"
@@ -112,7 +112,7 @@ def _members(field: Field) -> Iterator[tuple[str, Any, Any]]:
 
 
 def _parsed(field: Field, value: Any) -> Any:
-    """Return the JSON value of a field that is kept as text, and any other value as it is."""
+    """Return the JSON value of a field that is stored as JSON text, and any other value as it is."""
     kept = field.field.startswith(("in/", "out/", "x/"))
     return parse_small(value) if kept and isinstance(value, str) else value
 

@@ -24,13 +24,11 @@ from action_assistant.umrf.parameters import escape, flat_name
 
 
 def echo(graph: Graph, facts: EngineFacts) -> Graph:
-    """Return a graph as it appears in feedback and get answers, so that the `digest` of both can be
-    compared.
-
-    Missing in it are the graph's description, unknown fields, exit conditions, renamings of the
-    entry, `pvf_required`, the order of actions, values of outputs, and values of inputs that a
-    parent may hand over. This is the same for every build that was measured.
-    """
+    """Return a graph as an engine gives it back in feedback and get answers (its echo), so that the
+    `digest` of both can be compared. Missing in it are the graph's description, unknown fields,
+    exit conditions, renamings of the entry, `pvf_required`, the order of actions, values of
+    outputs, and values of inputs that a parent may hand over. `facts`, the engine build, makes no
+    difference so far."""
     del facts  # all measured builds give the same back
     real = sorted((a for a in graph.actions if not a.missing), key=lambda a: a.full_name)
     reached = _reached(graph, {action.key: action for action in real})
@@ -42,7 +40,8 @@ def echo(graph: Graph, facts: EngineFacts) -> Graph:
 
 
 def _reached(graph: Graph, actions: Mapping[Key, Action]) -> dict[Key, set[str]]:
-    """Return the flat names of the inputs that an output of some parent may reach."""
+    """Return, by key of the action, the flat names of the inputs that an output of some parent may
+    reach. `actions`: all by key."""
     found: dict[Key, set[str]] = {}
     for relation in graph.relations:
         parent = actions.get(relation.parent)
@@ -71,7 +70,7 @@ def _parameters(
     parameters: tuple[Parameter, ...], reached: set[str] | None
 ) -> tuple[Parameter, ...]:
     """Return parameters as the engine prints them. Parameters whose flat name is in `reached`
-    (None: all) lose their value, since an output of a parent may set it."""
+    (None: all) have no value, since an output of a parent may set it."""
     found: dict[str, Parameter] = {}
     for parameter in parameters:
         leaf = parse_small(parameter.text)

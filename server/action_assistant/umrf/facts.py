@@ -55,11 +55,9 @@ _KNOWN: Final = {facts.commit: facts for facts in (PINNED, SIMULATED)}
 
 
 def facts_for(commit: str | None) -> EngineFacts:
-    """Return the facts of the engine that was built from this commit (seven hex digits or more).
-
+    """Return what is true of the engine that was built from this commit (seven hex digits or more).
     A commit that was not measured gets the facts of the pinned engine with its own `commit`. None
-    stands for the pinned engine.
-    """
+    stands for the pinned engine."""
     if not commit:
         return PINNED
     for known, facts in _KNOWN.items():
@@ -83,10 +81,10 @@ SECOND_PERSON: Final = "second_person"
 
 
 def facts_of(profile: Mapping[str, object]) -> EngineFacts:
-    """Return the facts of a robot's engine: those of the `commit` in its profile, or of the pinned
-    engine if the profile has none. Other fields of the profile, named as in `EngineFacts`,
-    replace these facts. A robot synchronises only if its profile says so, whatever the commit.
-    Raises `BadProfile` if a field is unknown or has a wrong type or value."""
+    """Return what is true of a robot's engine: the facts of the `commit` in its profile, or of the
+    pinned engine if the profile has none. Other fields of the profile, named as in `EngineFacts`,
+    replace them. A robot synchronises only if its profile says so, whatever the commit. Raise
+    `BadProfile` if a field is unknown or has a wrong type or value."""
     if not isinstance(profile.get(SECOND_PERSON, False), bool):
         raise BadProfile(f"{SECOND_PERSON} is true or false.", f"/{SECOND_PERSON}")
     profile = {key: value for key, value in profile.items() if key != SECOND_PERSON}
@@ -103,8 +101,8 @@ def facts_of(profile: Mapping[str, object]) -> EngineFacts:
 
 
 def _profile_value(key: str, value: object) -> object:
-    """Return one value of a profile with the type of its field in `EngineFacts`. Raises
-    `BadProfile` if it cannot have this type."""
+    """Return the value of the field `key` of a profile with the type of its field in `EngineFacts`.
+    Raise `BadProfile` if it cannot have this type."""
     try:
         fitting: EngineFacts = msgspec.convert({"commit": "", key: value}, EngineFacts)
     except msgspec.ValidationError as wrong:

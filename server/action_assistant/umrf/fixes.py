@@ -20,7 +20,7 @@ def fix(graph: Graph, problem: Problem) -> Graph:
 
 def _mend_relation(change: Callable[[Relation], Relation | None]) -> "_Fix":
     """Return a fix that replaces the problem's relation by the result of `change`, or removes the
-    relation if that result is None."""
+    relation if that returns None."""
 
     def mend(graph: Graph, problem: Problem) -> Graph:
         relations = (
@@ -54,7 +54,8 @@ def _without_lonely_ghosts(graph: Graph) -> Graph:
 
 
 def _renumbered(graph: Graph, problem: Problem) -> Graph:
-    """Give the problem's action the lowest `instance_id` that no other action of its name has."""
+    """Return the graph in which the problem's action has the lowest `instance_id` that no other
+    action of its name has; unchanged if its number is free already."""
     used: Mapping[Key, Action] = {action.key: action for action in graph.actions}
     action = used.get(problem.where.aid or "")
     if action is None:
@@ -102,7 +103,8 @@ def _optional(parameter: Parameter) -> Parameter:
 
 
 def _with_example(graph: Graph, problem: Problem) -> Graph:
-    """Give the input that the problem is about its declared example as value, if the example fits."""
+    """Return the graph in which the input that the problem is about has its declared example as
+    value, if the example fits."""
     _, found, path = problem.where.path.partition("/input_parameters/")
     for action in graph.actions:
         if found and action.key == problem.where.aid:
@@ -112,8 +114,8 @@ def _with_example(graph: Graph, problem: Problem) -> Graph:
 
 
 def with_examples(graph: Graph, problems: Iterable[Problem]) -> Graph:
-    """Return the graph in which every input that the fix `take-example` of these problems concerns
-    has its example as value."""
+    """Return the graph in which every input that a problem with the fix `take-example` is about has
+    its example as value."""
     for problem in problems:
         if problem.fix == "take-example":
             graph = _with_example(graph, problem)

@@ -50,7 +50,8 @@ _TAKEN: Final = frozenset({"run", "stop", "pause", "restart"})  # responses that
 
 
 def keeper(number: int = 0, key: Key = KEEPER) -> Action:
-    """Return the action of the helper package, as its file describes it."""
+    """Return the keeper (the action of the helper package, which holds values until they are read),
+    as its file describes it, with this number and key."""
     leaves = {name: kind for name, (_, kind) in _INPUT_TYPES.items()} | {NEVER: "string"}
     return Action(
         key=key,
@@ -62,14 +63,15 @@ def keeper(number: int = 0, key: Key = KEEPER) -> Action:
 
 
 def has_keeper(known: Mapping[str, Signature]) -> bool:
-    """Return whether an engine that has indexed these actions has the helper package."""
+    """Return whether an engine has the helper package. `known`: the signatures of the actions that
+    it has indexed, by name."""
     found = known.get(KEEPER)
     wanted = {name: kind for name, (_, kind) in _INPUT_TYPES.items()} | {NEVER: "string"}
     return found is not None and found.inputs == wanted and not found.outputs
 
 
 def is_keeper(node: str) -> bool:
-    """Return whether a full name is that of a keeper."""
+    """Return whether a full name (`node`) is that of a keeper."""
     return node.startswith(f"{KEEPER}_")
 
 
@@ -82,8 +84,8 @@ class KeptOutput(msgspec.Struct, frozen=True):
 
 
 def kept_outputs(action: Action) -> tuple[KeptOutput, ...]:
-    """Return the outputs of an action that keepers can take: those of native types, unless the engine
-    would not find them after they are renamed."""
+    """Return the outputs of an action that keepers can take: outputs of native types; () if the
+    engine would not find them after they are renamed."""
     outputs = slots_of(action.outputs)
     if action.name == KEEPER or not any(slot.type in NATIVE for slot in outputs.values()):
         return ()
@@ -102,8 +104,9 @@ def kept_outputs(action: Action) -> tuple[KeptOutput, ...]:
 
 
 def with_keepers(piece: Graph, action: Action, *, taken_on_false: bool) -> Graph:
-    """Return a piece with keepers of the outputs of its action. `taken_on_false`: somebody takes them
-    when the action ends with false; its graph then stays RUNNING, and ends FINISHED only for true."""
+    """Return a piece with keepers of the outputs of its action. `taken_on_false`: other actions
+    also take the outputs when the action ends with false; the piece then stays RUNNING, and ends
+    FINISHED only for true."""
     outputs = slots_of(action.outputs)
     keepers: list[Action] = []
     arrows: list[Relation] = []
@@ -137,8 +140,9 @@ def _types(action: Action) -> dict[str, str]:
 
 
 def _remap(outputs: tuple[str, ...], types: Mapping[str, str], number: int) -> tuple[Remap, ...]:
-    """Return the names of the sorted outputs at the keeper with this number. The outputs that other
-    keepers take get names that keep the order and are no inputs."""
+    """Return the renamings of an action's sorted outputs on the arrow to the keeper with this
+    number. `types`: of the outputs by name. Outputs that other keepers take get names that keep the
+    order and are no inputs."""
     first = number * _OUTPUTS_EACH
     names: list[Remap] = []
     for index, output in enumerate(outputs):
@@ -174,8 +178,8 @@ _TOO_LARGE: Final = KeptValues(wrong=f"its values are larger than {MOST_BYTES //
 
 
 def kept_in(keepers: Mapping[int, bytes]) -> KeptValues:
-    """Return the values that keepers hold. `keepers`: the text of the `input_parameters` of each, as an
-    engine wrote it, by number. They come from machines that anybody may own."""
+    """Return the values that keepers hold. `keepers`: the text of the `input_parameters` of each,
+    as an engine wrote it, by number. The texts come from machines that are not trusted."""
     if sum(map(len, keepers.values())) > _MOST_TEXT:
         return _TOO_LARGE
     found: dict[str, str] = {}
@@ -195,8 +199,8 @@ def kept_in(keepers: Mapping[int, bytes]) -> KeptValues:
 
 
 def is_given(text: bytes) -> bool:
-    """Return whether a keeper, whose `input_parameters` an engine wrote like this, may run after all,
-    or cannot be read."""
+    """Return whether a keeper may run after all, or cannot be read. `text`: its `input_parameters`
+    as an engine wrote them."""
     try:
         never = _INPUTS.decode(text).get(NEVER)
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -210,7 +214,8 @@ def as_json(value: Any) -> str:
 
 
 def value_arrows(graph: Graph) -> Iterator[tuple[Relation, dict[str, str]]]:
-    """Yield each arrow that hands values from action to action, with these outputs and their types."""
+    """Yield each arrow that hands values from action to action, with the names of these outputs and
+    their types."""
     actions = {action.key: action for action in graph.actions if not action.missing}
     for relation in graph.relations:
         parent, child = actions.get(relation.parent), actions.get(relation.child)
@@ -231,13 +236,14 @@ def value_arrows(graph: Graph) -> Iterator[tuple[Relation, dict[str, str]]]:
 
 
 def takes(relation: Relation, outcomes: tuple[Precondition, ...] = PRECONDITIONS) -> bool:
-    """Return whether the child takes values of its parent after one of these outcomes."""
+    """Return whether the child of an arrow takes values of its parent after any of these outcomes."""
     return any(relation.conditions.answer(outcome) in _TAKEN for outcome in outcomes)
 
 
 def taken_on_false(graph: Graph, arrows: ValueArrows) -> frozenset[Key]:
-    """Return the keys of the actions whose values somebody takes after they have ended with false. The
-    exit of a graph takes those of the actions before it. `arrows`: all that hand values on."""
+    """Return the keys of the actions whose values another action, or the exit of the graph, takes
+    after they have ended with false. `arrows`: all that hand values on, as `value_arrows` yields.
+    """
     handed = {each.parent for each, _ in arrows}
     taking = [each for each, _ in arrows]
     taking += [each for each in graph.relations if each.child == EXIT and each.parent in handed]
@@ -245,8 +251,8 @@ def taken_on_false(graph: Graph, arrows: ValueArrows) -> frozenset[Key]:
 
 
 def receiving(graph: Graph, arrows: ValueArrows) -> dict[Key, frozenset[str]]:
-    """Return the flat names of the inputs that an arrow may hand a value to, by key of their action.
-    `arrows`: all that hand values on."""
+    """Return the flat names of the inputs to which an arrow may hand a value, by key of their
+    action. `arrows`: all that hand values on, as `value_arrows` yields."""
     actions = {action.key: action for action in graph.actions if not action.missing}
     found: dict[Key, set[str]] = {}
     for relation, _ in arrows:
@@ -261,8 +267,9 @@ def receiving(graph: Graph, arrows: ValueArrows) -> dict[Key, frozenset[str]]:
 def unreadable_arrows(
     graph: Graph, arrows: ValueArrows
 ) -> Iterator[tuple[Relation, dict[str, str], str]]:
-    """Yield each arrow whose values cannot be handed from one piece to another, with its outputs and
-    their types, and the reason as the end of a sentence. `arrows`: all that hand values on."""
+    """Yield each arrow whose values cannot be handed from one piece to another, with its outputs
+    and their types, and the reason as the end of a sentence. `arrows`: all that hand values on, as
+    `value_arrows` yields."""
     actions = {action.key: action for action in graph.actions if not action.missing}
     stopped = {
         each.child
@@ -291,6 +298,6 @@ def unreadable_arrows(
 
 
 def names_in_words(names: Collection[str]) -> str:
-    """Return the names of parameters in words, the first three of them."""
+    """Return the names of parameters for a sentence: the first three, and how many more."""
     more = f" and {len(names) - 3} more" if len(names) > 3 else ""
     return ", ".join(f"“{name}”" for name in list(names)[:3]) + more

@@ -31,10 +31,8 @@ class Laps(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def laps(graph: Graph, *, inside: bool = False) -> Laps:
-    """Return how often the actions of a graph can run, as far as its arrows tell. Never raises.
-
-    `inside`: True for a graph that runs as a sub-graph of another one.
-    """
+    """Return how often the actions of a graph can run, as far as its arrows show; no graph makes it
+    fail. `inside`: True for a graph that runs as a sub-graph of another one."""
     if _stops(graph):
         return Laps(stops=True)
     known = _walked(graph)
@@ -49,9 +47,9 @@ def laps(graph: Graph, *, inside: bool = False) -> Laps:
 
 
 def repeated(graph: Graph) -> set[Key]:
-    """Return the keys of the actions that can run more than once, as far as the arrows tell: they
-    are spontaneous, several parents may start them one after the other, or they lie on or after
-    such actions or a loop.
+    """Return the keys of the actions of a graph that can run more than once, as far as its arrows
+    show: they are spontaneous, several parents may start them one after the other, or they lie on
+    or after such actions or a loop.
 
     Unlike `laps`, this does not take stops for failures: a stop ends a run and begins none.
     """
@@ -71,13 +69,10 @@ def _needs(
     graph: Graph, once: Collection[str], names: Mapping[str, int]
 ) -> Iterator[tuple[str, str, int]]:
     """Yield (action, parent, count), with full names, for each action that only this one parent
-    starts. The entry starts the action `count` times in addition, as in `Laps.needs`.
-
-    `once`: full names of actions to leave out. `names`: how many actions have each full name; a
-    name that several actions have is left out. An action is also left out if a bypass of its parent
-    could start it: the parent then does not run, but passes on an outcome for which the action
-    runs.
-    """
+    starts. The entry starts the action `count` times in addition, as in `Laps.needs`. `once`: full
+    names of actions to skip. `names`: how many actions have each full name; a name that several
+    actions have is skipped. So is an action that a bypass of its parent could start: the parent
+    then does not run, but passes on an outcome for which the action runs."""
     called = {each.key: each.full_name for each in graph.actions if names[each.full_name] == 1}
     arriving: dict[Key, list[Relation]] = {}
     for arrow in graph.relations:
@@ -115,11 +110,9 @@ def _stops(graph: Graph) -> bool:
 
 
 def _walked(graph: Graph) -> dict[Key, bool]:
-    """Return the actions that end at most once, by key. The value tells whether this holds only as
-    long as no action fails.
-
-    Spontaneous actions, actions on a loop, and actions after either are not in the result.
-    """
+    """Return the actions that end at most once, by key; the value is True if this holds only as
+    long as no action fails. Spontaneous actions, actions on a loop, and actions after either are
+    not in the result."""
     lively = {each.key for each in graph.actions if each.type == "spontaneous"}
     arriving: dict[Key, list[Relation]] = {each.key: [] for each in graph.actions}
     leaving: dict[Key, list[Key]] = {}
@@ -143,8 +136,8 @@ def _walked(graph: Graph) -> dict[Key, bool]:
 
 
 def _joined(arrows: Sequence[Relation]) -> bool | None:
-    """Return whether an action waits for several parents, given all arrows that lead to it; None if
-    these arrows may let it end more than once."""
+    """Return whether an action waits for several parents. `arrows`: all that lead to it. None if
+    they may let it end more than once."""
     live = [each for each in arrows if any(_live(each, outcome) for outcome in PRECONDITIONS)]
     if len(live) <= 1:
         return False

@@ -24,9 +24,10 @@ _KEY: Final = "\N{SYMBOL FOR NULL}"
 
 
 def as_one_step(graph: Graph, problems: Sequence[Problem], facts: EngineFacts) -> dict[str, str]:
-    """Return, by code of a problem, a sentence that names the actions of which a sub-graph would take
-    the first such problem away; empty where none is known. `graph`: has the robot of each action as
-    its actor; `problems`: those of leading it (`led_problems`)."""
+    """Return, by code of a problem, a sentence that names actions which, moved into a sub-graph,
+    would take the first problem of that code away. A code is missing if no such actions were found.
+    `graph`: has the robot of each action as its actor; `problems`: as `led_problems` returns;
+    `facts`: the engine build."""
     found: dict[str, str] = {}
     if len(graph.actions) > _LARGEST:
         return found
@@ -44,7 +45,7 @@ def as_one_step(graph: Graph, problems: Sequence[Problem], facts: EngineFacts) -
 
 
 def _candidates(graph: Graph, problem: Problem) -> Iterator[frozenset[Key]]:
-    """Yield sets of actions of one robot that may make one step without this problem, small ones
+    """Yield sets of actions of one robot which, as one step, may not have this problem, small sets
     first."""
     actions = {each.key: each for each in graph.actions if not each.missing}
     keys = [each for each in (problem.where.aid, *(w.aid for w in problem.also)) if each in actions]
@@ -63,7 +64,8 @@ def _candidates(graph: Graph, problem: Problem) -> Iterator[frozenset[Key]]:
 
 
 def _circles(graph: Graph, actions: Mapping[Key, Action]) -> Iterator[set[Key]]:
-    """Yield the sets of actions that lie on a loop together; an action without one is alone."""
+    """Yield the sets of actions (by key) that lie on a loop together; an action on no loop is a set
+    alone."""
     keys = list(actions)
     place = {key: number for number, key in enumerate(keys)}
     ways: list[list[int]] = [[] for _ in keys]
@@ -75,7 +77,8 @@ def _circles(graph: Graph, actions: Mapping[Key, Action]) -> Iterator[set[Key]]:
 
 
 def _neighbours(graph: Graph, own: set[Key]) -> Iterator[set[Key]]:
-    """Yield the sets of these actions that arrows connect, directly or by others of them."""
+    """Yield the sets of those actions in `own` that arrows connect, directly or over other actions
+    in `own`."""
     left = set(own)
     while left:
         seen, open_ = set[Key](), [left.pop()]
@@ -91,7 +94,7 @@ def _neighbours(graph: Graph, own: set[Key]) -> Iterator[set[Key]]:
 
 def _helps(graph: Graph, chosen: frozenset[Key], code: str, facts: EngineFacts) -> bool:
     """Return whether the graph does the same with the actions `chosen` in a sub-graph, and the
-    action that stands for them has no problem with this code."""
+    action that stands for that has no problem with this code. `facts`: the engine build."""
     found = extracted(graph, chosen, _NAME, _KEY, budget=_BUDGET)
     if not isinstance(found, Extracted) or found.differences:
         return False

@@ -47,15 +47,16 @@ class StatesInside(msgspec.Struct, frozen=True):
 
 def actors_of(action: Action, inside: Inside) -> frozenset[str]:
     """Return the actors that carry out an action: its own, or those of the actions inside for which
-    it stands. An action inside that names no actor is carried out by the actor of the action around
-    it; "" is the actor of those around which none is named."""
+    it stands. `inside`: all graphs by name. An action inside that names no actor belongs to the
+    actor of the action around it; "" stands for an actor that is not named at all."""
     found = frozenset(each for each, _ in _played(action, inside))
     return found or frozenset({action.actor})
 
 
 def _played(action: Action, inside: Inside) -> Iterator[tuple[str, str]]:
-    """Yield the actor and the full name of each action that is code, from an action inwards. A graph
-    that stands at several positions is read once for each actor around it."""
+    """Yield the actor and the full name of each action with code of its own, from an action
+    inwards. `inside`: all graphs by name. A graph that stands at several positions is read once for
+    each actor around it."""
     read: set[tuple[str, str]] = set()  # graphs, each with the actor around it
     left = [(action, "")]
     while left:
@@ -70,14 +71,15 @@ def _played(action: Action, inside: Inside) -> Iterator[tuple[str, str]]:
 
 
 def actors_in(graph: Graph, inside: Inside) -> frozenset[str]:
-    """Return the actors of a graph, "" for actions without one, with those of the actions inside."""
+    """Return the actors of a graph and of the graphs inside, "" for actions without one."""
     real = (action for action in graph.actions if not action.missing)
     return frozenset[str]().union(*(actors_of(action, inside) for action in real))
 
 
 def players(graph: Graph, inside: Inside, robots: Mapping[str, str]) -> dict[str, str]:
-    """Return the robot of each action by full name. `robots`: the robot of each actor. An action
-    whose actions inside several robots play is left out."""
+    """Return the robot of each action of a graph by full name. `robots`: the robot of each actor;
+    `inside`: the sub-graphs by name. An action that stands for actions of several robots is
+    missing."""
     found: dict[str, str] = {}
     for action in graph.actions:
         chosen = (
@@ -89,7 +91,7 @@ def players(graph: Graph, inside: Inside, robots: Mapping[str, str]) -> dict[str
 
 
 def graphs_within(action: Action, inside: Inside) -> frozenset[str]:
-    """Return the names of all graphs inside of an action; empty if it stands for none."""
+    """Return the names of all graphs inside of an action; empty if it stands for no graph."""
     found: set[str] = set()
     left = [action.name]
     while left:
@@ -103,8 +105,8 @@ def graphs_within(action: Action, inside: Inside) -> frozenset[str]:
 def subgraph_obstacles(
     graph: Graph, inside: Inside, robots: Mapping[str, str]
 ) -> tuple[Obstacle, ...]:
-    """Return the reasons why sub-graphs of a graph cannot go as pieces: several robots play them.
-    `robots`: the robot of each actor."""
+    """Return the reasons why sub-graphs of a graph cannot run as pieces: several robots play their
+    actions. `robots`: the robot of each actor; `inside`: the sub-graphs by name."""
     shared = [
         action
         for action in graph.actions
@@ -125,7 +127,7 @@ def subgraph_obstacles(
 
 
 def _who(action: Action, inside: Inside, robots: Mapping[str, str]) -> str:
-    """Return which robot plays which actions inside of an action, for a sentence."""
+    """Return, for a sentence, which robot plays which actions inside of an action."""
     names: dict[str, list[str]] = {}
     for robot, name in dict.fromkeys((robots[by], name) for by, name in _played(action, inside)):
         names.setdefault(robot, []).append(name)
@@ -138,7 +140,8 @@ def _who(action: Action, inside: Inside, robots: Mapping[str, str]) -> str:
 
 
 def _remedy(graph: Graph, inside: Inside) -> str:
-    """Return what to do about sub-graphs of several robots, as a sentence."""
+    """Return the sentence that says what to do about sub-graphs of several robots: flatten the
+    graph, if that is possible."""
     flat = flattened(graph, inside, budget=_BUDGET)
     if isinstance(flat, Flattened):
         return "Make one graph without graphs inside of it, and start that: it does the same."
@@ -161,12 +164,11 @@ def outcome_of_subgraph(
     seen: StatesInside,
     inside: Inside,
 ) -> Precondition | None:
-    """Return the outcome of a piece that is a sub-graph; None where its states tell none.
-
-    `piece`: the name under which it ran; `states`: those of the piece and of its action. The result
-    of a graph is that of the action which reached its exit. That action is not known, so that the
-    outcome counts only if every action that may have been it has the same one.
-    """
+    """Return the outcome of a piece that is a sub-graph; None where its states do not show it.
+    `piece`: the name under which it ran; `states`: of the piece and of its action; `seen`: of the
+    graphs and actions inside; `inside`: the graphs by name. The result of a graph is the result of
+    the action which reached its exit. Which one did is unknown, so the outcome counts only if every
+    action that may have done so has the same one."""
     by_states = outcome_of(*states)
     may_be = _results_of(_part_of(piece, action), action.name, seen, inside, 0)
     match by_states:
@@ -186,7 +188,8 @@ def _part_of(around: str, action: Action) -> str:
 def _results_of(
     part: str, name: str, seen: StatesInside, inside: Inside, depth: int
 ) -> frozenset[Precondition]:
-    """Return the results that the graph `name` can have had, which ran as `part`."""
+    """Return the results that the graph `name`, which ran as `part`, can have had by the states
+    `seen`. `inside`: the graphs by name; `depth`: the number of graphs around."""
     match seen.graphs.get(part):
         case "FINISHED" if depth < _DEEPEST:
             pass
@@ -217,7 +220,8 @@ def _results_of(
 def _ends_of(
     part: str, action: Action, seen: StatesInside, inside: Inside, depth: int, *, stops: bool
 ) -> frozenset[Precondition]:
-    """Return the outcomes that the last visit of an action can have had, by its state at the end."""
+    """Return the outcomes that the last visit of an action in the graph that ran as `part` can have
+    had, by its state at the end (`seen`). `stops`: an arrow of the graph stops actions."""
     if action.type == "spontaneous":
         return _ANY
     match seen.actions.get(f"{part}/{action.full_name}"):
@@ -236,8 +240,9 @@ def _ends_of(
 def _with_bypassed(
     graph: Graph, ends: Mapping[Key, frozenset[Precondition]], again: Collection[Key]
 ) -> dict[Key, frozenset[Precondition]]:
-    """Return the outcomes that each action can have passed on: its own, and those that went past it.
-    An action in a loop (`again`) can have had any outcome before its last one."""
+    """Return the outcomes that each action can have passed on: its own (`ends`, by key), and those
+    by which it was bypassed. An action in a loop (`again`) can have had any outcome before its last
+    one."""
     passed = dict(ends)
     arrows = [
         (each.parent, each.child, outcome)

@@ -88,7 +88,7 @@ class Action(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def full_name(self) -> str:
-        """The name by which the engine knows the action."""
+        """The name by which the engine knows the action: its name, `_`, and its number."""
         return f"{self.name}_{self.instance_id}"
 
 
@@ -196,11 +196,8 @@ class Problem(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Note(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """A remark on something in a text that was translated or left out when it was read.
-
-    `times` counts how often that was, `where` is the first place and `also` are the others (the
-    first thousand of them).
-    """
+    """A remark on something in a text that was translated or dropped when it was read. `times`: how
+    often that was; `where`: the first place; `also`: the others (the first thousand of them)."""
 
     message: str
     where: Where

@@ -20,11 +20,9 @@ def flatten(group: dict[str, Json]) -> tuple[Parameter, ...]:
 
 
 def nest(parameters: Iterable[Parameter]) -> dict[str, Json]:
-    """Return the nested form, the inverse of `flatten`.
-
-    If one path lies inside another, the shorter one is kept; paths longer than `MAX_PATH` are left
-    out.
-    """
+    """Return parameters in the nested form of a file, the inverse of `flatten`. If the path of one
+    lies inside that of another, the one with the shorter path stays; paths with more than
+    `MAX_PATH` keys are dropped."""
     root: dict[str, Json] = {}
     listed = [(keys_of(p.path), p.text) for p in parameters]
     listed = [(keys, text) for keys, text in listed if len(keys) <= MAX_PATH]
@@ -42,7 +40,7 @@ def nest(parameters: Iterable[Parameter]) -> dict[str, Json]:
 
 
 def keys_of(path: str) -> tuple[str, ...]:
-    """Split the path of a parameter into its keys, without escapes."""
+    """Split the path of a parameter into its keys, unescaped."""
     return tuple(part.replace("~1", "/").replace("~0", "~") for part in path.split("/"))
 
 

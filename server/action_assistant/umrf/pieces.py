@@ -46,9 +46,9 @@ class Obstacle(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def piece_name(graph: str, action: str, visit: str = "") -> str:
-    """Return the name under which a robot runs the piece of an action. `action`: its full name;
-    `visit`: tells the visits apart where each has a name of its own. A sub-graph of the whole graph
-    never has this name."""
+    """Return the name under which a robot runs the piece of an action. `graph`: the name of the
+    whole graph; `action`: the full name; `visit`: an id that distinguishes the visits if each needs
+    a name of its own, else "". No sub-graph of the whole graph has this name."""
     return f"{graph}--{action}--v{visit}" if visit else f"{graph}--{action}"
 
 
@@ -67,14 +67,14 @@ def piece_of(graph: Graph, action: Action, visit: str = "") -> Graph:
 
 
 def outcome_of(graph_state: str | None, action_state: str) -> Precondition | None:
-    """Return the outcome that the states of a piece tell; None while it is not over, and for states
-    that tell no outcome, such as ERROR of the graph."""
+    """Return the outcome of a piece by the states of its graph and action; None while it is not
+    over, and for states that show no outcome, such as ERROR of the graph."""
     return _OUTCOMES.get((graph_state or "", action_state))
 
 
 def obstacles(graph: Graph) -> tuple[Obstacle, ...]:
-    """Return the reasons why a graph cannot run as pieces, except those of its sub-graphs
-    (`subgraph_obstacles`); empty if it can."""
+    """Return the reasons why a graph cannot run as pieces; empty if it can. Sub-graphs are checked
+    by `subgraph_obstacles`."""
     return (
         *_values_across(graph),
         *_spontaneous(graph),
@@ -83,8 +83,8 @@ def obstacles(graph: Graph) -> tuple[Obstacle, ...]:
 
 
 def handed_by(graph: Graph, actions: Collection[Key]) -> tuple[Obstacle, ...]:
-    """Return the arrows by which these actions, given by key, hand values to others: they need the
-    helper package on the robot that carries them out."""
+    """Return an obstacle for each arrow by which one of these actions (keys) hands values to
+    others: that needs the helper package on the robot that carries them out."""
     return tuple(
         Obstacle(code="values-across", text=_hands(graph, arrow, handed), aid=arrow.child)
         for arrow, handed in value_arrows(graph)
@@ -93,14 +93,15 @@ def handed_by(graph: Graph, actions: Collection[Key]) -> tuple[Obstacle, ...]:
 
 
 def _values_across(graph: Graph) -> Iterator[Obstacle]:
-    """Yield each arrow whose values no helper package can hand from one piece to another."""
+    """Yield an obstacle for each arrow whose values cannot be handed from one piece to another even
+    with the helper package."""
     for arrow, handed, why in unreadable_arrows(graph, tuple(value_arrows(graph))):
         text = f"{_hands(graph, arrow, handed)}: {why}"
         yield Obstacle(code="values-across", text=text, aid=arrow.child)
 
 
 def _hands(graph: Graph, arrow: Relation, outputs: Collection[str]) -> str:
-    """Return in words that an arrow hands these outputs on."""
+    """Return in words that an arrow hands these outputs on, with the names of both actions."""
     names = {action.key: action.full_name for action in graph.actions}
     return f"{names[arrow.parent]} hands {names_in_words(outputs)} to {names[arrow.child]}"
 
@@ -116,7 +117,8 @@ def _spontaneous(graph: Graph) -> Iterator[Obstacle]:
 
 
 def _pauses(graph: Graph) -> Iterator[Obstacle]:
-    """Yield each arrow that pauses an action, which no engine does safely for one piece."""
+    """Yield an obstacle for each arrow that pauses an action: no engine does that safely for one
+    piece."""
     actions = {action.key: action for action in graph.actions if not action.missing}
     for relation in graph.relations:
         child, conditions = actions.get(relation.child), relation.conditions

@@ -133,8 +133,8 @@ def _misfits(
 
 
 def _hands_over(relation: Relation) -> bool:
-    """Return whether a parent's outputs are handed over along an arrow: it must respond to some
-    outcome, other than by a bypass."""
+    """Return whether an arrow hands its parent's outputs over: it responds to some outcome other
+    than by a bypass."""
     if relation.only is not None or relation.listing or relation.parent == ENTRY:
         return False
     return any(relation.conditions.answer(o) not in {"ignore", "bypass"} for o in PRECONDITIONS)

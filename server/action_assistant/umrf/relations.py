@@ -28,11 +28,9 @@ assert set(_RESPONSES) == set(get_args(Response))
 
 
 def condition_of(text: Json) -> tuple[Precondition, Response] | None:
-    """Parse a condition such as `"on_true -> run"` into outcome and response; return None if the
-    engine refuses it.
-
-    Like the engine, ignore blanks, and everything after a second arrow; tabs are not ignored.
-    """
+    """Parse a condition of a file, such as `"on_true -> run"`, into outcome and response; return
+    None if the engine refuses it. Like the engine, ignore blanks, and everything after a second
+    arrow; tabs are not ignored."""
     if not isinstance(text, str):
         return None
     parts = _ARROW.split(text.replace(" ", ""))
@@ -44,8 +42,8 @@ def condition_of(text: Json) -> tuple[Precondition, Response] | None:
 
 
 def conditions_of(value: Json) -> tuple[Conditions, bool]:
-    """Return the conditions that a list of texts sets, and whether the engine could read the whole
-    list. Outcomes that the list lacks have the engine's default response."""
+    """Return the conditions that a list of texts in a file sets, and whether the engine could read
+    the whole list. Outcomes that the list lacks have the engine's default response."""
     conditions = ENGINE_DEFAULTS
     if not isinstance(value, list):
         return conditions, False
@@ -65,8 +63,8 @@ def conditions_text(conditions: Conditions) -> list[Json]:
 
 
 def remap_of(value: Json) -> tuple[tuple[Remap, ...], bool, bool]:
-    """Return the renamings that a list spells, whether the engine accepts the list, and whether no
-    item has members beyond `from` and `to`."""
+    """Return the renamings that a list in a file spells (() if the engine refuses it), whether the
+    engine accepts the list, and whether its items have no members beyond `from` and `to`."""
     if not isinstance(value, list):
         return (), False, False
     found: dict[str, Remap] = {}
@@ -83,8 +81,8 @@ def remap_of(value: Json) -> tuple[tuple[Remap, ...], bool, bool]:
 
 
 def whole_of(value: Json) -> tuple[int, bool]:
-    """Return the number that the engine reads from an `instance_id`, and whether the given value is
-    valid: a whole number that is not negative."""
+    """Return the number that the engine reads from an `instance_id` of a file, and whether that
+    value is valid: a whole number that is not negative."""
     match value:
         case Number(text=text):
             exact = text.lstrip("-").isdigit()

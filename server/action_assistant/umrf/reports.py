@@ -35,14 +35,14 @@ class Notes:
         self._times: Counter[str] = Counter()
 
     def add(self, message: str, path: str) -> None:
-        """Note that something was done with the value at `path`, a JSON pointer."""
+        """Add the remark `message` about the value at `path`, a JSON pointer."""
         places = self._places.setdefault(message, [])
         if len(places) < MAX_EACH:
             places.append(Where(path=path))
         self._times[message] += 1
 
     def all(self) -> tuple[Note, ...]:
-        """Return all notes in the order in which their messages first occurred."""
+        """Return all remarks in the order in which their messages first occurred."""
         return tuple(self._all())
 
     def _all(self) -> Iterator[Note]:

@@ -18,11 +18,9 @@ def signature_of(action: Action) -> Signature:
 
 
 def signature_of_graph(graph: Graph) -> Signature:
-    """Return the inputs and outputs that a graph has as a sub-graph.
-
-    The inputs are those inputs of its entry actions that have no value. The outputs are those of
-    the last exit action that has any outputs.
-    """
+    """Return the inputs and outputs that a graph has as a sub-graph. Its inputs are the inputs of
+    its entry actions that have no value. Its outputs are those of the last exit action that has any
+    outputs."""
     by_key = {action.key: action for action in graph.actions if not action.missing}
     inputs: dict[str, str] = {}
     optional: frozenset[str] = frozenset()
@@ -40,10 +38,8 @@ def signature_of_graph(graph: Graph) -> Signature:
 
 def action_of_graph(graph: Graph) -> Action:
     """Return an action that stands for this graph in another graph, with the parameters of
-    `signature_of_graph`. Its key is empty.
-
-    An input that several entry actions have is required if any of these actions requires it.
-    """
+    `signature_of_graph`. Its key is empty. An input that several entry actions have is required if
+    any of them requires it."""
     by_key = {action.key: action for action in graph.actions if not action.missing}
     inputs: dict[str, Parameter] = {}
     outputs: tuple[Parameter, ...] = ()
@@ -67,8 +63,8 @@ def action_of_graph(graph: Graph) -> Action:
 
 
 def with_inputs(graph: Graph) -> Graph:
-    """Return the graph in which the entry actions require no input, as if a graph around it had
-    given the missing values."""
+    """Return the graph in which the entry actions require no input, as if a graph around it handed
+    them the missing values."""
     entries = {relation.child for relation in graph.relations if relation.parent == ENTRY}
     actions = tuple(
         msgspec.structs.replace(action, inputs=tuple(map(_not_required, action.inputs)))

@@ -76,12 +76,9 @@ class SeenAfter(msgspec.Struct, frozen=True):
 
 
 def triggers_of(graph: Graph, *, exits_known: bool) -> Triggers:
-    """Return the arrows of a graph with the facts of `Triggers`.
-
-    `exits_known`: True if the graph was read from a text with the responses of the graph's exit.
-    The text that an engine prints lacks these responses, and does not say which inputs are
-    required.
-    """
+    """Return the arrows of a graph with facts about how often they trigger actions. `exits_known`:
+    True if the graph was read from a text with the responses of the graph's exit. The text that an
+    engine prints lacks them, and does not say which inputs are required."""
     names = {each.key: each.full_name for each in graph.actions if not each.missing}
     names |= {ENTRY: ENTRY, EXIT: EXIT}
     arrows = tuple(
@@ -140,7 +137,8 @@ def _given(parent: Action, arrow: Relation, child: Action) -> set[str]:
 
 
 def _has_one_consequence(arrows: tuple[TriggerArrow, ...]) -> bool:
-    """Return whether each outcome of each action starts, bypasses or ends at most one thing."""
+    """Return whether each outcome of each action starts, bypasses or ends at most one other thing
+    by these arrows."""
     found: set[tuple[str, Precondition]] = set()
     for arrow in arrows:
         outcomes = PRECONDITIONS[:1] if arrow.parent == ENTRY else PRECONDITIONS
@@ -162,11 +160,9 @@ def may_be_loading(
     parts: Collection[str] = (),
 ) -> tuple[str, ...]:
     """Return the full names of actions that may have been triggered although they have not begun,
-    in a graph of which no action moves.
-
-    `states`: the state of each action, by full name. `seen`: earlier observations of this graph.
-    `parts`: full names of the actions that are sub-graphs.
-    """
+    in a graph of which no action moves. `known`: the arrows of the graph. `states`: the state of
+    each action, by full name. `seen`: earlier observations of this graph. `parts`: full names of
+    the actions that are sub-graphs."""
     idle = {name for name, state in states.items() if state in NEVER_BEGAN}
     if not idle or graph_state in NEVER_BEGAN:
         return ()
@@ -206,8 +202,8 @@ class _Reports:
             self._report(name, outcome)
 
     def triggers(self, name: str) -> bool:
-        """Return whether some reported outcome runs this action, and all required parents of the
-        action have reported."""
+        """Return whether some reported outcome runs the action `name`, and all its required parents
+        have reported."""
         if name not in self._run:
             return False
         needed = (each.parent for each in self._arriving.get(name, ()) if each.required)
@@ -222,8 +218,8 @@ class _Reports:
                 yield name, outcome
 
     def _outcomes(self, name: str, state: str) -> _Outcomes:
-        """Return the outcomes that an action may have reported, which has begun and is now in this
-        state."""
+        """Return the outcomes that the action `name` may have reported, which has begun and is now
+        in this state."""
         if name not in self._once or name in self._parts:
             return _ALL
         possible = frozenset[Precondition](

@@ -191,8 +191,8 @@ export interface EditorApi {
     };
     /**
      * CallingUses
-     * @description A request to rename the actions called `before` in these graphs to `name`, after the graph
-     *     that they stand for was renamed.
+     * @description A request to rename the actions called `before` in `graphs` to `name`, after the graph that
+     *     they stand for was renamed.
      */
     CallingUses: {
         before: string;
@@ -217,10 +217,10 @@ export interface EditorApi {
     };
     /**
      * Changes
-     * @description The changes of somebody. `comments`: the number of threads with new comments. `overwritten`: the values
-     *     that this person set while somebody else, without knowing of it, set those that stayed: each as the
-     *     difference between what this person wanted (`before`) and what stayed (`after`). Of notes the text that this
-     *     person wanted.
+     * @description The changes of one person. `comments`: the number of threads with new comments.
+     *     `overwritten`: the values that this person set while another, without knowing of it, set the
+     *     values that stayed: each as the difference between what this person wanted (`before`) and what
+     *     stayed (`after`). Of notes the text that this person wanted.
      */
     Changes: {
         /** @default [] */
@@ -285,7 +285,7 @@ export interface EditorApi {
     };
     /**
      * Describing
-     * @description A new name or description of a graph. A field that is left out does not change.
+     * @description A new name or description of a graph. A missing field does not change.
      */
     Describing: {
         /** @default null */
@@ -466,8 +466,9 @@ export interface EditorApi {
     };
     /**
      * Extracting
-     * @description A request to move actions into a new sub-graph called `name`. `seq`: the change of the graph that the
-     *     page shows, the newest if left out. `otherwise`: do it even if the graph may then behave otherwise.
+     * @description A request to move actions into a new sub-graph called `name`. `seq`: the change of the graph
+     *     that the page shows, the newest if missing. `otherwise`: do it even if the graph may then behave
+     *     otherwise.
      */
     Extracting: {
         actions: string[];
@@ -1123,10 +1124,8 @@ export interface EditorApi {
     };
     /**
      * Note
-     * @description A remark on something in a text that was translated or left out when it was read.
-     *
-     *     `times` counts how often that was, `where` is the first place and `also` are the others (the
-     *     first thousand of them).
+     * @description A remark on something in a text that was translated or dropped when it was read. `times`: how
+     *     often that was; `where`: the first place; `also`: the others (the first thousand of them).
      */
     Note: {
         message: string;
@@ -1393,7 +1392,8 @@ export interface EditorApi {
     };
     /**
      * Publishing
-     * @description A request to publish a version. `seq`: the change of the graph to publish, the newest if left out.
+     * @description A request to publish a version. `seq`: the change of the graph to publish, the newest if
+     *     missing.
      */
     Publishing: {
         /** @default  */
@@ -1621,8 +1621,8 @@ export interface EditorApi {
     };
     /**
      * TakingOver
-     * @description The graph with the use whose parameters the library takes over, and the `aid` of that action;
-     *     if missing, the first use that differs.
+     * @description The graph with the use whose parameters the library takes over, and the key (`aid`) of that
+     *     action; if missing, the first use that differs.
      */
     TakingOver: {
         graph: string;
@@ -1641,9 +1641,9 @@ export interface EditorApi {
     };
     /**
      * UnpackingAction
-     * @description A request to replace an action by the actions of the graph that it stands for. `seq`: the change of the
-     *     graph that the page shows, the newest if left out. `at`: where the action is drawn, if it has no stored
-     *     position.
+     * @description A request to replace an action by the actions of the graph that it stands for. `seq`: the
+     *     change of the graph that the page shows, the newest if missing. `at`: where the action is drawn,
+     *     if it has no stored position.
      */
     UnpackingAction: {
         action: string;

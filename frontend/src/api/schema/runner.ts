@@ -129,8 +129,8 @@ export interface RunnerApi {
     };
     /**
      * ArchiveRequest
-     * @description A request to archive runs and raw messages that are older than so many days; null archives
-     *     none.
+     * @description A request to archive runs and raw messages that ended more than so many days ago; null
+     *     archives none.
      */
     ArchiveRequest: {
         /** @default null */
@@ -178,8 +178,8 @@ export interface RunnerApi {
     };
     /**
      * AtRestShown
-     * @description The observation of rest where no answer of the engine could prove it: by whom (null: the
-     *     runner saw the engine's process end), when, and how.
+     * @description The observation that a run is at rest, where no answer of the engine could prove it: by whom
+     *     (null: the runner saw the engine's process end), when, and how.
      */
     AtRestShown: {
         by: RunnerApi["Author"] | null;
@@ -278,8 +278,8 @@ export interface RunnerApi {
     };
     /**
      * Candidate
-     * @description An engine that discovery shows. `actor`: "" until its feedback was heard, since an engine
-     *     without a running graph does not say its name; a person has to know it then.
+     * @description An engine that discovery shows. `actor`: its name, "" until its feedback was received, since
+     *     an engine without a running graph does not send its name; a person has to know it then.
      */
     Candidate: {
         domain: number;
@@ -608,9 +608,9 @@ export interface RunnerApi {
     };
     /**
      * IndexFolderState
-     * @description The folder that the robot's engine indexes, as the runner sees it. `writable`: graphs that
-     *     can be written there; `waiting`: graphs whose file exists and that the engine has not indexed
-     *     yet; `hindered`: why other graphs cannot be written, as sentences by graph.
+     * @description The folder of files that the robot's engine indexes, as the runner sees it. `writable`:
+     *     graphs that can be written there; `waiting`: graphs whose file exists and that the engine has
+     *     not indexed yet; `hindered`: why other graphs cannot be written, as sentences by graph.
      */
     IndexFolderState: {
         path: string;
@@ -841,8 +841,8 @@ export interface RunnerApi {
     };
     /**
      * Overridden
-     * @description A problem that would have blocked a start, worded as in its pre-flight. `aid` and `path` are
-     *     its place in the graph that was sent.
+     * @description A problem that would have blocked a start, with the words of its pre-flight. `aid` (the key
+     *     of the action) and `path` are its place in the graph that was sent.
      */
     Overridden: {
         code: string;
@@ -1134,7 +1134,7 @@ export interface RunnerApi {
     };
     /**
      * ReplayHead
-     * @description The fields of a run that one event changed; the others are left out.
+     * @description The fields of a run that one event changed; unchanged fields are absent.
      */
     ReplayHead: {
         /** @enum {string} */
@@ -1272,13 +1272,14 @@ export interface RunnerApi {
     };
     /**
      * RobotRestShown
-     * @description The knowledge about the rest of one robot of a conducted run. `state`: nothing of the run was
-     *     ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is proven
-     *     ("stopping"), it does not answer ("silent"), no answer can prove rest any more ("unproven"), an
-     *     answer has proven it ("proven"), somebody or something has seen it ("seen"), nothing of the last
-     *     action began ("unsent"), or nothing was recorded of it ("unknown"). `since`: when that began;
-     *     `action`, `piece`: the action and the run of its piece; `why`: the reason, or how rest was seen;
-     *     `by`: who has seen it; `stops`: a Stop is asked for, and repeated until rest is proven.
+     * @description The state of the proof that one robot of a conducted run is at rest. `state`: nothing of the
+     *     run was ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is
+     *     proven ("stopping"), it does not answer ("silent"), no answer can prove rest any more
+     *     ("unproven"), an answer has proven it ("proven"), a person or the runner has seen it ("seen"),
+     *     nothing of the last action began ("unsent"), or nothing was recorded of it ("unknown"). `since`:
+     *     when that began; `action`, `piece`: the action and the run of its piece; `why`: the reason, or
+     *     how rest was seen; `by`: who has seen it; `stops`: a Stop is asked for, and repeated until rest
+     *     is proven.
      */
     RobotRestShown: {
         robot: string;
@@ -1374,8 +1375,8 @@ export interface RunnerApi {
     /**
      * RunShown
      * @description A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
-     *     robot whose engine the simulator plays; `behaviours`: whether its actions have Python behaviours;
-     *     `rests`: of a conducted run, what is known of the rest of each robot.
+     *     robot whose engine the simulator plays; `behaviours`: whether its actions have Python
+     *     behaviours; `rests`: of a conducted run, how far each robot is proven to be at rest.
      */
     RunShown: {
         id: string;
@@ -1526,7 +1527,7 @@ export interface RunnerApi {
     RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
      * SaidShown
-     * @description The word of a person for the result of a visit.
+     * @description A person's statement of the result of a visit that no answer has shown.
      */
     SaidShown: {
         by: RunnerApi["Author"];
@@ -1686,8 +1687,8 @@ export interface RunnerApi {
     };
     /**
      * StopMessage
-     * @description A Stop, the only message that a page may send. `run`: the id of a run or a group, or
-     *     "all".
+     * @description A press of Stop, the only message that a page may send. `run`: the id of a run or a group, or
+     *     "all"; `stop_id`: the id of the press.
      */
     StopMessage: {
         /** @enum {string} */
@@ -1697,8 +1698,9 @@ export interface RunnerApi {
     };
     /**
      * Stopping
-     * @description The runs that a Stop concerns and, if everything is stopped, the `graphs` of others by robot.
-     *     `unknown`: by robot, why it is unknown which graphs it runs.
+     * @description The answer to a Stop: the ids of the runs that are being stopped and, if everything is
+     *     stopped, the `graphs` of other programs by robot. `unknown`: by robot, why it is unknown which
+     *     graphs it runs.
      */
     Stopping: {
         /** @enum {string} */
@@ -1761,8 +1763,8 @@ export interface RunnerApi {
      *     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
      *     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
      *     none were seen; `outputs`: likewise those that it gave, where an answer could show them. In a
-     *     conducted run, `robot`: the engine that played it; `said`: who gave the result by word, where no
-     *     answer has shown it.
+     *     conducted run, `robot`: the engine that played it; `said`: the person who stated the result,
+     *     where no answer has shown it.
      */
     VisitShown: {
         /** Format: date-time */

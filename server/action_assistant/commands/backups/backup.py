@@ -187,8 +187,9 @@ class RegularBackups(msgspec.Struct, frozen=True):
 
 
 def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, OffSite | None]:
-    """Make a backup, record its outcome, and delete superfluous older backups. Raise CannotStart if
-    the backup fails."""
+    """Make a backup by `plan`, record its outcome in the data folder, and delete superfluous older
+    backups. Return it, and how the command that takes it elsewhere ended, None without one. Raise
+    CannotStart if the backup fails."""
     try:
         with _alone(plan.into):
             target = _free(plan.into)
@@ -208,8 +209,8 @@ def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, O
 
 
 def keep_making(plan: RegularBackups, every: float) -> int:
-    """Make a backup every `every` seconds, until SIGTERM or the end of the parent process. It runs
-    at low priority."""
+    """Make a backup every `every` seconds by `plan`, until SIGTERM or the end of the parent
+    process; return the exit code. The process gets a low priority."""
     os.nice(_NICE)
     signal.signal(signal.SIGTERM, _end)
     parent = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
@@ -241,7 +242,8 @@ def keep_making(plan: RegularBackups, every: float) -> int:
 
 
 def told(done: FinishedBackup, off_site: OffSite | None) -> str:
-    """Return one line about a finished backup."""
+    """Return the line to print about a finished backup. `off_site`: how the command that takes it
+    elsewhere ended, None without one."""
     made = done.made
     text = f"backup {made.file}: {made.bytes / 2**20:.1f} MiB in {made.seconds:.1f} s, proven"
     if made.missing:
@@ -253,7 +255,8 @@ def told(done: FinishedBackup, off_site: OffSite | None) -> str:
 
 @contextlib.contextmanager
 def _alone(into: Path) -> Iterator[None]:
-    """Allow one backup into a folder at a time, and remove what a killed one has left."""
+    """Return a context during which no other process makes a backup into the folder, and remove
+    what a killed one has left there. Raise CannotStart if another process makes one now."""
     make_folder(into)
     lock = opener(str(into / _LOCK), os.O_RDWR | os.O_CREAT)
     try:
@@ -266,15 +269,16 @@ def _alone(into: Path) -> Iterator[None]:
 
 
 def _free(into: Path) -> Path:
-    """Return a file name that no backup in the folder has yet."""
+    """Return a file name, by the time, that no backup in the folder has yet; wait up to a second
+    for one."""
     while (target := into / name_at(datetime.now(UTC))).exists():
         time.sleep(0.1)  # names tell the second
     return target
 
 
 def _is_anothers(path: Path, done: FinishedBackup) -> bool:
-    """Return whether a backup comes from another server, which has another token. Servers may share
-    a folder."""
+    """Return whether the file `path` is a backup of another server, which has another token than in
+    `done`. Servers may share a folder."""
     if moment_of(path) is None or not zipfile.is_zipfile(path):
         return False
     try:
@@ -331,7 +335,7 @@ def _first(plan: RegularBackups, every: float) -> float:
 
 def _wait_until(due: float, parent: str | None) -> bool:
     """Wait until `due` (seconds since 1970). Return False if the parent process, which holds the
-    other end of the pipe `parent`, ends first. It waits in slices, since clocks are set."""
+    other end of the pipe `parent`, ends first. It waits in slices, since clocks may be changed."""
     while (left := due - time.time()) > 0:
         ends = [] if parent is None else [int(parent)]
         if select.select(ends, [], [], min(left, 60.0))[0]:

@@ -91,12 +91,14 @@ class Packer:
         self._progress = progress
 
     def journal(self, branch: Branch, path: Path, events: int) -> JournalCopy:
-        """Add the copy of a journal with `events` events."""
+        """Add the copy of a journal (`path`) with `events` events to the backup; return its size
+        and SHA-256."""
         held = self._take(f"{branch}.db", path)
         return JournalCopy(events, held.sha256, held.bytes)
 
     def file(self, name: str, path: Path) -> BackupPart:
-        """Add one file to the backup under `name`. Raise OSError if it cannot be read or written."""
+        """Add the file `path` to the backup under `name`; return its size and SHA-256. Raise
+        OSError if it cannot be read or written."""
         self.files[name] = self._take(name, path)
         return self.files[name]
 
@@ -106,7 +108,8 @@ class Packer:
         self.files[name] = BackupPart(len(content), hashlib.sha256(content).hexdigest())
 
     def close(self, about: BackupManifest, target: Path, prove: Callable[[Path], None]) -> None:
-        """Add the manifest, finish the file, verify it by `prove`, and rename it to `target`."""
+        """Add the manifest (`about`), finish the file, verify it by `prove`, and rename it to
+        `target`."""
         self._write(_ABOUT, msgspec.json.format(msgspec.json.encode(about)))
         self._zip.close()
         self._raw.flush()
@@ -117,7 +120,7 @@ class Packer:
         sync(target.parent)
 
     def abandon(self) -> None:
-        """Close the unfinished backup file."""
+        """Close the unfinished backup file, which has a temporary name."""
         self._raw.close()
 
     def _write(self, name: str, content: bytes) -> None:
@@ -152,8 +155,8 @@ class Package:
             raise
 
     def prove(self, progress: Progress) -> None:
-        """Read every part of the backup and compare its SHA-256; write nothing. Raise CannotStart
-        if a part is damaged."""
+        """Read every part of the backup and compare its SHA-256; write nothing but the progress.
+        Raise CannotStart if a part is damaged."""
         self._check_total()
         for name in self.parts:
             with Path(os.devnull).open("wb") as nowhere:
@@ -161,7 +164,7 @@ class Package:
 
     def unpack(self, folder: Path, progress: Progress) -> None:
         """Write all parts into `folder`, and compare the SHA-256 of each. Raise CannotStart if a
-        part is damaged or the disk has too little space."""
+        part is damaged, NoRoom if the disk has too little space."""
         total = self._check_total()
         free = shutil.disk_usage(folder).free
         if total + _ROOM > free:
@@ -184,8 +187,8 @@ class Package:
         return total
 
     def _copy(self, name: str, here: IO[bytes], text: str, progress: Progress) -> None:
-        """Write one part into the file `here` and compare its SHA-256. Raise CannotStart if it is
-        damaged."""
+        """Write the part called `name` into the file `here` and compare its SHA-256. `text`: the
+        progress message. Raise CannotStart if it is damaged."""
         entry, sha256 = self.parts[name]
         try:
             with self._zip.open(entry) as there:
@@ -196,7 +199,7 @@ class Package:
             raise self._damaged(f"{name} is not what was written")
 
     def close(self) -> None:
-        """Close the backup file after reading."""
+        """Close the backup file that was read."""
         self._zip.close()
 
     def _read_about(self) -> BackupManifest:
@@ -275,7 +278,7 @@ def about_now(**fields: object) -> BackupManifest:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file in hex."""
+    """Return the SHA-256 of the file `path`, in hex."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -288,7 +291,8 @@ def _is_place(name: str) -> bool:
 
 
 def _copied(there: IO[bytes], here: IO[bytes], text: str, progress: Progress) -> tuple[int, str]:
-    """Copy all that comes; its size in bytes and its SHA-256."""
+    """Copy the stream `there` into `here`; return the number of bytes and the SHA-256 in hex.
+    `text`: the progress message."""
     size, digest = 0, hashlib.sha256()
     while block := there.read(_CHUNK):
         here.write(block)

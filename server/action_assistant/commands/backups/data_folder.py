@@ -57,7 +57,8 @@ _AT_WORK: Final = ".at-work"
 
 
 def belongings(data: Path) -> Iterator[tuple[str, Path]]:
-    """Yield the files beside the journals that a backup includes: relative path and path of each."""
+    """Yield the files of the data folder, beside the journals, that a backup includes: the path
+    relative to the folder, and the path."""
     for name in sorted(MERGED | WHOLE):
         top = data / name
         for path in sorted(top.rglob("*")) if top.is_dir() else [top]:
@@ -66,7 +67,7 @@ def belongings(data: Path) -> Iterator[tuple[str, Path]]:
 
 
 def left_out(data: Path) -> list[Path]:
-    """Return the entries of the folder that are not this program's."""
+    """Return the entries of the data folder that are not this program's, and so not in a backup."""
     if not data.is_dir():
         return []
     known = MERGED | WHOLE | _OWN
@@ -84,17 +85,15 @@ def _is_passing(path: Path) -> bool:
 
 
 def is_database(path: Path) -> bool:
-    """Return whether a file is a SQLite database, which has to be copied by SQLite itself."""
+    """Return whether the file `path` is a SQLite database, which has to be copied by SQLite itself."""
     with path.open("rb") as file:
         return file.read(len(_MAGIC)) == _MAGIC
 
 
 def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> None:
     """Copy the SQLite file `source` to `target`, as it is at one moment, even if other processes
-    write to it meanwhile. Only the owner may read the copy.
-
-    `progress` is told how many pages are copied, with the name `name` for the file.
-    """
+    write to it meanwhile. Only the owner may read the copy. The number of copied pages is reported
+    to `progress`, with the name `name` for the file."""
 
     def tell(_: int, remaining: int, total: int) -> None:
         progress.tell(f"{name}: {total - remaining} of {total} pages copied")
@@ -110,7 +109,8 @@ def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> 
 
 
 def fold_of(branch: Branch) -> Fold:
-    """Return the function that turns a journal's events into its tables."""
+    """Return the function that turns the events of a journal (the editor's or the runner's) into
+    its tables."""
     if branch == "editor":
         from action_assistant.editor.log.graph_events import fold as editor_fold
 
@@ -128,11 +128,9 @@ def checked(
     expected: int | None = None,
     anew: bool = False,
 ) -> int:
-    """Verify the copy of a journal, bring its tables to this version, and return the number of its
-    events. Raise CannotStart if an event is damaged or the number is not `expected`.
-
-    `anew`: begin another epoch in the copy.
-    """
+    """Verify the copy of a journal (`path`), bring its tables to this version, and return the
+    number of its events. Raise CannotStart if an event is damaged or the number is not `expected`.
+    `anew`: begin another epoch (history) in the copy."""
     from action_assistant.editor.log import epochs
 
     async def look() -> int:
@@ -162,7 +160,8 @@ def checked(
 
 
 def aside_folder(data: Path, prefix: str = ASIDE) -> Path:
-    """Create and return a new folder, named by the time, for files that are replaced."""
+    """Create and return a new folder in the data folder, named by `prefix` and the time, for files
+    that are replaced."""
     name = time.strftime(f"{prefix}%Y%m%d-%H%M%S")
     for number in count(1):
         path = data / (name if number == 1 else f"{name}-{number}")
@@ -175,7 +174,7 @@ def aside_folder(data: Path, prefix: str = ASIDE) -> Path:
 
 
 def rows_of(path: Path, question: Select[Any]) -> list[Row[Any]]:
-    """Return the rows of a query on a SQLite file that no process writes."""
+    """Return the rows of a query on a SQLite file (`path`) that no process writes."""
     found: list[Row[Any]] = []
     database_of(f"sqlite:///{path}").look(lambda c: found.extend(c.execute(question).all()))
     return found
@@ -203,8 +202,9 @@ def archived(runner: Path) -> dict[str, str]:
 
 @contextmanager
 def workshop(parent: Path, prefix: str) -> Iterator[Path]:
-    """Yield a temporary folder on the disk of the result, private to this user and locked against
-    `sweep`. Errors of disk and database are raised as CannotStart."""
+    """Return a context with a temporary folder in `parent`, which is on the disk of the result. It
+    is private to this user, locked against `sweep`, and removed at the end. Errors of disk and
+    database are raised as CannotStart."""
     try:
         with tempfile.TemporaryDirectory(prefix=prefix, dir=parent) as folder:
             held = opener(str(Path(folder) / _AT_WORK), os.O_RDWR | os.O_CREAT)
@@ -220,7 +220,8 @@ def workshop(parent: Path, prefix: str) -> Iterator[Path]:
 
 
 def sweep(parent: Path, prefix: str) -> None:
-    """Remove the work folders of processes that were killed; leave those that a process still uses."""
+    """Remove the work folders in `parent` with this prefix that killed processes have left; folders
+    that a process still uses stay."""
     for left in parent.glob(f"{prefix}*"):
         if left.is_symlink() or (left / _AT_WORK).is_symlink():
             continue  # nothing of ours: it may be a folder of everybody's, such as /tmp

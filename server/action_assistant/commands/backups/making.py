@@ -51,11 +51,8 @@ _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
 
 
 class FinishedBackup(msgspec.Struct, frozen=True):
-    """A finished backup and its content.
-
-    `strangers` names tables and other objects in the schema of a journal that are not this
-    program's and were left out.
-    """
+    """A finished backup and its content. `strangers` names tables and other objects in the schema
+    of a journal that are not this program's and are not in the backup."""
 
     made: BackupMade
     journals: Mapping[Branch, JournalCopy]
@@ -66,8 +63,8 @@ class FinishedBackup(msgspec.Struct, frozen=True):
 def make_backup(
     data: Path, database: str | None, target: Path, progress: Progress
 ) -> FinishedBackup:
-    """Write a backup of a data folder to a file. Raise CannotStart if that fails; no file is left
-    then."""
+    """Write a backup of a data folder to the file `target`. `database`: the URL of the graphs, None
+    for the folder's own. Raise CannotStart if that fails; no file is left then."""
     begun, at, sources = time.monotonic(), time.time(), _sources(data, database)
     _check_room(data, sources, target.parent)
     with workshop(target.parent, WORK) as folder:
@@ -132,8 +129,8 @@ def _elsewhere(data: Path, sources: Mapping[Branch, str]) -> str | None:
 
 
 def _check_room(data: Path, sources: Mapping[Branch, str], folder: Path) -> None:
-    """Check that the disk has space for a copy of each journal and for the packed backup. Raise
-    CannotStart if it has less."""
+    """Raise CannotStart if the disk of `folder` has less space than a copy of each journal and the
+    packed backup need. `sources`: the URL of each journal."""
     journals = sum(_size(source) for source in sources.values())
     kept = settings.keep(data).folder
     files = [path for top in _ARCHIVES for path in (kept / top).rglob("*.gz")]
@@ -160,7 +157,7 @@ def _size(source: str) -> int:
 
 
 def _read_back(part: Path, progress: Progress) -> None:
-    """Verify that a finished backup file holds what was written. Raise CannotStart otherwise."""
+    """Raise CannotStart if the finished backup file `part` does not hold what was written."""
     package = Package(part)
     try:
         package.prove(progress)
@@ -169,7 +166,7 @@ def _read_back(part: Path, progress: Progress) -> None:
 
 
 def _copy(source: str, branch: Branch, target: Path, progress: Progress) -> None:
-    """Copy a consistent state of a journal into a SQLite file."""
+    """Copy the journal at the URL `source`, as it is at one moment, into the SQLite file `target`."""
     from action_assistant.journal.copies.copying import copy
 
     target.touch(mode=0o600)
@@ -186,11 +183,9 @@ def _copy(source: str, branch: Branch, target: Path, progress: Progress) -> None
 
 
 def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple[str, ...]:
-    """Pack everything beside the journals, whose copies are in `folder`; return sentences about
-    missing parts.
-
-    Archives come after the journals: a run that is archived meanwhile is then in both.
-    """
+    """Pack all files beside the journals, whose copies are in `folder`; return a sentence for each
+    missing part. Archives come after the journals: a run that is archived meanwhile is then in
+    both."""
     missing = []
     given = os.environ.get("ACTION_ASSISTANT_TOKEN")
     for name, path in belongings(data):
@@ -217,8 +212,8 @@ def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple
 
 
 def _archives(packer: Packer, kept: Path, runner: Path) -> list[str]:
-    """Add all archives to the backup. Return a sentence for each archive that the journal names and
-    that is missing or altered."""
+    """Add all archives in the folder `kept` to the backup. Return a sentence for each archive that
+    is missing or altered but named in the copy of the runner's journal (`runner`)."""
     for path in sorted(path for top in _ARCHIVES for path in (kept / top).rglob("*.gz")):
         packer.file(f"{ARCHIVE}/{path.relative_to(kept).as_posix()}", path)
     missing = []
@@ -232,7 +227,8 @@ def _archives(packer: Packer, kept: Path, runner: Path) -> list[str]:
 
 
 def _links(editor: Path) -> bool:
-    """Return whether a journal holds invitations that were not revoked."""
+    """Return whether the copy of the editor's journal (`editor`) has invitations that were not
+    revoked."""
     if not editor.exists():
         return False
     open_ = select(invitation.c.id).where(invitation.c.revoked_at.is_(None)).limit(1)

@@ -46,12 +46,13 @@ def parse_retention(text: str) -> RetentionRule:
 
 
 def name_at(moment: datetime) -> str:
-    """Return the file name of a backup that was begun at this time."""
+    """Return the file name of a backup that was begun at `moment`."""
     return f"action-assistant-{moment.astimezone(UTC).strftime(_STAMP)}Z.zip"
 
 
 def moment_of(path: Path) -> datetime | None:
-    """Return the time at which a scheduled backup was begun; None for another file name."""
+    """Return the time at which a scheduled backup was begun, by its file name; None for another
+    file name."""
     found = _NAME.fullmatch(path.name)
     try:
         return found and datetime.strptime(found[1], _STAMP).replace(tzinfo=UTC)
@@ -61,11 +62,8 @@ def moment_of(path: Path) -> datetime | None:
 
 def superfluous(paths: Iterable[Path], keep: RetentionRule, now: datetime) -> list[Path]:
     """Return those of `paths` that are backups and that the rule `keep` does not keep at the time
-    `now`.
-
-    The newest backup dated before `now` always stays. Backups dated after `now` were made while a
-    clock was wrong: they stay, and they do not take the place of one that the rule keeps.
-    """
+    `now`. The newest backup dated before `now` always stays. Backups dated after `now` were made
+    when a clock was wrong: they stay, and they do not take the place of one that the rule keeps."""
     if keep.days is None:
         return []
     moments = ((moment_of(path), path) for path in paths)
@@ -86,7 +84,8 @@ _SECONDS: Final = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86_400.0}
 
 
 def add_rules(parser: argparse.ArgumentParser, prefix: str) -> None:
-    """Add the options for how many backups stay and for the command that takes them elsewhere."""
+    """Add two options to a parser: for how many backups stay, and for the command that takes them
+    elsewhere. `prefix`: of their names."""
     parser.add_argument(
         f"{prefix}keep",
         type=rule,
@@ -103,7 +102,8 @@ def add_rules(parser: argparse.ArgumentParser, prefix: str) -> None:
 
 
 def span(text: str) -> float:
-    """Parse a duration such as 30m, 24h or 7d; return it in seconds."""
+    """Parse a duration such as 30m, 24h or 7d; return it in seconds. Raise ArgumentTypeError for
+    another text."""
     found = _SPAN.fullmatch(text.strip())
     if found is None or float(found[1]) * _SECONDS[found[2]] < 1:
         raise argparse.ArgumentTypeError(f"{text!r} is no time such as 30m, 24h or 7d")

@@ -21,7 +21,7 @@ class Progress:
         self._shown = False
 
     def tell(self, text: str) -> None:
-        """Say how far the work has come, once a second at most."""
+        """Print `text` about how far the work has come, but at most once a second."""
         if time.monotonic() < self._next:
             return
         self._next = time.monotonic() + _EVERY
@@ -40,7 +40,8 @@ class Progress:
 
 
 def _steer(text: str) -> None:
-    """Write control characters to the terminal itself, past the filter that makes output plain."""
+    """Write control characters to the terminal itself, bypassing the filter that makes output
+    plain."""
     stream = sys.__stderr__ or sys.stderr
     stream.write(text)
     stream.flush()

@@ -34,7 +34,7 @@ Tell: TypeAlias = Callable[[str], None]
 
 
 class Findings:
-    """The sentences of a rehearsal: what was checked, and what is wrong."""
+    """The results of a rehearsal, as sentences: what was checked, and what is wrong."""
 
     def __init__(self) -> None:
         self.looked_at: list[str] = []
@@ -105,8 +105,8 @@ def _tell(found: Findings, done: BackupRehearsed) -> int:
 
 
 def _look(source: Path, folder: Path, found: Findings, progress: Progress) -> None:
-    """Unpack a backup into `folder`, verify all of it as a restore would, and add the results to
-    `found`. Raise CannotStart if a part or a journal is damaged."""
+    """Unpack the backup `source` into `folder`, verify all of it as a restore would, and add the
+    results to `found`. Raise CannotStart if a part or a journal is damaged."""
     package = Package(source)
     try:
         about = package.about
@@ -152,7 +152,9 @@ async def _opened(
 
 
 async def _look_at_graphs(journal: Journal, folder: Path, found: Findings, tell: Tell) -> None:
-    """Read every document to its end, and check the digest of every version and every invitation."""
+    """Read every document in the journal of the editor to its end, and check the digest of every
+    version and every invitation; add the results to `found`. `tell`: is called with the progress.
+    """
     from action_assistant.editor.crdt.loading import stored
     from action_assistant.editor.crdt.replica import ReplicaState
     from action_assistant.editor.documents import contents
@@ -203,7 +205,8 @@ async def _versions(journal: Journal, found: Findings, tell: Tell) -> int:
 
 
 async def _look_at_runs(journal: Journal, folder: Path, found: Findings, tell: Tell) -> None:
-    """Fold every run from its events, in the journal or an archive."""
+    """Fold every run from its events, in the journal or an archive in `folder`; add the results to
+    `found`. `tell`: is called with the progress."""
     from action_assistant.runner.archives.archive_store import ArchiveStore
     from action_assistant.runner.runs.history import RunHistory
     from action_assistant.web.workers.lanes import run_here

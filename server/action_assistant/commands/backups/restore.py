@@ -63,8 +63,8 @@ class RestoreUnderWay(msgspec.Struct, frozen=True):
 
 
 def restore(options: argparse.Namespace) -> int:
-    """Run the command `restore` and return its exit code. Raise CannotStart if the backup is
-    damaged or its target is in use."""
+    """Run the command `restore` with these options and return its exit code. Raise CannotStart if
+    the backup is damaged or its target is in use."""
     from action_assistant.editor.log import database_location
 
     data, source = options.data.resolve(), options.file.resolve()
@@ -108,7 +108,8 @@ def _make(data: Path) -> None:
 
 
 def check_names(about: BackupManifest, source: Path) -> None:
-    """Refuse a backup with a file that does not belong to a data folder. Raise CannotStart then."""
+    """Raise CannotStart if a backup has a file that does not belong to a data folder. `about`: its
+    manifest; `source`: its path, for the message."""
     for name in about.files:
         top, inner = name.split("/")[:2]
         if top == FILES and inner not in MERGED | WHOLE:
@@ -116,7 +117,8 @@ def check_names(about: BackupManifest, source: Path) -> None:
 
 
 def _check_folder(data: Path, source: Path) -> None:
-    """Refuse a folder with files of other programs and none of this one. Raise CannotStart then."""
+    """Raise CannotStart if the data folder has files of other programs and none of this one. The
+    backup itself (`source`) may lie there."""
     strangers = [path for path in left_out(data) if path != source]
     if strangers and not any((data / name).exists() for name in (*_JOURNALS, *WHOLE, *_MARKS)):
         names = ", ".join(path.name for path in strangers[:3])
@@ -128,8 +130,9 @@ def _check_folder(data: Path, source: Path) -> None:
 def _put(
     folder: Path, data: Path, url: str, about: BackupManifest, progress: Progress
 ) -> tuple[Path | None, list[str]]:
-    """Move the unpacked parts into the data folder. Return the folder that holds the replaced
-    files, and the names of existing files that were kept instead of the backup's."""
+    """Move the unpacked parts from `folder` into the data folder, and the graphs to the database
+    `url`. Return the folder with the replaced files, None if none was replaced, and the names of
+    existing files that stayed instead of the backup's."""
     from action_assistant.editor.log import database_location, epochs
 
     mark, is_own = data / settings.RESTORING, database_location.is_own(data, url)
@@ -160,12 +163,10 @@ def _begin(
     elsewhere: bool,
 ) -> None:
     """Write the file `mark`, which says that a restore is under way; then, if `elsewhere`, copy the
-    graphs of the backup into the database `url` in one transaction.
-
-    `folder` holds the unpacked backup. `elsewhere`: the database is no file of the data folder.
-    Nothing is done if an interrupted restore has copied these graphs already. Raises CannotStart if
-    the database cannot be read or the copy fails; `mark` is then as it was before the call.
-    """
+    graphs of the backup into the database `url` in one transaction. `folder`: the unpacked backup;
+    `about`: its manifest; `elsewhere`: the database is no file of the data folder. Do nothing if an
+    interrupted restore has copied the graphs already. Raise CannotStart if the database cannot be
+    read or the copy fails; `mark` is then as it was before the call."""
     from action_assistant.journal.copies.copying import copy
 
     before = _under(mark)
@@ -203,8 +204,8 @@ def _end_of(folder: Path, about: BackupManifest) -> RestoreUnderWay:
 
 
 def _is_there(url: str, under: RestoreUnderWay, about: BackupManifest) -> bool:
-    """Return whether the database at `url` already holds this backup, from a restore that was
-    interrupted. Raise CannotStart if it cannot be read."""
+    """Return whether the database at `url` already has the graphs of this backup (`about`), from a
+    restore that was interrupted (`under`). Raise CannotStart if it cannot be read."""
     if "editor" not in about.journals or under.sha256 != about.journals["editor"].sha256:
         return False
 
@@ -218,7 +219,8 @@ def _is_there(url: str, under: RestoreUnderWay, about: BackupManifest) -> bool:
 
 
 def _placed(folder: Path, name: str, data: Path) -> bool:
-    """Move an unpacked file to its target; return False if another file is there, which is kept."""
+    """Move the unpacked file `name` from `folder` to its place in the data folder; return False if
+    another file is there, which stays."""
     top, _, inner = name.partition("/")
     base = data if top == FILES else settings.keep(data).folder
     source, target = folder / name, base / inner
@@ -238,7 +240,7 @@ def _placed(folder: Path, name: str, data: Path) -> bool:
 
 
 def _move(source: Path, target: Path) -> None:
-    """Move a file or folder atomically and durably, also to another disk."""
+    """Move a file or folder to `target` atomically and durably, also to another disk."""
     part = source
     if source.stat().st_dev != target.parent.stat().st_dev:
         part = target.with_name(f".{target.name}.part")
@@ -251,8 +253,8 @@ def _move(source: Path, target: Path) -> None:
 
 
 def _locked(data: Path, branch: Branch) -> int:
-    """Lock a journal against all other processes, also one that cannot be opened. Return the
-    descriptor of the lock."""
+    """Lock the journal of a branch against all other processes, even if it cannot be opened. Return
+    the descriptor of the lock. Raise CannotStart if another process has locked it."""
     from action_assistant.journal.sqlite import own
 
     try:
@@ -262,7 +264,8 @@ def _locked(data: Path, branch: Branch) -> int:
 
 
 def _exchange(new: Path, old: Path, aside: Path | None) -> None:
-    """Replace a file atomically; link the old one into the folder `aside` first."""
+    """Replace the file `old` by `new` atomically; first link `old` into the folder `aside` (None:
+    do not)."""
     for path in (old, old.with_name(f"{old.name}-wal")):
         if aside is not None and path.exists() and not (aside / path.name).exists():
             os.link(path, aside / path.name)

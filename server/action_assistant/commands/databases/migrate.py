@@ -41,8 +41,9 @@ _DAMAGED: Final = {sqlite3.SQLITE_ERROR, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_
 
 
 def go_back(data: Path, database: str | None, files: list[Path]) -> int:
-    """Run `migrate --back`: put copies of journals in place of the journals, or list the copies if
-    no file is named. Raise CannotStart if a copy or a database cannot be used."""
+    """Run `migrate --back` in a data folder and return the exit code: put copies (`files`) of
+    journals in place of the journals, or list the copies if no file is named. Raise CannotStart if
+    a copy or a database cannot be used."""
     settings.settled(data)
     if not files:
         return _list(data)
@@ -79,8 +80,8 @@ def _list(data: Path) -> int:
 
 
 def _asked(path: Path) -> str:
-    """Return the version that last wrote a database file; "" if the file does not say. The file is
-    not changed."""
+    """Return the version of this program that last wrote the database file `path`; "" if the file
+    does not say. The file is not changed."""
     engine = create_engine(unchanged(path), poolclass=NullPool)
     try:
         with engine.connect() as connection:
@@ -153,12 +154,9 @@ def _exchange(part: Path, path: Path, aside: Path) -> None:
 
 
 def _emptied(path: Path) -> int | None:
-    """Merge the write-ahead log of a SQLite database into its file, and return the number of events
-    in the database.
-
-    Return None if the file is damaged. Raise CannotStart if another process has the database open,
-    or if it cannot be closed for another reason.
-    """
+    """Merge the write-ahead log of the SQLite database `path` into its file, and return the number
+    of its events, 0 if there is no file. Return None if the file is damaged. Raise CannotStart if
+    another process has the database open, or if it cannot be closed for another reason."""
     if not path.exists():
         return 0
     try:
@@ -203,7 +201,7 @@ def _exchanged(
 ) -> tuple[int, int]:
     """Copy the present tables of the branch to a file in the folder `aside`, if there are any, then
     replace them by the tables of the copy. Return how many events there are now, and how many there
-    were before. Raise CannotStart, and change nothing, if a newer version made the tables or they
+    were before. Raise CannotStart, without a change, if a newer version made the tables or they
     cannot be copied."""
     try:
         current = recognize(connection)
@@ -252,7 +250,8 @@ def _tell(copy: UpgradeCopy, place: str, then: int, now: int | None, aside: Path
 
 @contextmanager
 def _told(folder: Path) -> Iterator[None]:
-    """Turn errors of the disk into CannotStart with a sentence."""
+    """Return a context that turns errors of the disk into CannotStart with a sentence about
+    `folder`."""
     try:
         yield
     except OSError as error:

@@ -47,15 +47,15 @@ _WIDE: Final = 1 << 256
 
 
 class TableSum(NamedTuple):
-    """The number of rows of a table, and the sum of their digests."""
+    """The number of rows of a table, and the sum of their digests as a number."""
 
     rows: int
     digest: int
 
 
 def differences(one: str, other: str, progress: Progress) -> list[str]:
-    """Return one sentence for each table of the editor that differs between two databases. Raise
-    CannotStart if one cannot be read."""
+    """Return one sentence for each table of the editor that differs between the databases with the
+    URLs `one` and `other`. Raise CannotStart if one cannot be read."""
     found = [ask_once(url, lambda c: dict(_sums(c, progress))) for url in (one, other)]
     return [
         f"{name}: {found[0][name].rows} rows and {found[1][name].rows}"
@@ -83,8 +83,8 @@ def _sum(connection: Connection, table: Table, progress: Progress) -> TableSum:
 
 
 def _digest(values: tuple[Any, ...]) -> bytes:
-    """Return the digest of a row. It covers type and length of each value, so that different rows
-    differ."""
+    """Return the digest of the values of a row. It covers type and length of each value, so that
+    different rows differ."""
     digest = blake2b(digest_size=32)
     for value in values:
         if isinstance(value, bytes | memoryview):
@@ -152,9 +152,9 @@ def _move(options: argparse.Namespace) -> int:
 
 
 def _moved(data: Path, source: str, target: str) -> tuple[int, Path | None]:
-    """Copy the graphs to another database while no other process can write. Return the number of
-    events and the path to which the files of the data folder were moved, if any. Raise
-    CannotStart if a database cannot be used."""
+    """Copy the graphs from the database `source` to `target` (URLs) while no other process can
+    write. Return the number of events and the path to which the files of the data folder were
+    moved, None if none was. Raise CannotStart if a database cannot be used."""
     progress = Progress()
     database = database_of(source)
     try:
@@ -192,9 +192,9 @@ def _target(data: Path, to: str) -> str:
 
 
 def _source(data: Path, known: str, given: str | None) -> str:
-    """Return the URL of the graphs' database: `given`, which may hold a password, if it names the
-    same database as `known`, else `known`, the URL without a password that the data folder has
-    for its graphs. Raise CannotStart if the data folder has no graphs yet."""
+    """Return the URL of the graphs' database: `given`, which may have a password, if it names the
+    same database as `known`, else `known`, the URL without a password that is stored in the data
+    folder. Raise CannotStart if the data folder has no graphs yet."""
     from action_assistant.editor.log import database_location
 
     if given is not None and database_location.same(given, known):
@@ -205,8 +205,8 @@ def _source(data: Path, known: str, given: str | None) -> str:
 
 
 def _into_server(data: Path, source: str, target: str, progress: Progress) -> int:
-    """Copy the graphs into a database on a server, compare, and switch to it; return the number of
-    events. Raise CannotStart if that fails; nothing has changed then."""
+    """Copy the graphs from `source` into the database `target` on a server, compare, and switch to
+    it; return the number of events. Raise CannotStart if that fails; nothing has changed then."""
     return copy(
         database_of(source),
         database_of(target),
@@ -221,8 +221,9 @@ def _into_server(data: Path, source: str, target: str, progress: Progress) -> in
 def _into_folder(
     data: Path, source: str, target: str, progress: Progress
 ) -> tuple[int, Path | None]:
-    """Copy the graphs into a file of the data folder; return the number of events and the file that
-    was put aside."""
+    """Copy the graphs from `source` into a file of the data folder, and switch to it (`target`: its
+    URL); return the number of events and the old file that was moved aside, None if there was none.
+    """
     with workshop(data, _WORK) as folder, ExitStack() as locks:
         locks.callback(os.close, own(data / "editor.db"))
         sweep(data, _WORK)
@@ -244,7 +245,8 @@ def _into_folder(
 
 
 def _tidy(data: Path, target: str) -> None:
-    """Remove what is left of a move that was killed after the switch to the other database."""
+    """Remove what is left of a move to `target` that was killed after the switch. Do nothing while
+    another process uses the old file."""
     try:
         lock = own(data / "editor.db")
     except CannotStart:
@@ -277,8 +279,10 @@ def _check_room(folder: Path, source: str) -> None:
 def _switch(
     data: Path, source: str, copied: str, target: str, progress: Progress, file: Path | None = None
 ) -> None:
-    """Make the copied database the one that this data folder uses. Raise CannotStart if its tables
-    differ from the source or the choice cannot be stored."""
+    """Compare the databases `source` and `copied`, then make the copy the one that this data folder
+    uses, under the URL `target`; `file`: the copied file to move into the folder, None for a
+    database on a server. Raise CannotStart if its tables differ from the source or the choice
+    cannot be stored."""
     from action_assistant.editor.log import database_location
 
     unlike = differences(source, copied, progress)

@@ -72,8 +72,9 @@ FROM {SCHEMA}.event WHERE stream LIKE 'run/%'
 
 
 async def once(copier: "RunsCopier", name: str) -> int:
-    """Copy the events that are new, and return the exit code: 1 if some are missing. Raise
-    CannotStart if a database cannot be used."""
+    """Copy the events that are new, close the copier, and return the exit code: 1 if archives are
+    missing. `name`: of the database, for messages. Raise CannotStart if a database cannot be used.
+    """
     try:
         copied = await copier.catch_up()
     except _FAULTS as error:
@@ -87,7 +88,7 @@ async def once(copier: "RunsCopier", name: str) -> int:
 
 
 async def followed(copier: "RunsCopier") -> int:
-    """Copy new events again and again, until cancelled."""
+    """Copy new events again and again, until cancelled; wait and retry while the database is away."""
     away = False
     try:
         while True:
@@ -109,7 +110,8 @@ async def followed(copier: "RunsCopier") -> int:
 
 
 class RunsCopier:
-    """Brings the copy of the runner's log up to date. `missing`: runs whose archive is not there."""
+    """Copies the runner's log into another database, for other programs to read. `missing`: runs
+    whose archive is not there."""
 
     def __init__(self, path: Path, kept: Path, engine: AsyncEngine, progress: Progress) -> None:
         self.missing: list[str] = []
@@ -144,7 +146,7 @@ class RunsCopier:
         return copied
 
     async def close(self) -> None:
-        """Close the connections to the copy's database."""
+        """Close all connections to the copy's database."""
         await self._engine.dispose()
 
     async def _do(self, work: Any, *values: Any) -> Any:
@@ -152,8 +154,9 @@ class RunsCopier:
             return await connection.run_sync(work, *values)
 
     async def _check(self, last: int) -> None:
-        """Check that the copy is of this very log. Events of archived runs are removed from the
-        log, so the newest event that it still has must be equal in both."""
+        """Raise CannotStart unless the copy, which goes up to the position `last`, is of this very
+        log. Events of archived runs are removed from the log, so the newest event that it still has
+        must be equal in both."""
         chosen = select(runner_event.c.position, runner_event.c.chain)
         chosen = chosen.where(runner_event.c.position <= last)
         rows = await self._log.query(chosen.order_by(runner_event.c.position.desc()).limit(1))
@@ -164,7 +167,8 @@ class RunsCopier:
                 raise CannotStart(_another(f"event {row.position} is another one"))
 
     async def _store(self, events: Sequence[Event], chains: dict[int, bytes]) -> None:
-        """Store events and the rows of their runs in one transaction."""
+        """Store events and the rows of their runs in one transaction. `chains`: the hash chain at
+        each event, by position."""
         runs = {name for each in events if (name := _run_of(each.stream))}
         rows = await self._rows(sorted(runs))
         rows["robot"] = [
@@ -221,7 +225,8 @@ def _prepare(connection: Connection) -> None:
 
 
 def _last(connection: Connection) -> int:
-    """Return the position up to which the log was copied. Events from archives do not count."""
+    """Return the position up to which the copy has the log; 0 without events. Events from archives
+    do not count."""
     chosen = select(func.max(_event.c.position)).where(_event.c.chain.is_not(None))
     return int(connection.execute(chosen).scalar() or 0)
 
@@ -247,7 +252,8 @@ def _write(
     runs: Sequence[str],
     rows: dict[str, list[dict[str, Any]]],
 ) -> None:
-    """Insert events that the copy lacks, and replace the rows of these runs."""
+    """Insert the events that the copy lacks, and replace the rows of these runs. `chains`: the hash
+    chain at each event, by position."""
     if events:
         values = [
             {name: getattr(each, name) for name in Event.__struct_fields__}

@@ -35,7 +35,8 @@ _PASSWORD: Final = (
 
 
 def fault(url: str, error: Exception) -> Diagnostic:
-    """Return the diagnostic for a database that could not be asked. `url` has no password."""
+    """Return the diagnostic for a database that could not be asked, by its error. `url` has no
+    password."""
     host = make_url(url).host or "this computer"
     causes = [*_causes(error)]
     if any(isinstance(each, socket.gaierror) for each in causes):
@@ -92,29 +93,29 @@ _event, _head = editor_event.c, editor_head.c  # both databases have these table
 
 
 def newest_at(connection: Connection) -> int | None:
-    """Return when the newest events were written, in microseconds since 1970; None without events."""
+    """Return when the newest events in a database were written, in microseconds since 1970; None
+    without events."""
     newest = select(_event.at).order_by(_event.position.desc()).limit(50)
     return max((row.at for row in connection.execute(newest) if type(row.at) is int), default=None)
 
 
 def oldest_at(connection: Connection) -> int | None:
-    """Return when the first event was written, in microseconds since 1970; None without events."""
+    """Return when the first event in a database was written, in microseconds since 1970; None
+    without events."""
     oldest = select(_event.at).order_by(_event.position).limit(1)
     return connection.execute(oldest).scalar()
 
 
 def has_events(connection: Connection) -> bool:
-    """Return whether a database has any event."""
+    """Return whether a database has any stored event."""
     if not inspect(connection).has_table(editor_event.name):
         return False
     return connection.execute(select(_event.position).limit(1)).first() is not None
 
 
 def first_damage(database: Database, connection: Connection) -> str:
-    """Return a clause about damage among the newest events; empty if none is found.
-
-    The search covers some thousand events and ends after two seconds at most.
-    """
+    """Return a clause about damage among the newest events of a database; "" if none is found. The
+    search covers some thousand events and ends after two seconds at most."""
     until = time.monotonic() + _SECONDS
     heads: dict[str, Head] = {}
     after = _last(connection) - _EVENTS
@@ -130,15 +131,17 @@ def first_damage(database: Database, connection: Connection) -> str:
 
 
 def _last(connection: Connection) -> int:
-    """Return the last position for `scan`: the row id in a file, the event's position on a server."""
+    """Return the last position for `Database.scan`: the row id in a file, the event's position on a
+    server; 0 without events."""
     if connection.dialect.name == "sqlite":
         return connection.execute(text("SELECT max(rowid) FROM event NOT INDEXED")).scalar() or 0
     return connection.execute(select(func.max(_event.position))).scalar() or 0
 
 
 def _wrong(connection: Connection, heads: dict[str, Head], row: Sequence[Any]) -> str:
-    """Return a clause about what is wrong with an event, given the events before it; empty if it is
-    sound. `heads` is updated."""
+    """Return a clause about what is wrong with the stored event in `row`, compared with the one
+    before it; "" if it is sound. `heads`: the end of each stream so far (number and hash), which is
+    updated."""
     stream, seq = row[0], row[1]
     if tuple(map(type, row)) != _TYPES:
         return f"one of {stream!r} holds values of the wrong kind"
@@ -154,8 +157,8 @@ def _wrong(connection: Connection, heads: dict[str, Head], row: Sequence[Any]) -
 
 
 def _before(connection: Connection, stream: str, seq: int) -> Head | None:
-    """Return the head of a stream before an event; None if the previous event is not in the
-    database."""
+    """Return the end of a stream (number and hash) before its event `seq`; None if the previous
+    event is not in the database."""
     if seq == 1:
         return NOTHING
     chosen = select(_event.chain).where(_event.stream == stream, _event.seq == seq - 1)
@@ -164,7 +167,8 @@ def _before(connection: Connection, stream: str, seq: int) -> Head | None:
 
 
 def _wrong_ends(connection: Connection, heads: dict[str, Head]) -> str:
-    """Return a clause about a stream that does not end where its head says; empty if all do."""
+    """Return a clause about a stream whose stored end differs from that of its events; "" if none
+    does. `heads`: the end of each stream by its events."""
     names = list(heads)[:500]
     chosen = select(_head.stream, _head.seq, _head.chain).where(_head.stream.in_(names))
     for row in connection.execute(chosen):
@@ -174,8 +178,8 @@ def _wrong_ends(connection: Connection, heads: dict[str, Head]) -> str:
 
 
 def _cut_off(connection: Connection) -> str:
-    """Return a clause about a stream of the editor whose last event is missing; empty otherwise.
-    Streams of runs are not checked, since they may be in archives."""
+    """Return a clause about a stream of the editor whose last event is missing; "" if there is
+    none. Streams of runs are not checked, since they may be in archives."""
     if not inspect(connection).has_table(graph.name):
         return ""
     last = select(_event.seq).where(_event.stream == _head.stream, _event.seq == _head.seq)
@@ -230,9 +234,9 @@ def graphs_are_there(place: Installation) -> Iterator[Diagnostic]:
 
 
 def runs_are_there(place: Installation) -> Iterator[Diagnostic]:
-    """Check the runner's database, the file `runner.db` in the data folder. Yield an error if the
-    file is missing although archives or recordings of runs exist, and what is wrong in the file
-    if it exists."""
+    """Check the runner's database, the file `runner.db` in the data folder of `place`. Yield an
+    error if the file is missing although archives or recordings of runs exist, and what is wrong in
+    the file if it exists."""
     file = place.data / "runner.db"
     left = [place.data / name for name in ("archive", "recordings")]
     if file.exists():
@@ -249,7 +253,9 @@ def runs_are_there(place: Installation) -> Iterator[Diagnostic]:
 
 
 class _DatabaseFindings(msgspec.Struct):
-    """The findings of one examination of a database."""
+    """The results of one examination of a database. `damage`: a clause, "" for none; `newest`: when
+    the newest event was written (microseconds since 1970); `weak`: why nothing may be written, ""
+    for no reason; `lacks`: events that the data folder has seen are missing."""
 
     damage: str = ""
     newest: int | None = None
@@ -258,8 +264,8 @@ class _DatabaseFindings(msgspec.Struct):
 
 
 def _holds_events(file: Path) -> bool:
-    """Return whether a journal has events; False where it cannot be read, which another check
-    reports."""
+    """Return whether the journal in a SQLite file has events; False where it cannot be read, which
+    another check reports."""
     held: list[bool] = []
     try:
         database_of(f"sqlite:///{file}").look(lambda each: held.append(has_events(each)))
@@ -283,8 +289,8 @@ def _in_file(what: str, file: Path) -> Iterator[Diagnostic]:
 
 
 def _examine(database: Database, connection: Connection, seen: _DatabaseFindings) -> None:
-    """Examine a database of this version or an earlier one, and add the results to `seen`. Raise
-    CannotStart for any other database."""
+    """Examine a database of this version or an earlier one by a connection, and add the results to
+    `seen`. Raise CannotStart for any other database."""
     if recognize(connection):
         seen.damage = first_damage(database, connection)
         seen.newest = newest_at(connection)
@@ -306,7 +312,8 @@ def _refused(where: object, error: CannotStart) -> Diagnostic:
 
 
 def _events(what: str, where: object, seen: _DatabaseFindings) -> Iterator[Diagnostic]:
-    """Yield the faults of the newest events."""
+    """Yield the faults of the newest events by `seen`, the results of an examination. `what`,
+    `where`: the contents and the address of the database, for the message."""
     if seen.damage:
         yield found(
             "events-damaged",
@@ -327,14 +334,15 @@ def _events(what: str, where: object, seen: _DatabaseFindings) -> Iterator[Diagn
 
 
 def span(seconds: float) -> str:
-    """Return a time as text, for example `90 s` or `5 min`."""
+    """Return a time in seconds, without its sign, as text, for example `90 s` or `5 min`."""
     if abs(seconds) < 120:
         return f"{abs(seconds):.0f} s"
     return f"{abs(seconds) / 60:.0f} min" if abs(seconds) < 7200 else f"{abs(seconds) / 3600:.0f} h"
 
 
 def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
-    """Check that a database on a server answers, stores commits durably, and has the graphs."""
+    """Check that the database `url` on a server answers, stores commits durably, and has the graphs
+    of the data folder."""
     shown = database_location.shown(url)
     database = database_of(url)
     try:
@@ -373,8 +381,9 @@ def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
 
 
 async def _asked(database: Database, data: Path) -> _DatabaseFindings:
-    """Examine a database on a server without changing it. Raise its driver's errors or TimeoutError
-    if it does not answer, CannotStart for a database of another program."""
+    """Examine a database on a server without changing it, and return the results. `data`: the data
+    folder. Raise its driver's errors or TimeoutError if it does not answer, CannotStart for a
+    database of another program."""
     seen = _DatabaseFindings()
 
     def question(connection: Connection) -> None:
@@ -391,10 +400,8 @@ async def _asked(database: Database, data: Path) -> _DatabaseFindings:
 
 
 def _holds_mark(connection: Connection, data: Path) -> bool:
-    """Return whether the database holds all events that this folder has seen.
-
-    Return True where the folder has seen none.
-    """
+    """Return whether the database has all events that the data folder `data` has seen; True where
+    the folder has seen none."""
     mark = marked(data / MARK)
     if mark is None or mark.position == 0:
         return True

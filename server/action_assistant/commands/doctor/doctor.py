@@ -74,18 +74,17 @@ ROBOTS_S: Final = _ROBOTS_TIMEOUT_S + 5
 
 
 def diagnose(place: Installation) -> list[Diagnostic]:
-    """Return the faults of an installation, without those of robots.
-
-    This takes about a second, and ten seconds at most.
-    """
+    """Return the faults of an installation; robots are not asked. This takes about a second, and
+    ten seconds at most."""
     return [each for each in examine(place) if each.severity != "fine"]
 
 
 def examine(
     place: Installation, checks: Iterable[Check] = CHECKS, seconds: float = PATIENCE_S
 ) -> Iterator[Diagnostic]:
-    """Start all checks side by side, since some wait for an answer, and yield their findings in the
-    order of the checks."""
+    """Start all checks of an installation at the same time, since some wait for an answer, and
+    yield their findings in the order of the checks. A check that takes longer than `seconds` is
+    reported as unfinished."""
     until = time.monotonic() + seconds
     threads = [_CheckThread(check, place) for check in checks]
     return (each for thread in threads for each in thread.seen(until))
@@ -116,7 +115,7 @@ class _CheckThread(threading.Thread):
             ]
 
     def seen(self, until: float) -> list[Diagnostic]:
-        """Wait for the end of the check, until `until` (monotonic clock) at most. Return its
+        """Wait for the end of the check, until `until` (monotonic seconds) at most. Return its
         findings, or one finding that says that it has not ended."""
         self.join(max(0.0, until - time.monotonic()))
         if not self.is_alive():
@@ -212,12 +211,9 @@ def _tell(each: Diagnostic) -> None:
 
 
 def robots_answer(place: Installation) -> Iterator[Diagnostic]:
-    """Check ROS 2, and whether each registered robot answers, with the Python that the runner would
-    use. Yield what was found.
-
-    With registered robots this takes some seconds. Nothing is yielded if there is no such Python,
-    since the check of the settings reports that.
-    """
+    """Check ROS 2, and whether each robot registered at `place` answers, with the Python that the
+    runner would use. Yield what was found. With registered robots this takes some seconds. Nothing
+    is yielded if there is no such Python, since the check of the settings reports that."""
     try:
         interpreter = for_runner()
     except CannotStart:  # told with the settings
@@ -233,8 +229,8 @@ def robots_answer(place: Installation) -> Iterator[Diagnostic]:
 
 
 def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
-    """Warn of engines of registered robots on this computer that index while they run: such an
-    engine may crash at a get or start (H15)."""
+    """Warn of engines, on this computer, of registered robots that index their folders again while
+    they run: such an engine may crash at a get or start (hazard H15)."""
     robots = {each.name: each for each in _registered(place.data)}
     for pid, words in _engines() if robots else ():
         name = argument(words, "--actor-name")
@@ -251,7 +247,7 @@ def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
 
 
 def robots_have_names(place: Installation) -> Iterator[Diagnostic]:
-    """Warn of a robot whose name stands for led runs since it was registered."""
+    """Warn of a robot that was registered under the name that now stands for conducted runs."""
     if any(each.name == CONDUCTED for each in _registered(place.data)):
         yield found(
             "robot-name",
@@ -273,7 +269,8 @@ def _engines() -> Iterator[tuple[int, list[str]]]:
 
 
 def look_here(place: Installation) -> list[Diagnostic]:
-    """Return the findings about ROS 2 and the robots, with the Python that runs this."""
+    """Return the findings about ROS 2 and the robots registered at `place`, with the Python that
+    runs this."""
     return anyio.run(look, _registered(place.data), utc_us)
 
 
@@ -311,8 +308,8 @@ def _asked(interpreter: Interpreter, place: Installation) -> list[Diagnostic]:
 
 
 def _registered(data: Path) -> list[Registration]:
-    """Return the registered robots, read from the database without the runner; empty if it cannot
-    be read."""
+    """Return the registered robots, read from the database in the data folder without the runner;
+    empty if it cannot be read."""
     path = data / "runner.db"
     if not path.exists():
         return []

@@ -39,7 +39,7 @@ _HOST: Final = re.compile(r"[A-Za-z0-9_.:\[\]-]+")
 
 
 def settings_mean_something(place: Installation) -> Iterator[Diagnostic]:
-    """Check every environment variable of this program."""
+    """Check the values of all environment variables of this program."""
     del place
     given = {name: value for name, value in os.environ.items() if name.startswith(_PREFIX)}
     problems = [each for name in sorted(given) for each in _setting(name, given[name])]
@@ -68,7 +68,7 @@ def _setting(name: str, value: str) -> Iterator[Diagnostic]:
 
 
 def _anything(_: str) -> None:
-    """Accept any value, since another check reads it."""
+    """Accept any value of a setting, since another check reads it."""
 
 
 def _limits(value: str) -> None:
@@ -154,7 +154,7 @@ _ASSET: Final = re.compile(r'(?:src|href)="\.?/?(assets/[^"]+)"')
 
 
 def program(place: Installation) -> Iterator[Diagnostic]:
-    """Report the versions of this program, of Python and of SQLite."""
+    """Report the versions of this program, of Python and of SQLite; never a fault."""
     del place
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     yield fine(
@@ -164,7 +164,8 @@ def program(place: Installation) -> Iterator[Diagnostic]:
 
 
 def page_is_built(place: Installation) -> Iterator[Diagnostic]:
-    """Check that the built page is complete and, in a checkout, not older than its sources."""
+    """Check that the built page is there and complete and, in a checkout, not older than its
+    sources."""
     del place
     folder = paths.page()
     index = folder / "index.html"
@@ -201,8 +202,8 @@ def page_is_built(place: Installation) -> Iterator[Diagnostic]:
 
 
 def _newer_source(built: float) -> Path | None:
-    """Return a source file of the page that is newer than the built page; None if there is none or
-    this is no checkout."""
+    """Return a source file of the page that is newer than the built page (`built`: seconds since
+    1970); None if no file is or this is no checkout."""
     sources = paths.page_sources()
     if sources is None:
         return None
@@ -214,7 +215,7 @@ def _newer_source(built: float) -> Path | None:
 
 
 def descriptors_suffice(place: Installation) -> Iterator[Diagnostic]:
-    """Check how many files and connections a process may have open."""
+    """Check that a process may have enough files and connections open."""
     del place
     most = posix.descriptors_allowed()
     if most < _DESCRIPTORS:
@@ -231,8 +232,8 @@ def descriptors_suffice(place: Installation) -> Iterator[Diagnostic]:
 
 
 def clock_is_possible(place: Installation) -> Iterator[Diagnostic]:
-    """Check that the clock is not earlier than the files of this program. Other checks compare it
-    with events and processes."""
+    """Check that the clock of this computer is not earlier than the files of this program. Other
+    checks compare it with events and processes."""
     del place
     newest = max(each.stat().st_mtime for each in Path(__file__).parent.glob("*.py"))
     if time.time() < newest - 86_400:
@@ -247,7 +248,8 @@ def clock_is_possible(place: Installation) -> Iterator[Diagnostic]:
 
 
 def shared_memory_is_there(place: Installation) -> Iterator[Diagnostic]:
-    """Check the shared memory that workers and ROS 2 use on Linux."""
+    """Check that the shared memory that workers and ROS 2 use on Linux can be written and has
+    space."""
     del place
     if not sys.platform.startswith("linux"):
         return
@@ -282,7 +284,7 @@ _SHOWN: Final = 5
 
 
 def backups_are_made(place: Installation) -> Iterator[Diagnostic]:
-    """Check that backups of this folder exist and are not late."""
+    """Check that backups of the data folder exist and are not late."""
     state, where, now = backup_state(place.data), place.data / backups.FILE, time.time()
     if state is None:
         message = "What is known of backups cannot be read."
@@ -302,7 +304,8 @@ def backups_are_made(place: Installation) -> Iterator[Diagnostic]:
 
 
 def _trouble(state: BackupState, last: float, now: float) -> str:
-    """Return a sentence about what is wrong with the newest backup; empty if it is fine."""
+    """Return a sentence about what is wrong with the newest backup, made at `last` (seconds since
+    1970, as `now`); "" if it is fine."""
     if state.failed is not None:
         return f"The last backup failed ({state.failed.why}); the newest is of {_day(last)}."
     if state.is_late(now) and state.schedule is not None:
@@ -335,7 +338,7 @@ def _day(at: float) -> str:
 
 
 def folder_is_ours(place: Installation) -> Iterator[Diagnostic]:
-    """Check that the current user can use the data folder, and that nobody else can."""
+    """Check that the current user can use the data folder, and that no other user can."""
     data = place.data
     if not data.exists():
         if blocked := _blocked(data):
@@ -413,7 +416,7 @@ def _readable(data: Path) -> Iterator[Diagnostic]:
 
 
 def _listed(data: Path, paths: list[Path]) -> str:
-    """Return the first of these paths in one text, relative to the data folder, and how many more
+    """Return the first of the paths in one text, relative to the data folder, and how many more
     there are."""
     names = [str(path.relative_to(data)) if path != data else str(data) for path in paths]
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
@@ -456,7 +459,7 @@ def token_is_there(place: Installation) -> Iterator[Diagnostic]:
 
 
 def nothing_was_interrupted(place: Installation) -> Iterator[Diagnostic]:
-    """Report a restore that was interrupted, after which no process starts."""
+    """Report a restore that was interrupted, after which no process of this program starts."""
     mark = place.data / settings.RESTORING
     if mark.exists():
         yield found(
@@ -468,7 +471,7 @@ def nothing_was_interrupted(place: Installation) -> Iterator[Diagnostic]:
 
 
 def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
-    """Check the folder of archives."""
+    """Check that the folder of archives, if it exists, can be read and written, or else be created."""
     try:
         folder = settings.keep(place.data).folder
     except CannotStart:  # told with the settings
@@ -500,7 +503,7 @@ def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
 
 
 def disk_has_room(place: Installation) -> Iterator[Diagnostic]:
-    """Check the free space on the disks of the data folder and of the archive."""
+    """Check the free space on the disks of the data folder and of the folder of archives."""
     folders = [place.data]
     with suppress(CannotStart):  # told with the settings
         folders.append(settings.keep(place.data).folder)

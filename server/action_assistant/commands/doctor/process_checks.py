@@ -49,7 +49,7 @@ class _Health(msgspec.Struct):
 
 
 def listens(host: str, port: int) -> bool:
-    """Return whether a program accepts connections at this address."""
+    """Return whether a program accepts connections at this host and port."""
     try:
         socket.create_connection((_reached(host), port), _PATIENCE_S).close()
     except OSError:
@@ -58,8 +58,8 @@ def listens(host: str, port: int) -> bool:
 
 
 def at_port(host: str, port: int) -> ProcessAnswer | None:
-    """Return the answer of the web server at a port, over http or https; None if there is no
-    answer."""
+    """Return the answer of the web server at a host and port to `/healthz`, over http or https;
+    None if there is no answer."""
     shown = _reached(host)
     shown = f"[{shown}]" if ":" in shown else shown
     for scheme in ("http", "https"):
@@ -73,12 +73,14 @@ def at_port(host: str, port: int) -> ProcessAnswer | None:
 
 
 def client(verify: ssl.SSLContext | bool) -> httpx.Client:
-    """Return an HTTP client without proxies and with a short timeout."""
+    """Return an HTTP client without proxies and with a short timeout. `verify`: the certificates to
+    accept, False for all."""
     return httpx.Client(verify=verify, timeout=_PATIENCE_S, trust_env=False)
 
 
 def health(asking: httpx.Client, base: str) -> ProcessAnswer:
-    """Return the answer of a process to `/healthz`. Raise httpx.HTTPError if there is no answer."""
+    """Ask a process for `/healthz` by the client `asking`, and return its answer. `base`: its URL.
+    Raise httpx.HTTPError if there is no answer."""
     answer = asking.get(f"{base}/healthz")
     now = time.time()
     try:
@@ -102,7 +104,8 @@ def _ahead(date: str, now: float) -> float | None:
 
 
 def _reached(host: str) -> str:
-    """Return the address by which a process that listens everywhere is reached from here."""
+    """Return the address by which a process that listens at `host` is reached from here: this
+    computer's own, if it listens everywhere."""
     return "127.0.0.1" if host in {"*", "0.0.0.0", "::", "localhost"} else host
 
 
@@ -112,7 +115,8 @@ _OTHER_NAME: Final = (62, 64)  # X509_V_ERR_HOSTNAME_MISMATCH, …IP_ADDRESS_MIS
 
 
 def certificate_fits(where: str, url: str, trust: ssl.SSLContext) -> Iterator[Diagnostic]:
-    """Yield the faults of the certificate at an address; yield no finding if no server answers."""
+    """Yield the faults of the certificate of the server at `url`; none if no server answers.
+    `where`: the address for the message; `trust`: the certificates to accept."""
     host, port = urlsplit(url).hostname or "", urlsplit(url).port or 443
     try:
         _shake(host, port, trust)
@@ -163,8 +167,9 @@ def _names(shown: x509.Certificate | None) -> str:
 
 
 def _shake(host: str, port: int, trust: ssl.SSLContext) -> bytes | None:
-    """Return the certificate that a server presents. Raise OSError if it does not answer,
-    ssl.SSLCertVerificationError if the certificate is not trusted."""
+    """Make a TLS handshake with a server and return its certificate (DER), None if it has none.
+    Raise OSError if it does not answer, ssl.SSLCertVerificationError if the certificate is not
+    trusted."""
     with (
         socket.create_connection((host, port), _HANDSHAKE_S) as wire,
         trust.wrap_socket(wire, server_hostname=host) as secured,
@@ -194,7 +199,7 @@ _UPGRADE: Final = {
 
 
 def proxy_leads_here(place: Installation) -> Iterator[Diagnostic]:
-    """Check that the public address leads to both processes. Nothing secret is sent."""
+    """Check that the public address of `place` leads to both processes. No secret is sent."""
     try:
         public = reached(place.public_url, None).public
     except CannotStart as error:
@@ -268,7 +273,8 @@ _CLOCK_S: Final = 5.0
 
 
 def processes_fit(place: Installation) -> Iterator[Diagnostic]:
-    """Check which programs listen at both ports, and which hold the databases."""
+    """Check which programs listen at the ports of the editor and the runner, and which hold the
+    databases of `place`."""
     for name, port in place.processes:
         where = f"{place.host}:{port}"
         answer = at_port(place.host, port)
@@ -319,7 +325,8 @@ def _ours(
 
 
 def clock_differs(name: str, where: str, ahead_s: float) -> Diagnostic:
-    """Return the finding that the clock of a process differs from ours."""
+    """Return the finding that the clock of a process is `ahead_s` seconds ahead of (negative:
+    behind) the clock of this computer. `name`, `where`: the process and its address."""
     way = "ahead of" if ahead_s > 0 else "behind"
     return found(
         "clock-differs",
@@ -331,8 +338,9 @@ def clock_differs(name: str, where: str, ahead_s: float) -> Diagnostic:
 
 
 def _held(place: Installation, name: str, *, runs: bool) -> Iterator[Diagnostic]:
-    """Yield a finding if the process that holds the lock of a database is of another program, or of
-    this program but does not answer at its port. `runs`: one of this program answers there."""
+    """Yield a finding if the process that holds the lock of the database `name` is of another
+    program, or is of this program but does not answer at its port. `runs`: this program answers
+    there."""
     file = place.data / f"{name}.db"
     holder = lock.holder(file)
     if holder is None:

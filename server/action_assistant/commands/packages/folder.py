@@ -52,8 +52,8 @@ class FileStep(msgspec.Struct, frozen=True):
 
 
 def contents(root: Path, paths: Iterable[str]) -> FolderContents:
-    """Read the files at these relative paths (with `/`). Raise CannotStart if the folder cannot be
-    read."""
+    """Read the files at the relative paths `paths` (with `/`) below `root`. Raise CannotStart if
+    the folder cannot be read."""
     present: dict[str, bytes] = {}
     barred: dict[str, str] = {}
     try:
@@ -76,9 +76,9 @@ def contents(root: Path, paths: Iterable[str]) -> FolderContents:
 
 
 def write_all(root: Path, steps: Sequence[FileStep], known: Mapping[str, bytes]) -> None:
-    """Carry out all steps in their order, or none of them; create missing folders. `known` gives
-    the expected content of each file. Raise CannotStart if a file has another content by now or
-    cannot be written.
+    """Carry out all steps in their order below `root`, or none of them; create missing folders.
+    `known`: the expected present content of each file. Raise CannotStart if a file has another
+    content by now or cannot be written.
 
     All contents are written into new files first, so that a full disk does no harm. Then the files
     are renamed: each file is the old one or the new one at any time.
@@ -131,7 +131,7 @@ def _inside(top: Directory, path: str, make: bool = False) -> Iterator[tuple[Dir
 
 
 def _content(top: Directory, path: str) -> tuple[bytes, int]:
-    """Return the content of a file and its mode."""
+    """Return the content and the mode of the file at the relative path `path` below `top`."""
     with _inside(top, path) as (at, name):
         return at.read(name)
 
@@ -146,8 +146,8 @@ def _prove_unchanged(top: Directory, path: str, known: bytes | None) -> None:
 
 
 def _stage(top: Directory, path: str, content: bytes) -> str:
-    """Write a new file beside the path, with the rights of the existing file there. Return its
-    name."""
+    """Write a new file with this content beside `path`, with the permissions of the existing file
+    there. Return its name."""
     with _inside(top, path, make=True) as (at, name):
         new = f".{name}.{secrets.token_hex(4)}"
         mode = None
@@ -170,7 +170,8 @@ def _do(top: Directory, path: str, staged: str | None) -> None:
 
 
 def _undo(top: Directory, done: Sequence[FileStep], known: Mapping[str, bytes]) -> None:
-    """Undo the steps, the last first, as far as the disk allows."""
+    """Undo the steps in `done`, the last first, as far as the disk allows. `known`: the contents
+    before."""
     for path in reversed(dict.fromkeys(step.path for step in done)):
         with suppress(OSError):
             if path in known:
@@ -193,7 +194,7 @@ class PackagesPlan(msgspec.Struct, frozen=True):
 
     @property
     def refused(self) -> bool:
-        """Return whether anything prevents writing."""
+        """Return whether anything, such as a conflict, prevents writing."""
         return bool(self.barred) or any(
             each.conflicts or each.differing or each.broken for each in self.regenerations.values()
         )
@@ -210,7 +211,7 @@ class PackagesPlan(msgspec.Struct, frozen=True):
 
     @property
     def removals(self) -> tuple[str, ...]:
-        """Return the paths of files to be removed."""
+        """Return the paths of the files to be removed."""
         return tuple(
             f"{folder}/{path}"
             for folder, each in self.regenerations.items()
@@ -219,12 +220,10 @@ class PackagesPlan(msgspec.Struct, frozen=True):
 
     @property
     def steps(self) -> tuple[FileStep, ...]:
-        """Return the steps of writing, in an order that may be interrupted anywhere.
-
-        The base files come last. If they came first, a killed call would leave files that look as
-        if people had reverted the new content. Before all files, each base announces which files
-        will follow, so that the next call knows those that were written.
-        """
+        """Return the steps of writing, in an order that may be interrupted anywhere. The base files
+        come last. If they came first, a killed call would leave files that seem to be reverted by
+        people. Before all files, each base announces which files will follow, so that the next call
+        recognises the written ones."""
         announced = [
             FileStep(f"{folder}/{BASE_NAME}", each.announced)
             for folder, each in self.regenerations.items()
@@ -277,9 +276,9 @@ def _regenerated(
 
 
 def prevented_in(source: Path, packages: Iterable[str]) -> tuple[str, ...]:
-    """Return a sentence for each package of one of these names that is below a source folder, but
-    not in its folder NAME: colcon accepts each name once. Raise CannotStart if there is no such
-    source folder, or if colcon looks for no packages in it."""
+    """Return a sentence for each package, of these names, that is below the source folder but not
+    in its folder NAME: colcon accepts each name once. Raise CannotStart if there is no such source
+    folder, or if colcon ignores it."""
     if not source.is_dir():
         raise CannotStart(
             f"{source} is no folder. --into wants the source folder of a workspace that is there, as "
@@ -297,8 +296,8 @@ def prevented_in(source: Path, packages: Iterable[str]) -> tuple[str, ...]:
 
 
 def _packages(source: Path) -> Iterator[tuple[Path, str]]:
-    """Yield the folder and name of every package below. As colcon does, follow links to folders,
-    and skip hidden folders and folders inside packages."""
+    """Yield the folder and name of every package below `source`. As colcon does, follow links to
+    folders, and skip hidden folders and folders inside packages."""
     seen: set[str] = set()
     for at, folders, files in os.walk(source, followlinks=True):
         real = os.path.realpath(at)

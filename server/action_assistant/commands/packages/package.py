@@ -24,7 +24,7 @@ from action_assistant.umrf.packages.regenerating import GeneratedChange
 
 
 def tell_refusals(root: Path, plan: PackagesPlan) -> None:
-    """Print each reason against writing, with its place."""
+    """Print each reason against writing the plan, with its place."""
     for path, reason in plan.barred.items():
         _tell(f"{root / path}: {reason}.")
     for folder, each in plan.regenerations.items():
@@ -46,14 +46,14 @@ def tell_refusals(root: Path, plan: PackagesPlan) -> None:
 
 
 def tell_refused(plan: PackagesPlan) -> None:
-    """Print that nothing was written, and what to do about files that were changed by hand."""
+    """Print that nothing was written and, for conflicts in `plan`, what to do about them."""
     _tell("Nothing was written.")
     if any(each.conflicts or each.broken for each in plan.regenerations.values()):
         _tell("Take over by hand what `--diff` shows for these files, and call again.")
 
 
 def tell_changes(root: Path, plan: PackagesPlan) -> None:
-    """Print what a call would change."""
+    """Print what writing the plan would change."""
     for path in plan.writes:
         _tell(f"{root / path}: {'would change' if path in plan.there else 'is not there'}.")
     for path in plan.removals:
@@ -61,11 +61,9 @@ def tell_changes(root: Path, plan: PackagesPlan) -> None:
 
 
 def tell_notes(root: Path, plan: PackagesPlan, with_lines: bool) -> None:
-    """Print which files stay although they are generated differently now, or not at all.
-
-    With `with_lines`, print the difference too: once files are written, nothing else knows what was
-    generated before.
-    """
+    """Print which files stay although they are generated differently now, or not at all. With
+    `with_lines`, print the difference too: once files are written, the earlier generated text is
+    lost."""
     for folder, each in plan.regenerations.items():
         for path in each.kept:
             _tell(
@@ -83,11 +81,9 @@ def tell_notes(root: Path, plan: PackagesPlan, with_lines: bool) -> None:
 
 
 def print_difference(plan: PackagesPlan) -> None:
-    """Print, like `diff -u`, what would be written after merging or what prevents it.
-
-    The base files are left out: their changes are those of the other files. Changes that people
-    have to take over by hand follow at the end.
-    """
+    """Print, like `diff -u`, what would be written after merging or what prevents it. The base
+    files are not shown: their changes repeat those of the other files. Changes that people have to
+    make by hand follow at the end."""
     shown: dict[str, bytes | None] = {**plan.writes, **dict.fromkeys(plan.removals)}
     for folder, each in plan.regenerations.items():
         shown |= {f"{folder}/{path}": content for path, content in each.differing.items()}
@@ -212,7 +208,8 @@ def _regenerated(root: Path, found: PackagesPlan, options: argparse.Namespace) -
 
 
 def _keeping(options: argparse.Namespace) -> tuple[Action, ...]:
-    """Return the action that keeps values. Raise CannotStart if others are named, too."""
+    """Return the action of the helper package that keeps values, as the only one. Raise CannotStart
+    if the options name others, too."""
     if options.file is not None or options.name or options.together:
         raise CannotStart("--values is a package of its own: name no FILE, --name or --together.")
     return (keeper(),)
@@ -239,9 +236,9 @@ def _of_library(options: argparse.Namespace) -> tuple[Action, ...]:
 def _chosen(
     path: Path, names: Sequence[str] | None
 ) -> tuple[tuple[Action, ...], tuple[NameRefusal, ...]]:
-    """Return the actions of a file for which packages are wanted, and refusals of actions that
-    disagree. Raise `Unreadable` for a file that is no UMRF, CannotStart for one that cannot be
-    read."""
+    """Return the actions of a file (`path`) for which packages are wanted (`names`, None for all),
+    and refusals of actions whose uses disagree. Raise `Unreadable` for a file that is no UMRF,
+    CannotStart for one that cannot be read."""
     try:
         text = path.read_bytes()
     except OSError as error:
@@ -268,7 +265,8 @@ def _chosen(
 def _packages(
     actions: Sequence[Action], together: str | None
 ) -> tuple[dict[str, dict[str, bytes]], tuple[NameRefusal, ...]]:
-    """Return the files of all packages, by folder and path, or the reasons against them."""
+    """Return the files of all packages, by folder and path, and the reasons against them, of which
+    there must be none. `together`: the name of one package for all actions, None for one each."""
     if together is not None:
         try:
             return {together: bundle_files(together, actions)}, ()

@@ -178,8 +178,8 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
-    """Return the service that these options describe. Raise CannotStart if an option cannot be used
-    in a unit file."""
+    """Return the service that the options describe. `systemd`: the manager it is for. Raise
+    CannotStart if an option cannot be used in a unit file."""
     settings.check_environment()  # files of secrets stay named, and are read by the service
     if options.database and ("@" in options.database or "password" in options.database):
         raise CannotStart(
@@ -230,7 +230,8 @@ def _backups(options: argparse.Namespace) -> list[str]:
 
 
 def _data(options: argparse.Namespace) -> Path | None:
-    """Return the data folder of the service; None for the folder that systemd manages."""
+    """Return the data folder that the options name for the service; None for the folder that
+    systemd manages."""
     given: Path = options.data
     if options.scope == "system" and given == paths.data() and not _named_data():
         return None
@@ -279,8 +280,8 @@ def _program() -> tuple[str, ...]:
 
 
 def _sourced(environ: Mapping[str, str]) -> dict[str, str]:
-    """Return the shell's ROS 2 environment and settings. Secrets are left out: everybody can read a
-    unit."""
+    """Return the variables of ROS 2 and of this program in the shell's environment; not the secret
+    ones, since all users can read a unit."""
     plain = [name for name in settings.VARIABLES if name not in _SECRET | _SAID]
     return {name: environ[name] for name in (*SOURCED, *plain) if environ.get(name)}
 
@@ -303,7 +304,8 @@ def _there(systemd: Systemd) -> str:
 
 
 def _write(systemd: Systemd, text: str, *, replace: bool) -> None:
-    """Write the unit file. Raise CannotStart if a person has edited it, unless `replace` is set."""
+    """Write the unit file with this text. Raise CannotStart if a person has edited it, unless
+    `replace` is set."""
     unit = systemd.unit
     before = unit.read_text() if unit.exists() else ""
     if before == text:
@@ -325,7 +327,7 @@ def _write(systemd: Systemd, text: str, *, replace: bool) -> None:
 
 
 def _put_aside(unit: Path, text: str) -> None:
-    """Keep a copy of a unit that a person has edited."""
+    """Copy a unit with this text to a file beside it, if a person has edited it."""
     if not is_untouched(text):
         kept = unit.with_name(f"{unit.name}.before")
         shutil.copy2(unit, kept)

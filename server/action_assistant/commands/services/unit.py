@@ -80,7 +80,7 @@ class ServicePlan(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def text_of(plan: ServicePlan) -> str:
-    """Return the whole text of the unit."""
+    """Return the whole text of the unit file for a service."""
     body = "\n".join([*_unit(plan), *_service(plan), *_install(plan), ""])
     head = (
         f"# Made by `action-assistant service install`, version {VERSION}. What you want otherwise\n"
@@ -91,13 +91,14 @@ def text_of(plan: ServicePlan) -> str:
 
 
 def is_untouched(text: str) -> bool:
-    """Return whether a unit is as this program, in any version, wrote it."""
+    """Return whether the text of a unit is as this program, in any version, wrote it."""
     first, _, rest = text.partition("\n")
     return first == f"{_DIGEST}{_digest(rest)}"
 
 
 def options_of(text: str) -> tuple[str, ...] | None:
-    """Return the options by which a unit was made; None if this program did not make it."""
+    """Return the options by which a unit with this text was made; None if this program did not make
+    it."""
     for line in text.splitlines()[:6]:
         if line.startswith(_OPTIONS):
             try:
@@ -108,7 +109,8 @@ def options_of(text: str) -> tuple[str, ...] | None:
 
 
 def quoted(word: str) -> str:
-    """Quote a word so that systemd reads it back unchanged, in a command or an assignment."""
+    """Quote one word of a command or an assignment in a unit, so that systemd reads it back
+    unchanged."""
     plain = word.replace("%", "%%")
     if _PLAIN.fullmatch(plain):
         return plain
@@ -185,7 +187,8 @@ _BOOTED: Final = Path("/run/systemd/system")
 
 
 class Systemd:
-    """The manager of a scope. With `root` nothing is started: systemd of that image will."""
+    """The systemd of a scope, system or user. With `root`, the folder of an image, nothing is
+    started: systemd of that image will do so."""
 
     def __init__(self, scope: Scope, root: Path | None = None) -> None:
         self.scope: Final = scope
@@ -193,7 +196,7 @@ class Systemd:
 
     @property
     def unit(self) -> Path:
-        """Return the path of the unit."""
+        """Return the path of the service's unit file."""
         if self.root is not None:
             return self.root / "etc" / "systemd" / self.scope / NAME
         if self.scope == "system":
@@ -217,7 +220,7 @@ class Systemd:
             )
 
     def command(self, *words: str) -> list[str]:
-        """Return a systemctl command for this scope."""
+        """Return the systemctl command with these arguments for this scope."""
         if self.root is not None:
             scope = ["--global"] if self.scope == "user" else []
             return ["systemctl", f"--root={self.root}", *scope, *words]

@@ -74,8 +74,8 @@ class FolderTrouble(msgspec.Struct, frozen=True):
 
 
 class Folder:
-    """The files of a folder by name, and their stored state. The constructor raises CannotStart if
-    folder or state cannot be read; the methods raise OSError."""
+    """The files of a folder by name, and the stored state of their synchronisation. The constructor
+    raises CannotStart if folder or state cannot be read; the methods raise OSError."""
 
     def __init__(self, path: Path) -> None:
         try:
@@ -87,7 +87,7 @@ class Folder:
         self.known: dict[str, SyncedFile] = self._remembered(path / _STATE)
 
     def close(self) -> None:
-        """Close the descriptor of the folder."""
+        """Close the descriptor of the open folder."""
         self._at.close()
 
     def names(self) -> list[str]:
@@ -95,20 +95,22 @@ class Folder:
         return sorted(n for n in self._at.names() if _is_graph_file(n) and _is_utf8(n))
 
     def read(self, name: str) -> bytes | None:
-        """Return the content of a file; None if there is none. Raise OSError if the entry is no
-        regular file."""
+        """Return the content of the file `name`; None if there is no such entry. Raise OSError if
+        the entry is no regular file."""
         try:
             return self._at.read(name)[0]
         except FileNotFoundError:
             return None
 
     def copy_of(self, name: str, file: SyncedFile) -> str | None:
-        """Return the name of the copy of a conflict, None once it is gone."""
+        """Return the name of the copy that was put beside a file for a conflict, None once it is
+        gone. `file`: the stored state of the file."""
         copy = _copy(name, file.copy)
         return copy if self._is_there(copy) else None
 
     def put_copy(self, name: str, text: bytes) -> int:
-        """Put the server's text beside a file, in place of nothing; return the number of that copy."""
+        """Write the server's text as a new copy beside the file `name`, replacing nothing; return
+        the number of that copy."""
         rights = _rights(self._at.status(name))
         fresh = _fresh(secrets.token_hex(8))
         self._at.write_new(fresh, text, *rights)
@@ -123,11 +125,11 @@ class Folder:
         return number
 
     def remember(self, name: str, file: SyncedFile) -> None:
-        """Store that a file and its graph are in step; on the disk when this returns."""
+        """Store durably the state in which the file `name` and its graph are in sync."""
         self._store({**self.known, name: file})
 
     def forget(self, name: str) -> None:
-        """Store that a file has no graph."""
+        """Store durably that the file `name` has no graph."""
         self._store({each: file for each, file in self.known.items() if each != name})
 
     def free_name(self, graph_name: str) -> str:
@@ -140,7 +142,8 @@ class Folder:
             number += 1
 
     def make(self, name: str, graph: str, seq: int, text: bytes) -> bool:
-        """Create the file of a graph; return False if the name is taken by now."""
+        """Create the file `name` with `text`, that of a graph (its id) after its change `seq`;
+        return False if the name is taken by now."""
         coming = Coming(secrets.token_hex(8), seq, sha(text))
         self.remember(name, SyncedFile(graph, seq, None, coming=coming))
         self._at.write_new(_fresh(coming.token), text, None)
@@ -153,9 +156,10 @@ class Folder:
         return made
 
     def exchange(self, name: str, old: str, seq: int, text: bytes) -> bool:
-        """Replace the text of a file by that of its graph at `seq`, if the file still has the
-        SHA-256 `old`; return False if it was changed meanwhile. The old file is kept until the
-        next round, which finds what an editor that had it open has written since."""
+        """Replace the text of a file by `text`, that of its graph at `seq`, if the file still has
+        the SHA-256 `old`; return False if it was changed meanwhile. The old file stays under
+        another name until the next round, which finds what an editor that had it open has written
+        since."""
         before = self.known[name]
         coming = Coming(secrets.token_hex(8), seq, sha(text))
         aside = PutAside(coming.token, old)
@@ -200,9 +204,9 @@ class Folder:
         return self._trouble
 
     def _resumed(self, name: str, file: SyncedFile) -> SyncedFile | None:
-        """Complete or undo an exchange of a file that was interrupted, and return its entry without
-        the pending state. Return None if it was a new file that was never created. Raise OSError
-        if a file cannot be read or moved."""
+        """Complete or undo an exchange of the file `name` that was interrupted, and return its
+        state without the pending part. Return None if it was a new file that was never created.
+        Raise OSError if a file cannot be read or moved."""
         coming = file.coming
         if coming is None:
             return file
@@ -220,8 +224,9 @@ class Folder:
         return None if file.sha is None and file.aside is None else replace(file, coming=None)
 
     def _completed(self, name: str, here: bytes, sources: list[str | None]) -> bytes:
-        """Complete a file of which only the beginning was written when the process ended (without
-        hard links files are copied). Return the content."""
+        """Complete the file `name`, with the content `here`, if only the beginning of one of
+        `sources` was written when the process ended (without hard links files are copied). Return
+        the content."""
         for source in filter(None, sources):
             text = self.read(source)
             if text is not None and len(here) < len(text) and text.startswith(here):
@@ -232,8 +237,9 @@ class Folder:
     def _look_after(
         self, name: str, aside: str, old: str, what: str = "was written while it was exchanged"
     ) -> None:
-        """Remove a file that was put aside; keep it under another name if somebody has written into
-        it since. Raise OSError if that fails."""
+        """Remove the file `aside`, which was moved aside from `name` with the SHA-256 `old`; if it
+        was written into since, keep it under another name and report that (`what`). Raise OSError
+        if that fails."""
         text = self.read(aside)
         if text is None:
             return
@@ -245,7 +251,8 @@ class Folder:
         self._at.remove(aside)
 
     def _kept(self, name: str, aside: str, text: bytes) -> str:
-        """Rename a file that was put aside to an unused name, and return the name."""
+        """Rename the file `aside`, with this text, to an unused name beside `name`, and return
+        that."""
         names = (f"{name}.mine-{sha(text)[:8]}{more}" for more in _numbers())
         return next(
             kept for kept in names if self._move(aside, kept) or self._read_or_none(kept) == text
@@ -275,8 +282,8 @@ class Folder:
                 self._trouble.append(FolderTrouble(f"{entry}: {why(error)}"))
 
     def _look_after_former(self, aside: str, name: str, old: str) -> None:
-        """Handle a file that an earlier version of this program has put aside, as `_look_after`
-        does."""
+        """Handle a file that an earlier version of this program has moved aside from `name`, as
+        `_look_after` does."""
         file = self.known.get(name)
         if not self._is_there(name):
             if file is not None and file.sha == old:
@@ -287,14 +294,14 @@ class Folder:
         self._look_after(name, aside, old)
 
     def _read_or_none(self, name: str) -> bytes | None:
-        """Return the content of a file; None if there is none or it is no regular file."""
+        """Return the content of the file `name`; None if it does not exist or is no regular file."""
         try:
             return self.read(name)
         except OSError:
             return None
 
     def _is_there(self, name: str) -> bool:
-        """Return whether something has this name, be it a link that leads nowhere."""
+        """Return whether an entry has this name, even if it is a link that leads nowhere."""
         try:
             self._at.status(name)
         except FileNotFoundError:
@@ -302,8 +309,8 @@ class Folder:
         return True
 
     def _move(self, old: str, new: str) -> bool:
-        """Rename a file without overwriting; return False if `new` exists. Without hard links a
-        regular file is copied, since a rename could overwrite."""
+        """Rename the file `old` to `new` without overwriting; return False if `new` exists. Without
+        hard links a regular file is copied, since a rename could overwrite."""
         try:
             self._at.link(old, new)
         except FileExistsError:
@@ -322,7 +329,8 @@ class Folder:
         return True
 
     def _store(self, known: dict[str, SyncedFile]) -> None:
-        """Replace the stored state of the folder, durably. Raise OSError if it cannot be written."""
+        """Replace the stored state of the folder by `known`, durably. Raise OSError if it cannot be
+        written."""
         fresh = _fresh(secrets.token_hex(8))
         rights: tuple[int, Owner] | tuple[None, None] = (None, None)
         with suppress(FileNotFoundError):
@@ -334,8 +342,8 @@ class Folder:
 
     def _remembered(self, path: Path) -> dict[str, SyncedFile]:
         """Return the entries of the stored state. An entry that is malformed or names no file of
-        this folder is reported, not used, and kept. Raise CannotStart if the state cannot be
-        read."""
+        this folder is reported and not used, but stays stored. `path`: of the state, for messages.
+        Raise CannotStart if the state cannot be read."""
         try:
             text = self.read(_STATE)
             entries = {} if text is None else msgspec.json.decode(text, type=dict[str, msgspec.Raw])
@@ -356,7 +364,7 @@ class Folder:
 
 
 def sha(text: bytes) -> str:
-    """Return the SHA-256 of a text, in hex."""
+    """Return the SHA-256 of the bytes `text`, in hex."""
     return hashlib.sha256(text).hexdigest()
 
 
@@ -388,5 +396,5 @@ def _numbers() -> Iterator[str]:
 
 
 def _rights(found: os.stat_result) -> tuple[int, Owner]:
-    """Return the mode and owner of an entry."""
+    """Return the permissions and the owner in the status of an entry."""
     return stat.S_IMODE(found.st_mode), Owner(found.st_uid, found.st_gid)

@@ -54,7 +54,8 @@ COMMANDS: Final = {"sync": _add_sync}
 
 
 def _sync(options: argparse.Namespace) -> int:
-    """Run the command; return 1 if something is not in sync, which was printed."""
+    """Run the command with these options; return the exit code, 1 if a file or graph is not in
+    sync, which was printed. Raise CannotStart if the folder does not exist."""
     if not options.folder.is_dir():
         raise CannotStart(f"{options.folder} is no folder.")
     told: set[str] = set()
@@ -76,8 +77,8 @@ def _sync(options: argparse.Namespace) -> int:
 
 @contextmanager
 def _alone(folder: Path) -> Iterator[None]:
-    """Lock a folder against a second `sync`, where the file system has locks. Raise CannotStart if
-    another `sync` holds the lock."""
+    """Return a context during which no second `sync` works in the folder, where the file system has
+    locks. Raise CannotStart if another `sync` does."""
     with ExitStack() as held:
         if fcntl is not None:
             at = os.open(folder, os.O_RDONLY)
@@ -92,7 +93,8 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 class SyncRound:
-    """One round of synchronisation. `left`: what is not in sync after it, in words."""
+    """One round of synchronisation of a folder with a server. `left`: what is not in sync after it,
+    in words."""
 
     def __init__(self, server: Server, folder: Folder, tell: Callable[[str], None]) -> None:
         self.left: list[str] = []
@@ -126,8 +128,8 @@ class SyncRound:
                 self._try(graph.name, self._fetch_new, graph)
 
     def _try(self, name: str, step: Callable[..., None], *given: Any) -> None:
-        """Synchronise one file or graph by `step`; a refusal or error is reported and does not stop
-        the others."""
+        """Synchronise one file or graph, called `name`, by `step`; a refusal or error is reported
+        and does not stop the others."""
         try:
             step(*given)
         except RequestRefused as error:
@@ -167,7 +169,8 @@ class SyncRound:
             self._fetch(name, file)
 
     def _send(self, name: str, file: SyncedFile, text: bytes) -> None:
-        """Merge a changed file into its graph."""
+        """Merge the changed text of a file into its graph; for a conflict, put the server's text
+        beside the file."""
         from action_assistant.editor.api.graphs import MergedGraph
 
         try:
@@ -193,7 +196,8 @@ class SyncRound:
             self._folder.remember(name, sent)
 
     def _fetch(self, name: str, file: SyncedFile) -> None:
-        """Write a changed graph into its file."""
+        """Write the changed text of a graph into its file, unless the file has it already or was
+        changed meanwhile."""
         seq, now = self._text(file.graph)
         assert file.sha is not None
         if sha(now) == file.sha:
@@ -203,7 +207,7 @@ class SyncRound:
         # Otherwise the next round sees what somebody has written.
 
     def _bring(self, name: str, others: Collection[str]) -> None:
-        """Make a graph of a new file. `others`: the graphs that have no file."""
+        """Make a graph of the new file `name`. `others`: the ids of graphs that have no file."""
         text = self._folder.read(name)
         if text is None:
             return
@@ -227,7 +231,8 @@ class SyncRound:
         self._brought(name, SyncedFile(made.id, made.seq, sha(text)), text)
 
     def _brought(self, name: str, file: SyncedFile, text: bytes) -> None:
-        """Record that a file has become a graph."""
+        """Record that the file `name` has become a graph; fetch the graph's text if the file was an
+        older form of UMRF."""
         self._folder.remember(name, file)
         if codec.read(text).dialect != _TODAY:  # an edit of an older form could not be told apart
             self._tell(f"{name}: was an older form of UMRF; it has today's now")
@@ -239,7 +244,7 @@ class SyncRound:
         return self._server.editor("GET", path, params={"at": _FIRST}).content
 
     def _fetch_new(self, graph: "GraphView") -> None:
-        """Make a file for a new graph."""
+        """Make a file for a graph that has none."""
         seq, now = self._text(graph.id)
         name = self._folder.free_name(graph.name)
         if self._folder.make(name, graph.id, seq, now):

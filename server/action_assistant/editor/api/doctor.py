@@ -34,7 +34,8 @@ class LastExamination(msgspec.Struct, frozen=True):
 
 
 def routes(settings: EditorSettings) -> list[ControllerRouterHandler]:
-    """Return the route that runs `doctor`, once at a time for all requests."""
+    """Return the routes that run the command `doctor`, once at a time for all requests, and that
+    give its last result."""
 
     examination = SharedCheck(lambda: _examined(settings), patience=_PATIENCE_S, fresh=_FRESH_S)
 
@@ -81,7 +82,8 @@ def _told(failure: BaseException) -> str:
 
 
 async def _examined(settings: EditorSettings) -> list[Diagnostic]:
-    """Run the command `doctor` in a process of low priority, since it loads much and may hang."""
+    """Run the command `doctor` in a process of low priority, since it loads much and may hang, wait
+    for it, and return what it found. Raise Unavailable if its output cannot be read."""
     command = [sys.executable, "-m", "action_assistant", "doctor", "--json"]
     command += ["--data", str(settings.data), "--port", str(settings.port)]
     async with await anyio.open_process(

@@ -36,7 +36,8 @@ class Answering(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes that only drafts have: list, make, propose, answer, preview and merge."""
+    """Return the routes that only drafts have: list, make, propose, answer, preview and merge.
+    `app_state` has the services once they are open."""
     return [*_drafts(app_state), *_proposals(app_state), *_merges(app_state)]
 
 

@@ -21,7 +21,7 @@ _SCRIPT: Final = 1_000_000  # bytes of a body that says what to play
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Return the routes that read pasted UMRF text, and that compute what a graph would do in a
-    run."""
+    run. `app_state` has the services once they are open."""
 
     @post(
         "/api/pieces",

@@ -65,7 +65,8 @@ class Participant(msgspec.Struct, frozen=True):
 
 
 def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
-    """Return the routes that belong to no single graph: settings, people, examples and the stream of events."""
+    """Return the routes that belong to no single graph: settings, people, examples and the stream
+    of events. `addresses`: of this server for other people."""
 
     known = commit()
 
@@ -120,8 +121,9 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
 
 
 async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[ServerSentEventMessage]:
-    """Yield the stored events after a position (None: no old ones), then new events as they are
-    stored."""
+    """Yield, as events of an HTTP event stream, the stored events after the position `after` (None:
+    no old ones), then new events as they are stored, without end. While none comes, yield a comment
+    now and then."""
     services = app_state.services
     async with services.journal.follow() as events:
         done = await services.journal.position() if after is None else after

@@ -46,7 +46,7 @@ class MergedGraph(msgspec.Struct, frozen=True):
 
 
 class Describing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A new name or description of a graph. A field that is left out does not change."""
+    """A new name or description of a graph. A missing field does not change."""
 
     name: str | None = None
     description: str | None = None
@@ -60,31 +60,30 @@ class Problems(msgspec.Struct, frozen=True):
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes under `/api/graphs` except those of versions, rooms and history."""
+    """Return the routes under `/api/graphs`, except for versions, rooms and history."""
     return [*_catalogue(app_state), *_contents(app_state)]
 
 
 def made_graph(made: GraphView, told: bytes | None) -> Response[MadeGraph]:
-    """Return the answer for a new document. `told`: the JSON of the `ImportReport` of its file."""
+    """Return the answer with the status 201 for a new document. `told`: the JSON of the
+    `ImportReport` of its file, None without a file."""
     reading = None if told is None else encoded(ImportReport, told)
     body = MadeGraph(**msgspec.structs.asdict(made), reading=reading)
     return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
 
 async def _previewed(services: EditorServices, body: bytes) -> bytes:
-    """Return the JSON of a `Preview` of a file, checked with the stored graphs that would be
-    inside."""
+    """Return the JSON of a `Preview` of a UMRF file (`body`), checked with the stored graphs that
+    would be inside."""
     name, uses = await services.workers.files(importing.names, body)
     inside = await services.graph_checks.inside_of(name, uses)
     return await services.workers.files(importing.preview, body, inside)
 
 
 async def _inside_with(services: EditorServices, then: GraphAtSeq, text: bytes) -> Inside:
-    """Return the graphs inside of the graph `then`, as they are now. `text`: UMRF text that was
-    edited from this graph; graphs that only the text uses are returned, too.
-
-    Raise BadInput, NotUmrf or TooLarge if the text cannot be read.
-    """
+    """Return the graphs inside of the graph `then`, in their present state. `text`: UMRF text that
+    was edited from this graph; graphs that only the text uses are returned, too. Raise BadInput,
+    NotUmrf or TooLarge if the text cannot be read."""
     _, uses = await services.workers.files(importing.names, text)
     return await services.graph_checks.inside(then, more=uses)
 

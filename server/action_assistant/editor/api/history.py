@@ -46,8 +46,9 @@ class PastDocument(msgspec.Struct, frozen=True):
 
 
 async def _moment(services: EditorServices, graph: str, seq: int | None, place: str) -> int:
-    """Return a change of a graph that the index has: `seq`, or the newest one. Raise Conflict, with
-    `place` as its place, if there is no such change."""
+    """Return the number of a change of a graph: `seq`, or the newest one for None, after the index
+    of changes has caught up to it. Raise Conflict, with `place` as its place, if there is no such
+    change."""
     at = await services.journal.newest(graph_stream(graph)) if seq is None else seq
     upto = await services.change_index.upto(graph, at)
     if upto < at:
@@ -58,7 +59,7 @@ async def _moment(services: EditorServices, graph: str, seq: int | None, place: 
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes that read the history of a graph, and those that go back in it."""
+    """Return the routes that read the history of a graph, and that restore or revert."""
     return [*_looking(app_state), *_blaming(app_state), *_going(app_state)]
 
 

@@ -48,8 +48,8 @@ class UpdatingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class TakingOver(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The graph with the use whose parameters the library takes over, and the `aid` of that action;
-    if missing, the first use that differs."""
+    """The graph with the use whose parameters the library takes over, and the key (`aid`) of that
+    action; if missing, the first use that differs."""
 
     graph: str
     aid: str | None = None
@@ -71,7 +71,7 @@ class LastBuild(msgspec.Struct, frozen=True):
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes of the action library."""
+    """Return the routes of the library of actions: actions, their uses, and builds."""
     return [*_actions(app_state), *_uses(app_state), *_builds(app_state)]
 
 

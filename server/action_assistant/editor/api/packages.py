@@ -18,7 +18,7 @@ Packages = Annotated[list[str] | None, QueryParameter(name="package", max_items=
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes that generate C++ packages. They store nothing."""
+    """Return the routes that generate C++ packages from graphs and actions. They store nothing."""
 
     @get(
         "/api/graphs/{graph_id:str}/packages",

@@ -37,9 +37,9 @@ class RoomConnection:
         self._rate_limits = rate_limits
 
     def receive(self, data: bytes | None) -> float:
-        """Handle one binary message; None stands for a text message, which is refused. Return for
-        how many seconds the socket must not be read, in addition to the time while it is far
-        ahead of the room. Close the socket if the message is malformed."""
+        """Handle one binary message of the socket; None stands for a text message, which is
+        refused. Return for how many seconds the socket must not be read, in addition to the time
+        while it is far ahead of the room. Close the socket if the message is malformed."""
         member = self.member
         if data is None:
             member.refuse(messages.UNREADABLE)
@@ -71,8 +71,8 @@ class RoomConnection:
 
 
 async def serve_directly(connection: RoomConnection, socket: DirectSocket) -> int:
-    """Serve a socket of our own server until it ends; return the close code. Raise the error that
-    ended it."""
+    """Serve a socket of this program's own server until it ends; return the close code. Raise the
+    error that ended it."""
     directly = _Directly(connection, socket)
     connection.room.join(connection.member)
     socket.take_over(directly)
@@ -84,7 +84,7 @@ async def serve_directly(connection: RoomConnection, socket: DirectSocket) -> in
 
 
 class _Directly:
-    """Reads a socket, and writes to it at most once per turn of the event loop."""
+    """Reads a socket of our own server, and writes to it at most once per turn of the event loop."""
 
     def __init__(self, connection: RoomConnection, socket: DirectSocket) -> None:
         self._connection = connection
@@ -103,7 +103,7 @@ class _Directly:
             self._hold(debt)
 
     def heard(self, message: bytes | None) -> None:
-        """Handle one message; None stands for text."""
+        """Handle one message of the client; None stands for a text message."""
         member = self._member
         if member.closed:
             return
@@ -125,15 +125,15 @@ class _Directly:
         self._socket.resume_hearing()
 
     def may_write(self) -> None:
-        """Write on, since the send buffer of the socket has room again."""
+        """Write the waiting messages, since the send buffer of the socket has room again."""
         self._write()
 
     def gone(self) -> None:
-        """Close the member, since the client has disconnected."""
+        """Close the member of the room, since the client has disconnected."""
         self._member.close(NORMAL)
 
     def end(self) -> None:
-        """Hand the socket back to its server. Raises an error that a message caused meanwhile."""
+        """Hand the socket back to its server. Raise an error that a message caused meanwhile."""
         self._member.on_news = _nothing
         if self._pause is not None:
             self._pause.cancel()
@@ -148,11 +148,11 @@ class _Directly:
 
     def _write_now(self, framed: bytes) -> bool:
         """Write framed messages at once, and return True; return False if other messages have to be
-        written before them or the socket takes none now."""
+        written before them or the socket accepts no data now."""
         return not self._is_due and not self._unsent and self._socket.write_framed(framed)
 
     def _write(self) -> None:
-        """Write what waits, as far as the client reads it."""
+        """Write the waiting messages, as far as the client reads them."""
         self._is_due = False
         member, socket = self._member, self._socket
         if member.closed or not socket.is_writable:
@@ -166,12 +166,12 @@ class _Directly:
 
 
 def _nothing() -> None:
-    """Ignore news of a socket that has ended."""
+    """Ignore events of a socket that has ended."""
 
 
 async def serve_by_asgi(connection: RoomConnection, receive: Receive, send: Send) -> int:
-    """Serve a socket of any ASGI server until it ends; return the close code. Raise the error that
-    ended it."""
+    """Serve a socket of any ASGI server, by its functions `receive` and `send`, until it ends;
+    return the close code. Raise the error that ended it."""
     connection.room.join(connection.member)
     # Two plain tasks: a thousand idle sockets are a thousand times what stands around each.
     tasks = [
@@ -194,7 +194,8 @@ async def serve_by_asgi(connection: RoomConnection, receive: Receive, send: Send
 
 
 async def _read_messages(receive: Receive, connection: RoomConnection) -> None:
-    """Read messages until the client disconnects, which closes the member."""
+    """Read messages of the client and handle them until it disconnects, which closes the member of
+    the room, or is refused."""
     if (debt := connection.debt()) > 0:
         await connection.pause(debt)
     while True:
@@ -225,7 +226,8 @@ _GOODBYE: Final = 1.0  # seconds that a close frame gets
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the route of rooms. Stock clients (`y-websocket`) append the name of their room, always `room`."""
+    """Return the route of rooms (WebSockets of graphs). Common clients (`y-websocket`) append the
+    name of their room to the path, always `room`."""
 
     @websocket("/api/graphs/{graph_id:str}/room")
     async def room(socket: Socket, graph_id: str) -> None:
@@ -266,8 +268,8 @@ def _wants_acks(socket: Socket) -> bool:
 
 
 def _has_other_history(socket: Socket, epoch: str, room: Room) -> bool:
-    """Return whether the client has another history of the log: its epoch differs, or it knows
-    later changes than exist."""
+    """Return whether the client has another history of the log, as after a restored backup: its
+    epoch differs, or it knows later changes than the room."""
     asked = socket.query_params
     if asked.get("epoch", epoch) != epoch:
         return True
@@ -285,7 +287,7 @@ async def _refuse_history(socket: Socket, epoch: str) -> None:
 
 
 async def _serve(socket: Socket, connection: RoomConnection) -> int:
-    """Serve a socket until one side closes it; return the close code."""
+    """Serve the socket of a member of a room until one side closes it; return the close code."""
     direct = direct_socket(socket.scope.get("extensions"))
     if direct is not None:
         code = await serve_directly(connection, direct)
@@ -298,7 +300,8 @@ async def _serve(socket: Socket, connection: RoomConnection) -> int:
 
 
 async def _refuse(socket: Socket, refused: Refused) -> None:
-    """Answer the request for an upgrade with an HTTP error."""
+    """Answer the request for a WebSocket with an HTTP error, or, if it is open already, close it as
+    for a restart."""
     if socket.connection_state != "init":
         await socket.close(messages.RESTARTING, messages.REASONS[messages.RESTARTING])
         return

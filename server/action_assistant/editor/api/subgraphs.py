@@ -31,8 +31,9 @@ from action_assistant.web.auth.access import Needs, person_of
 
 
 class Extracting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to move actions into a new sub-graph called `name`. `seq`: the change of the graph that the
-    page shows, the newest if left out. `otherwise`: do it even if the graph may then behave otherwise."""
+    """A request to move actions into a new sub-graph called `name`. `seq`: the change of the graph
+    that the page shows, the newest if missing. `otherwise`: do it even if the graph may then behave
+    otherwise."""
 
     actions: tuple[Key, ...]
     name: str
@@ -49,9 +50,9 @@ class MadeSubGraph(msgspec.Struct, frozen=True):
 
 
 class UnpackingAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to replace an action by the actions of the graph that it stands for. `seq`: the change of the
-    graph that the page shows, the newest if left out. `at`: where the action is drawn, if it has no stored
-    position."""
+    """A request to replace an action by the actions of the graph that it stands for. `seq`: the
+    change of the graph that the page shows, the newest if missing. `at`: where the action is drawn,
+    if it has no stored position."""
 
     action: Key
     seq: int | None = None
@@ -59,8 +60,8 @@ class UnpackingAction(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class CallingUses(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to rename the actions called `before` in these graphs to `name`, after the graph
-    that they stand for was renamed."""
+    """A request to rename the actions called `before` in `graphs` to `name`, after the graph that
+    they stand for was renamed."""
 
     before: str
     name: str
@@ -83,7 +84,8 @@ class FlatCopy(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 async def _chosen(
     services: EditorServices, graph: str, data: Extracting
 ) -> tuple[GraphAtSeq, ChosenActions]:
-    """Return the outer graph, and the request for a sub-graph of its chosen actions."""
+    """Return the outer graph (`graph`: its id) after the change that the request names, and the
+    request for a sub-graph of its chosen actions."""
     await services.catalogue.require(graph, "graph")
     name, _ = fit(data.name, "")
     names = services.graph_checks.names
@@ -173,12 +175,10 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
 async def _whole(
     services: EditorServices, graph: str, seq: int | None
 ) -> tuple[GraphAtSeq, Inside]:
-    """Return a graph after its change `seq` (None: the newest), with the present state of all
-    graphs inside. `graph`: its id.
-
-    Raise NotFound if there is no such graph; Conflict if it has no such change, or if more graphs
-    are inside of it than are looked at; Unavailable if the log cannot be read.
-    """
+    """Return a graph (its id) after its change `seq` (None: the newest), and all graphs inside in
+    their present state. Raise NotFound if there is no such graph; Conflict if it has no such
+    change, or more graphs are inside of it than are examined; Unavailable if the log cannot be
+    read."""
     await services.catalogue.require(graph, "graph")
     sight = await services.graph_reader.moment(graph, seq)
     inside = await services.graph_checks.inside(sight)

@@ -15,7 +15,8 @@ from action_assistant.web.server.openapi import FileBytes, answer
 
 
 class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to publish a version. `seq`: the change of the graph to publish, the newest if left out."""
+    """A request to publish a version. `seq`: the change of the graph to publish, the newest if
+    missing."""
 
     label: str = ""
     seq: int | None = None
@@ -23,7 +24,7 @@ class Publishing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes of published versions."""
+    """Return the routes of published versions: list, publish and get."""
 
     @get(
         "/api/graphs/{graph_id:str}/versions",

@@ -77,8 +77,9 @@ class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Catalogue:
-    """All graphs and actions of the library. Its methods raise NotFound for an id that is unknown
-    or deleted."""
+    """Lists, makes, changes and deletes graphs and actions of the library. Its methods raise
+    NotFound for an id that is unknown or deleted. `author`: the id of the person for whom it acts.
+    """
 
     def __init__(
         self,
@@ -95,23 +96,24 @@ class Catalogue:
         self._graph_reader = graph_reader
 
     async def require(self, graph: str, kind: h.DocumentKind | None = None) -> h.DocumentKind:
-        """Check that a document exists and is not deleted, and return its kind. Raise NotFound if
-        there is no such document, or if `kind` is given and the document is of another kind."""
+        """Check that a document exists and is not deleted, and return its kind. `graph`: its id.
+        Raise NotFound if there is no such document, or if it is not of the kind `kind` (None: of
+        any)."""
         found: h.DocumentKind = _there(
             graph, await self._journal.query(_KIND, {"id": graph}), kind
         ).kind
         return found
 
     async def get(self, graph: str) -> GraphView:
-        """Return one graph as lists show it. Raise NotFound if there is none with this id."""
+        """Return one graph as lists show it. Raise NotFound if no graph has this id."""
         await self._checks.names.refresh()
         return await self._view(await self._row(graph))
 
     async def all(
         self, *, deleted: bool = False, kind: h.DocumentKind = "graph"
     ) -> list[GraphView]:
-        """Return every document of a kind, the last changed first. Deleted documents and drafts are
-        left out; with `deleted`, return the deleted documents instead."""
+        """Return all documents of a kind, the last changed first: without deleted ones and drafts
+        or, with `deleted`, only deleted ones."""
         graph = editor_tables.graph.c
         shown = [graph.deleted_at.is_(None), graph.draft_of.is_(None)]
         chosen = _rows().where(
@@ -124,11 +126,9 @@ class Catalogue:
 
     async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
         """Make a graph. `body` is either an object with a name and a description, for an empty
-        graph, or a UMRF file. Return the graph, and JSON of a `Reading` if a file was read.
-
-        Raise BadInput, NotUmrf or TooLarge, with the place in the file, if the file cannot be read;
-        then nothing is stored.
-        """
+        graph, or a UMRF file. Return the graph, and the JSON of an `ImportReport` if a file was
+        read, else None. Raise BadInput, NotUmrf or TooLarge, with the place in the file, if the
+        file cannot be read; then nothing is stored."""
         try:
             wanted = msgspec.json.decode(body, type=NewGraph)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
@@ -147,9 +147,9 @@ class Catalogue:
         keys: tuple[Key, ...] = (),
         run_in_worker: RunInWorker | None = None,
     ) -> tuple[GraphView, bytes]:
-        """Make a graph from a UMRF file, which the log keeps unchanged. `keys`: the keys of its
-        actions in order; without them actions get new ones. Return the graph and the JSON of an
-        `ImportReport`."""
+        """Make a graph from a UMRF file (`body`), which the log stores unchanged. `keys`: the keys
+        of its actions in order; without them actions get new ones. Return the graph and the JSON of
+        an `ImportReport`. Raise BadInput, NotUmrf or TooLarge if the file cannot be read."""
         found = await (run_in_worker or self._run_in_worker)(importing.imported, body, keys)
         about = found.about
         made = h.draft(
@@ -163,7 +163,8 @@ class Catalogue:
     async def describe(
         self, graph: str, author: str, *, name: str | None, description: str | None
     ) -> GraphView:
-        """Give a graph another name or description. It is an edit of its document."""
+        """Give a graph another name or description (None: keep it) by an edit of its document;
+        return it as lists show it."""
         row = await self._row(graph)
         new_name, new_description = fit(
             row.name if name is None else name,
@@ -183,9 +184,10 @@ class Catalogue:
     async def call_uses(
         self, graphs: Collection[str], before: str, name: str, author: str
     ) -> tuple[str, ...]:
-        """Rename the actions called `before` in these graphs, one edit for each graph, after the
-        graph that they stand for was renamed. Return the graphs that had such an action. Raise
-        NotFound, before anything is written, if a graph does not exist."""
+        """Rename the actions called `before` in the graphs with these ids to `name`, by one edit
+        for each graph, after the graph that they stand for was renamed. Return the ids of the
+        graphs that had such an action. Raise NotFound, before anything is written, if a graph does
+        not exist."""
         new_name, _ = fit(name, "")
         for graph in graphs:
             await self.require(graph, "graph")
@@ -199,7 +201,7 @@ class Catalogue:
         return tuple(changed)
 
     async def delete(self, graph: str, author: str) -> None:
-        """Mark a graph as deleted, and close the sockets of all who are in it."""
+        """Mark a graph as deleted, and close the sockets of all who have it open."""
         await self._row(graph)
         stream = h.graph_stream(graph)
         self._rooms.check_existence(stream)  # also where it is never known whether this was stored
@@ -207,7 +209,7 @@ class Catalogue:
         self._rooms.expel(stream)
 
     async def recover(self, graph: str, author: str) -> GraphView:
-        """Bring a deleted graph back."""
+        """Undelete a graph, and return it; does nothing to one that is not deleted."""
         row = await self._row(graph, deleted=True)
         if row.deleted_at is not None:
             try:
@@ -219,8 +221,9 @@ class Catalogue:
     async def add_action(
         self, action: Action, author: str, about: h.GraphCreated, file: bytes | None = None
     ) -> GraphView:
-        """Make the document of an action of the library. `file`: the file from which the action was
-        read, which is stored with the document; None if there was none."""
+        """Make the document of an action of the library, and return it as lists show it. `about`:
+        the event that records this; `file`: the file from which the action was read, which is
+        stored with the document; None if there was none."""
         graph = Graph(name=action.name, actions=(action,), direction="right")
         created = h.draft(h.CREATED, author, about)
         came = None if file is None else Draft(h.IMPORTED, author, file)
@@ -228,10 +231,10 @@ class Catalogue:
         return await self._add(document_edits.first(graph), info, [created], author, came)
 
     async def add_draft(self, origin: str, seq: int, name: str, author: str) -> GraphView:
-        """Make a draft of the graph `origin`: a new graph with the content that `origin` had after
-        its change `seq`, under the same keys. Comments are not copied. Raise NotFound if there
-        is no such graph, Conflict if it has no such change, and Unavailable if the log cannot be
-        read or written."""
+        """Make a draft of the graph `origin` called `name`: a new graph with the content that
+        `origin` had after its change `seq`, under the same keys. Comments are not copied. Raise
+        NotFound if there is no such graph, Conflict if it has no such change, and Unavailable if
+        the log cannot be read or written."""
         row = await self._row(origin, kind="graph")
         then = await self._graph_reader.at(origin, seq)
         update, about = await self._graph_reader.ask(drafted, then)
@@ -249,8 +252,9 @@ class Catalogue:
         author: str,
         file: Draft | None = None,
     ) -> GraphView:
-        """Store a new graph. A large `file` is stored before it in a commit of its own, since edits
-        of others wait for every commit."""
+        """Store a new graph. `update`: its document as one Yjs update; `of`: facts for lists;
+        `about`: events about it. A large `file` is stored before it in a commit of its own, since
+        edits of others wait for every commit."""
         made = random_id()
         document = Draft(h.UPDATED, author, update)
         if file is not None and len(file.body) > _LARGE_FILE:

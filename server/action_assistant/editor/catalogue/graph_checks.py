@@ -46,7 +46,8 @@ class GraphSummary(msgspec.Struct, frozen=True):
     first: tuple[str, str] | None = None
 
     def called(self, kind: DocumentKind) -> tuple[str | None, str | None]:
-        """Return name and description; for a library document those of its action."""
+        """Return the name and the description of a document; for a library document those of its
+        action. A value is None if it is not known."""
         return (self.name, self.description) if kind == "graph" or not self.first else self.first
 
 
@@ -87,7 +88,7 @@ class NamedInside(msgspec.Struct, frozen=True):
 
 
 class GraphChecks:
-    """Checks graphs. Nothing that it remembers is needed; it only saves checking again."""
+    """Checks graphs, with the graphs inside of them. All that it stores is a cache."""
 
     def __init__(self, journal: Journal, rooms: Rooms, reader: GraphReader) -> None:
         self._rooms = rooms
@@ -101,8 +102,8 @@ class GraphChecks:
         self._uses = LruCache[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
 
     async def problems(self, sight: GraphAtSeq) -> bytes:
-        """Return the JSON of a graph's problems, checked with the present state of the graphs
-        inside."""
+        """Return the JSON of the problems of a graph at a change (`sight`), checked with the
+        present state of the graphs inside."""
         await self.names.refresh()
         named = await self._resolved(*await self._names_at(sight))
         key = sight.graph, sight.seq, named.key()
@@ -114,8 +115,8 @@ class GraphChecks:
         return found
 
     async def inside(self, *moments: GraphAtSeq, more: Iterable[str] = ()) -> Inside:
-        """Return the graphs inside of a graph, as they are now. The names of its actions are read
-        from the graph at these moments, and the names in `more` are added."""
+        """Return the graphs inside of a graph, in their present state. The names of its actions are
+        read from the graph at each of `moments`, and the names in `more` are added."""
         await self.names.refresh()
         known = [await self._names_at(each) for each in moments]
         uses = [name for _, each in known for name in each]
@@ -148,8 +149,9 @@ class GraphChecks:
         self._remember(graph, _About(1, 1, about))
 
     async def summary(self, graph: str, newest: int) -> GraphSummary:
-        """Return what lists show of a graph whose last change is `newest`. Names of other graphs
-        are those of the last refresh."""
+        """Return what lists show of a graph, up to its newest change (`newest`: its number). The
+        graphs inside are found by the names as of the last refresh. A graph that cannot be read
+        gives a summary with that number only."""
         try:
             about = await self._about(graph, newest)
             named = await self._resolved(about.info.name, about.info.uses)
@@ -184,8 +186,9 @@ class GraphChecks:
         return known[2:]
 
     async def _about(self, graph: str, newest: int) -> _About:
-        """Return the facts about a graph without its sub-graphs, from the cache or a worker. Raise
-        Unavailable if it cannot be read, TooLarge if it needs too much memory."""
+        """Return the facts about a graph, without those inside, from the cache or a worker.
+        `newest`: the number of its newest change. Raise Unavailable if it cannot be read, TooLarge
+        if it needs too much memory."""
         known = self._abouts.get(graph)
         if known is not None and known.newest >= newest:
             return known
@@ -208,8 +211,9 @@ class GraphChecks:
         return self._abouts.put(graph, about, len(uses))
 
     async def _name(self, graph: str, newest: int, kind: DocumentKind) -> str:
-        """Return the name of a document. Raise Unavailable if it cannot be read, TooLarge if it
-        needs too much memory."""
+        """Return the name of a document of this kind; of a library document that of its action.
+        `newest`: the number of its newest change. Raise Unavailable if it cannot be read, TooLarge
+        if it needs too much memory."""
         room = self._rooms.open_room(graph_stream(graph))
         if room is not None and kind == "graph":
             return await room.read(lambda replica, _: document.name_of(replica.doc))
@@ -219,15 +223,15 @@ class GraphChecks:
         return info.first[0] if info.first is not None else ""
 
     async def _names_at(self, sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
-        """Return the name of a graph at one seq of its log, and the names of its actions."""
+        """Return the name of a graph at a change (`sight`), and the names of its actions."""
         key = sight.graph, sight.seq
         found = self._uses.get(key)
         return found or self._uses.put(key, await self._reader.ask(contents.names, sight))
 
     async def _resolved(self, own: str, uses: Iterable[str]) -> NamedInside:
-        """Find the graphs inside of a graph, level by level, by the names of its actions (`uses`). An action
-        with the name of the graph that contains it is an ordinary action, since no engine runs a graph inside
-        itself."""
+        """Find the graphs inside of the graph called `own`, level by level, by the names of its
+        actions (`uses`). An action with the name of the graph that contains it is an ordinary
+        action, since no engine runs a graph inside itself."""
         found: dict[str, _Member] = {}
         hidden: set[str] = set()
         level, actions, cut = [(own, uses)], 0, False
@@ -270,8 +274,8 @@ class GraphChecks:
         return Inside(tuple(graphs), named.several, named.cut, named.hidden)
 
     async def _sight(self, graph: str, seq: int) -> GraphAtSeq:
-        """Return a graph at a change, or its newest readable state if its history is damaged after
-        that. Raise Unavailable if the journal cannot be read."""
+        """Return a graph after its change `seq`, or in its newest readable state if its history is
+        damaged before that. Raise Unavailable if the journal cannot be read."""
         try:
             return await self._reader.at(graph, seq)
         except Refused:  # its history is damaged after that

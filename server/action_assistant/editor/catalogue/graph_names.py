@@ -32,7 +32,7 @@ ReadName = Callable[[str, int, DocumentKind], Awaitable[str]]
 
 
 class NamedGraph(msgspec.Struct, frozen=True):
-    """A graph, and its last change that is known here."""
+    """The id of a graph, and the number of its last change as of the last refresh."""
 
     graph: str
     seq: int
@@ -47,8 +47,7 @@ class _Document(msgspec.Struct, frozen=True):
 
 
 class GraphNames:
-    """Knows the names of all graphs and of all actions of the library. Each refresh reads only what
-    has changed."""
+    """Finds graphs and library actions by their names. Each refresh reads only what has changed."""
 
     def __init__(self, journal: Journal, read_name: ReadName) -> None:
         self._journal = journal
@@ -65,8 +64,8 @@ class GraphNames:
 
     def graph(self, name: str) -> NamedGraph | None:
         """Return the graph that an action of this name stands for, by the names that the last
-        `refresh` read. Return None if no graph has the name, or if an action of the library has
-        it. If several graphs have the name, return the oldest of these graphs."""
+        `refresh` read. Return None if no graph has the name, or if an action of the library has it.
+        If several graphs have the name, return the oldest of them."""
         found = self._graphs.get(name)
         if not found or self._actions[name]:
             return None
@@ -74,12 +73,12 @@ class GraphNames:
         return NamedGraph(graph, self._seqs[graph])
 
     def of_graphs(self, names: Iterable[str]) -> list[str]:
-        """Return those of these names that a graph has."""
+        """Return those of `names` that a graph has, in their order."""
         graphs = self._graphs
         return [name for name in names if name in graphs]
 
     def is_ambiguous(self, name: str) -> bool:
-        """Return whether several graphs have this name."""
+        """Return whether more than one graph has this name."""
         return len(self._graphs.get(name, ())) > 1
 
     def is_hidden(self, name: str) -> bool:
@@ -97,8 +96,8 @@ class GraphNames:
 
     @asynccontextmanager
     async def read_ahead(self) -> AsyncIterator[None]:
-        """Read the names in background tasks while the context is open, so that the first request
-        for a name seldom waits."""
+        """Return a context while which names are read in background tasks, so that the first
+        request for a name seldom waits."""
         self._begun()
         try:
             yield
@@ -114,8 +113,8 @@ class GraphNames:
         return self._next
 
     def _ended(self, task: "asyncio.Task[None]") -> None:
-        """Forget a refresh that has ended. Its error is read, so that asyncio logs none if nobody
-        waits."""
+        """Remove a refresh task that has ended. Its error is read, so that asyncio logs none if no
+        caller waits."""
         self._tasks.discard(task)
         if not task.cancelled():
             task.exception()
@@ -162,8 +161,8 @@ class GraphNames:
         return position, seqs, abouts
 
     async def _look_up(self, abouts: Collection[str]) -> set[str]:
-        """Read the rows of these documents from the tables. Forget documents that are deleted or
-        are drafts, and return the ids of documents that are known only from now on."""
+        """Read the rows of the documents with the ids `abouts` from the tables. Forget documents
+        that are deleted or are drafts, and return the ids of documents that are new here."""
         ids = sorted(abouts)
         fresh: set[str] = set()
         graph = editor_tables.graph.c
@@ -192,8 +191,8 @@ class GraphNames:
             self._call(graph, msgspec.structs.replace(document, name=name))
 
     def _call(self, graph: str, document: _Document | None) -> None:
-        """Replace the known name of a document by `document`; None removes it, since it was deleted
-        or is a draft."""
+        """Replace what is stored of the document with this id by `document`; None removes it, since
+        it was deleted or is a draft."""
         before = self._documents.pop(graph, None)
         if before is not None and before.name:
             if before.kind == "action":

@@ -20,7 +20,8 @@ _REMEMBERED: Final = 32  # moments of graphs
 
 
 class GraphReader:
-    """Reads graphs. Nothing that it remembers is needed; it only saves reading again."""
+    """Reads graphs as they are or were after a change, from their rooms or the log. All that it
+    stores is a cache."""
 
     def __init__(
         self, journal: Journal, rooms: Rooms, run_in_worker: RunInWorker = run_here
@@ -81,7 +82,9 @@ class GraphReader:
         return self._moments.put((graph, seq), sight)
 
     async def moment(self, graph: str, seq: int | None) -> GraphAtSeq:
-        """Return the graph after its change `seq`, or its present state if `seq` is None."""
+        """Return the graph after its change `seq`, or its present state for None. Raise Conflict if
+        it has no such change, NotFound if there is no such graph, Unavailable if the log cannot be
+        read."""
         return await (self.now(graph) if seq is None else self.at(graph, seq))
 
     def made(self, graph: str, state: bytes) -> None:
@@ -89,7 +92,8 @@ class GraphReader:
         self._moments.put((graph, 1), GraphAtSeq(graph, 1, state))
 
     async def ask(self, work: Callable[..., T], /, *values: Any) -> T:
-        """Call a function of `contents` in a worker and return its result. `values`: its arguments."""
+        """Call `work`, a function of `contents`, in a worker process with the arguments `values`,
+        and return its result."""
         return await self._run_in_worker(work, *values)
 
     async def _newest(self, graph: str) -> int:

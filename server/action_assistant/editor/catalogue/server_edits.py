@@ -15,12 +15,10 @@ async def rename(
     kind: DocumentKind = "graph",
     run_in_worker: RunInWorker = run_here,
 ) -> int:
-    """Give the graph or action another name or description; None keeps the old one. Return the seq
-    up to which its log is committed then.
-
+    """Give the graph or library action (`kind`) in a room another name or description, in the name
+    of `author`; None keeps the old one. Return the number (seq) of the last change in its log then.
     Raise BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable
-    if the room is closed or the edit cannot be stored.
-    """
+    if the room is closed or the edit cannot be stored."""
     state = await room.read(lambda replica, _: replica.state())
     update = await run_in_worker(renaming, state, name, description, kind)
     return await room.submit(update, author)
@@ -29,7 +27,8 @@ async def rename(
 async def call_actions(
     room: Room, author: str, before: str, name: str, *, run_in_worker: RunInWorker = run_here
 ) -> bool:
-    """Rename every action called `before`, as one edit. Return whether there was one."""
+    """Rename all actions called `before` to `name`, as one edit in the name of `author`. Return
+    whether there was one. The errors are those of `rename`."""
     state, seq = await room.read(lambda replica, seq: (replica.state(), seq))
     update = await run_in_worker(calling_actions, state, before, name)
     return await room.submit(update, author) > seq
@@ -38,11 +37,10 @@ async def call_actions(
 async def restore(
     room: Room, author: str, then: bytes, *, run_in_worker: RunInWorker = run_here
 ) -> int:
-    """Restore a graph to the content of the document `then` by an ordinary edit, which can be
-    undone. Its comments stay as they are now. Return the seq up to which its log is committed then.
-
-    Raise BadInput or TooLarge if the edit is refused, Conflict if the log is damaged, Unavailable
-    if the room is closed or the edit cannot be stored.
+    """Restore a graph to the content of the document `then` (encoded) by an ordinary edit in the
+    name of `author`, which can be undone. Its comments stay as they are now. Return the number
+    (seq) of the last change in its log then. Raise BadInput or TooLarge if the edit is refused,
+    Conflict if the log is damaged, Unavailable if the room is closed or the edit cannot be stored.
     """
     state = await room.read(lambda replica, _: replica.state())
     return await room.submit(await run_in_worker(restoring, state, then), author)

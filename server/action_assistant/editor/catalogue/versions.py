@@ -78,7 +78,7 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Versions:
-    """All versions of all graphs."""
+    """Publishes and lists versions of graphs."""
 
     def __init__(self, journal: Journal, graph_reader: GraphReader, checks: GraphChecks) -> None:
         self._journal = journal
@@ -94,13 +94,11 @@ class Versions:
         note: str = "",
         seq: int | None = None,
     ) -> tuple[VersionView, bool]:
-        """Publish a version of a graph at `seq` (None: the newest), with the present state of the
-        graphs inside pinned. Return it, and whether it is new.
-
-        Without label and note, an equal version of that seq is returned instead of a new one. Raise
-        NotFound for an unknown graph, Conflict for an unknown change, BadInput for a long label or
-        note, TooLarge for a graph that could not be started.
-        """
+        """Publish a version of a graph (its id) at its change `seq` (None: the newest), with the
+        present state of the graphs inside pinned. Return it, and whether it is new. Without label
+        and note, an equal version of that seq is returned instead of a new one. Raise NotFound for
+        an unknown graph, Conflict for an unknown change, BadInput for a long label or note,
+        TooLarge for a graph that could not be started."""
         label, note = _within_limits(label, note)
         sight = await self._graph_reader.moment(graph, seq)
         made = random_id()
@@ -129,8 +127,9 @@ class Versions:
         return await self.get(made), True
 
     async def inside(self, graph: str, seq: int | None) -> InsideView:
-        """Return the graphs that publishing a graph would include. Raise NotFound for an unknown
-        graph, Conflict for an unknown change, Unavailable if the journal cannot be read."""
+        """Return the graphs that publishing a graph at its change `seq` (None: the newest) would
+        include. Raise NotFound for an unknown graph, Conflict for an unknown change, Unavailable if
+        the journal cannot be read."""
         sight = await self._graph_reader.moment(graph, seq)
         inside = await self._checks.inside(sight)
         stamp = codec.Stamp(graph=graph)
@@ -179,7 +178,8 @@ class Versions:
 
 
 def versions_by_event(connection: Connection, graph: str) -> dict[int, VersionView]:
-    """Return the versions of a graph, by the seq of the event that published them. For workers."""
+    """Return the versions of a graph, by the seq of the event that published them. Call it in a
+    worker process."""
     return {row.event_seq: _view(row) for row in connection.execute(_of_graph(graph))}
 
 
@@ -190,7 +190,8 @@ def _of_graph(graph: str) -> Select[Any]:
 
 
 def _require_runnable(found: contents.Released, inside: contents.Inside) -> None:
-    """Raise TooLarge if the runner would refuse to start the version for its size."""
+    """Raise TooLarge if the runner would refuse to start the version for its size. `found`: the
+    version; `inside`: the graphs inside."""
     if inside.cut:
         raise TooLarge(
             "Not published: more is inside of the graph than can be run. At most "
@@ -202,7 +203,7 @@ def _require_runnable(found: contents.Released, inside: contents.Inside) -> None
 
 
 def _within_limits(label: str, note: str) -> tuple[str, str]:
-    """Return label and note without spaces around them. Raises BadInput for one that is too long."""
+    """Return label and note without spaces around them. Raise BadInput for one that is too long."""
     label, note = " ".join(label.split()), note.strip()
     if len(label) > LABEL_LIMIT:
         raise BadInput(f"A label has up to {LABEL_LIMIT} characters.", where={"path": "/label"})

@@ -41,17 +41,17 @@ _APPLYING: Final = _Applying()
 
 
 def applying() -> AbstractContextManager[None]:
-    """Return the context manager for a call of the CRDT library with foreign bytes. It raises
-    Malformed for bytes that the library refuses, Panicked if the library fails."""
+    """Return the context manager for a call of the CRDT library (Yjs) with bytes from elsewhere. It
+    raises Malformed for bytes that the library refuses, Panicked if the library fails."""
     return _APPLYING
 
 
 def apply_updates(doc: "Doc[Any]", *updates: bytes) -> None:
-    """Apply updates in one transaction, with the same result as `doc.apply_update` for each. The
-    caller must have no other transaction open. Errors of observers are dropped.
+    """Apply Yjs updates in one transaction, with the same result as `doc.apply_update` for each.
+    The caller must have no other transaction open. Errors of observers are dropped.
 
-    Raise ValueError or RuntimeError if the library refuses an update; those before it stay applied.
-    `applying` translates these errors.
+    Raise ValueError or RuntimeError if the library refuses an update; the earlier ones stay
+    applied. `applying` translates these errors.
 
     The function calls the library's core, since its Python layer costs more than the change itself.
     That saves a twentieth of the cost of an edit, and a quarter where many updates are applied
@@ -70,8 +70,9 @@ def apply_updates(doc: "Doc[Any]", *updates: bytes) -> None:
 def check_cut_items(
     doc: "Doc[Any]", update: bytes, read: UpdateOutline, known: Mapping[int, int]
 ) -> None:
-    """Raise Malformed if an item continues a struct of which only the length is left, since Yjs
-    fails at that."""
+    """Raise Malformed if the document has only the first part of an item of the update, and that
+    part was deleted and collected as garbage, since Yjs fails then. `read`: the outline of the
+    update; `known`: per Yjs client, how many of its items the document has (its clock)."""
     if not any(start < known.get(client, 0) < end for client, start, end in read.brings):
         return
     for client in cut_items(update, known):
@@ -83,8 +84,8 @@ def check_cut_items(
 
 
 def check_whole(doc: "Doc[Any]", read: UpdateOutline) -> None:
-    """Raise Panicked if the library has not applied all of an update, since structs of several
-    clients wait for each other."""
+    """Raise Panicked if the document lacks a part of an update that was applied: the library holds
+    parts of several clients back if they wait for each other. `read`: the outline of the update."""
     if len(read.brings) > 1:
         reached = clocks(doc.get_state())
         if any(reached.get(client, 0) < end for client, _, end in read.brings):
@@ -92,19 +93,20 @@ def check_whole(doc: "Doc[Any]", read: UpdateOutline) -> None:
 
 
 def check_unchanged(doc: "Doc[Any]", known: Mapping[int, int], error: Malformed) -> None:
-    """Raise Panicked if the library has refused an update after applying a part."""
+    """Raise Panicked if the document has changed although the library has refused an update with
+    `error`. `known`: per Yjs client, how many of its items (its clock) the document had before."""
     if clocks(doc.get_state()) != {client: clock for client, clock in known.items() if clock}:
         raise Panicked(f"partly applied: {error}") from error
 
 
 def clocks(state: bytes) -> dict[int, int]:
-    """Decode a Yjs state vector: the next clock of each client. Raise Malformed if it is cut
-    off."""
+    """Decode a Yjs state vector: per client, the number of its items that a document has (its
+    clock). Raise Malformed if it is cut off."""
     reader = ByteReader(state)
     return {reader.number(): reader.number() for _ in range(reader.number())}
 
 
 def _state(known: Mapping[int, int]) -> bytes:
-    """Encode a state vector in the format of Yjs."""
+    """Encode the clocks of clients (`known`) as a Yjs state vector."""
     pairs = [number(client) + number(clock) for client, clock in known.items()]
     return number(len(pairs)) + b"".join(pairs)

@@ -29,7 +29,8 @@ MOST_AT_ONE: Final = MOST_ACTIONS
 
 
 def refuse_too_much(graph: Graph, dialect: str) -> None:
-    """Refuse a graph that a document may not hold. Raises TooLarge with the place."""
+    """Raise TooLarge, with the place in the file, if a graph has more actions or arrows than a
+    document may have. `dialect`: of the file."""
     actions = "/umrf_actions" if dialect in {"D1", "D1'"} else "/actions"
     real = [action for action in graph.actions if not action.missing]
     if len(graph.actions) > MOST_ACTIONS:
@@ -60,8 +61,7 @@ def refuse_too_much(graph: Graph, dialect: str) -> None:
 
 
 def refuse_too_wide(maps: Mapping[str, Mapping[str, object]]) -> None:
-    """Refuse a graph whose actions and arrows have too many fields together. Raise TooLarge above
-    MOST_FIELDS."""
+    """Raise TooLarge if the root maps of a document have too many keys together (MOST_FIELDS)."""
     fields = sum(map(len, maps.values()))
     if fields > MOST_FIELDS:
         raise TooLarge(
@@ -72,7 +72,7 @@ def refuse_too_wide(maps: Mapping[str, Mapping[str, object]]) -> None:
 
 
 def refuse_too_long(update: bytes) -> None:
-    """Refuse an encoded document that is too large for a room. Raise TooLarge above MOST_BYTES."""
+    """Raise TooLarge if an encoded document (`update`) is too large for a room (MOST_BYTES)."""
     if len(update) > MOST_BYTES:
         raise TooLarge(f"A graph may have {MOST_BYTES >> 20} MiB.", where={"path": ""})
 
@@ -96,7 +96,7 @@ class DocumentQuota:
 
     def check(self, update: bytes, read: UpdateOutline) -> None:
         """Raise QuotaExceeded if the document would have too many actions, fields or bytes after
-        this update. An update that only deletes is always accepted."""
+        this update. `read`: its outline. An update that only deletes is always accepted."""
         if read.actions > self._spare and self._changed:
             self._changed = False
             self._spare = MOST_ACTIONS - actions_in(self._doc)
@@ -123,10 +123,11 @@ class DocumentQuota:
 
 
 def actions_in(doc: "Doc[Any]") -> int:
-    """Return the number of actions of a document: the keys without a field name."""
+    """Return the number of actions in a document: the keys without a field name in its map of
+    actions."""
     return sum("|" not in key for key in doc.get("actions", type=Map).keys())  # noqa: SIM118
 
 
 def fields_in(doc: "Doc[Any]") -> int:
-    """Count the keys in all maps of a document."""
+    """Return the number of keys in all root maps of a document."""
     return sum(len(doc.get(root, type=Map)) for root in ROOTS)

@@ -62,7 +62,8 @@ class Folded(msgspec.Struct, frozen=True):
 
 
 def _sent_back(replica: Replica, seq: int, damaged: StreamDamage | None = None) -> Folded:
-    """Return a document as it is sent from the worker: packed where it is large, since the event loop copies it."""
+    """Return the document of a replica with `seq` and `damaged`, as it is sent from the worker
+    process: compressed if large, since the event loop copies it."""
     return Folded(ReplicaState.packed(ReplicaState.of(replica)), seq, damaged)
 
 
@@ -96,8 +97,9 @@ def fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
 
 
 def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Folded:
-    """Fold the events before the first one that cannot be applied. A new replica is used, since a
-    replica in which something failed is unusable."""
+    """Fold the events into the snapshot `document` before the first one that cannot be applied, and
+    return the result with the damage. A new replica is used, since a replica in which something
+    failed is unusable."""
     bad, why = _first_bad(document, events)
     damaged = StreamDamage(events.first + bad, why)
     if not bad:
@@ -110,7 +112,8 @@ def _before_the_bad(document: bytes, events: EventColumns, *, learn: bool) -> Fo
 
 
 def _first_bad(document: bytes, events: EventColumns) -> tuple[int, str]:
-    """Return the index of the first of these events that cannot be applied, and the reason."""
+    """Return the index of the first event that cannot be applied to the snapshot `document`, and
+    the reason. Raise Unavailable if all can."""
     replica = ReplicaState.replica(document) if document else Replica()
     assert replica is not None
     for n in range(len(events)):
@@ -252,7 +255,8 @@ def _columns(slices: Sequence[StoredColumns]) -> EventColumns:
 
 
 def _linked(chain: bytes, stream: str, slices: Sequence[StoredColumns]) -> int:
-    """Return how many events, counted from the first, continue the chain."""
+    """Return how many events, counted from the first, continue the hash chain of a stream from
+    `chain`. `slices`: the events, in parts."""
     count = 0
     for each in slices:
         good = _linked_of_one(chain, stream, each)
@@ -301,8 +305,8 @@ async def load(
     run_in_worker: RunInWorker = run_here,
 ) -> Loaded:
     """Load the document of a stream as it is now, or after its event `upto`. `learn`: also collect
-    what only editing needs; the default is to do so only if `upto` is None. Raise Unavailable if
-    the log cannot be read."""
+    what only editing needs; by default (None) only if `upto` is None. Raise Unavailable if the log
+    cannot be read."""
     learn = upto is None if learn is None else learn
     found = await stored(journal, stream, upto, learn=learn, run_in_worker=run_in_worker)
     replica = await _opened(found.document, run_in_worker)
@@ -317,8 +321,9 @@ async def load(
 
 
 async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None:
-    """Make a replica from a snapshot; a large one is applied in pieces, so that other tasks run in
-    between. Return an empty replica for empty bytes, None if the bytes are no snapshot."""
+    """Make a replica from the bytes of a snapshot; a large one is applied in pieces, so that other
+    tasks run in between. Return an empty replica for empty bytes, None if the bytes are no
+    snapshot."""
     if not document:
         return Replica()
     kept = await ReplicaState.read_aside(document)
@@ -336,7 +341,8 @@ async def _opened(document: bytes, run_in_worker: RunInWorker) -> Replica | None
 
 
 async def pieces_aside(update: bytes, run_in_worker: RunInWorker) -> list[bytes]:
-    """Split a large update in a worker; return the update alone if it is small or the worker fails."""
+    """Split a large update into pieces in a worker process; return it alone if it is small or the
+    worker fails."""
     if run_in_worker is run_here or len(update) <= PIECE_BYTES:
         return [update]
     try:
@@ -354,9 +360,9 @@ async def stored(
     learn: bool,
     run_in_worker: RunInWorker = run_here,
 ) -> Stored:
-    """Return the document of a stream as bytes, as it is now or after its event `upto`. Work that
-    grows with the document is done by `run_in_worker`. Raise Unavailable if the log cannot be
-    read."""
+    """Return the document of a stream as the bytes of a snapshot, as it is now or after its event
+    `upto`. `learn`: also collect what only editing needs. Work that grows with the document is done
+    by `run_in_worker`. Raise Unavailable if the log cannot be read."""
     snapshot = await _snapshot(journal, stream)
     if snapshot is not None and (upto is None or snapshot.seq <= upto):
         found = await _followed(
@@ -377,8 +383,9 @@ async def _followed(
     learn: bool,
     run_in_worker: RunInWorker,
 ) -> Stored:
-    """Apply the events after a snapshot to it; without a snapshot, apply all events of the stream
-    to an empty document. A snapshot that turns out to be unreadable is ignored."""
+    """Apply the events of a stream after a snapshot, up to the event `upto` (None: all), to it;
+    without a snapshot, to an empty document. A snapshot that turns out to be unreadable is ignored.
+    `learn`: also collect what only editing needs."""
     start, document = (0, b"") if snapshot is None else (snapshot.seq, snapshot.state)
     tail = LogTail(journal, stream, start, upto)
     while events := await tail.next():
@@ -398,10 +405,10 @@ async def _folded(
     tail: LogTail, document: bytes, events: EventColumns, learn: bool, run_in_worker: RunInWorker
 ) -> Folded | None:
     """Apply to `document` the events before the first one whose hash does not match, and return the
-    result. `learn`: also collect what only editing needs. In this process no event is applied
-    before its hash was checked; a worker may begin earlier, and its result is thrown away if a
-    hash does not match: the events before that one are then folded again. Return None if `fold`
-    returns None."""
+    result. `tail`: checks the hashes; `learn`: also collect what only editing needs. In this
+    process no event is applied before its hash was checked; a worker may begin earlier, and its
+    result is thrown away if a hash does not match: the events before that one are then folded
+    again. Return None if `fold` returns None."""
     if run_in_worker is run_here or _is_small(document, events):
         return _fold(document, events.part(0, await tail.sound()), learn)
     folding = asyncio.ensure_future(_folded_aside(document, events, learn, run_in_worker))
@@ -420,12 +427,14 @@ async def _folded(
 
 
 def _is_small(document: bytes, events: EventColumns) -> bool:
-    """Return whether a snapshot and events are folded within milliseconds. A packed snapshot is large."""
+    """Return whether it takes only milliseconds to fold events into the snapshot `document`. A
+    compressed snapshot is large."""
     return not is_packed(document) and len(document) + events.size <= _SMALL
 
 
 def _heard(folding: "asyncio.Future[Folded | None]") -> None:
-    """Ignore the result for events whose hash does not match; the chain check reports them."""
+    """Read the error of a fold that was cancelled or no longer needed, so that asyncio does not log
+    it."""
     if not folding.cancelled():
         folding.exception()
 
@@ -448,7 +457,7 @@ def _fold(document: bytes, events: EventColumns, learn: bool) -> Folded | None:
 
 
 async def _snapshot(journal: Journal, stream: str) -> StreamSnapshot | None:
-    """Return the snapshot of a stream. Return None if there is none or if it cannot be read, since
+    """Return the snapshot of a stream. Return None if none is stored or it cannot be read, since
     the log has all that a snapshot has."""
     try:
         return await journal.snapshot(stream)

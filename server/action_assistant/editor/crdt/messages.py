@@ -62,7 +62,8 @@ class Malformed(Exception):
 
 
 class Question(msgspec.Struct, frozen=True):
-    """Sync step 1: what the client has, as a state vector."""
+    """Sync step 1 of Yjs: a client says what it has, as a state vector (a number per Yjs client),
+    and asks for the rest of the document."""
 
     state: bytes
 
@@ -104,14 +105,16 @@ Message: TypeAlias = Question | Edit | Presence | WhoIsThere | CompareMessage
 
 
 class ByteReader:
-    """Reads lib0's variable-length encoding. Raises Malformed past the end."""
+    """Reads values in the variable-length encoding of lib0 (the library under Yjs). Raises
+    Malformed past the end."""
 
     def __init__(self, data: bytes) -> None:
         self._data = data
         self._at = 0
 
     def number(self) -> int:
-        """Read a varUint of at most 64 bits and return it."""
+        """Read an unsigned number (varUint) of at most 64 bits and return it. Raise Malformed if it
+        is longer or the message ends before."""
         number = shift = 0
         while True:
             if self._at >= len(self._data) or shift > 63:
@@ -124,7 +127,8 @@ class ByteReader:
             shift += 7
 
     def text(self) -> bytes:
-        """Read a varUint8Array, or a varString, and return its bytes (UTF-8 for a varString)."""
+        """Read a byte string with its length (varUint8Array), or a text (varString), and return its
+        bytes (UTF-8 for a text). Raise Malformed if the message ends before."""
         length = self.number()
         if length > self.left:
             raise Malformed("longer than the message")
@@ -132,20 +136,20 @@ class ByteReader:
         return self._data[self._at - length : self._at]
 
     def byte(self) -> int:
-        """Read one byte. Raises Malformed at the end."""
+        """Read one byte and return it. Raise Malformed at the end."""
         if self._at >= len(self._data):
             raise Malformed("the message ends early")
         self._at += 1
         return self._data[self._at - 1]
 
     def skip(self, count: int) -> None:
-        """Skip `count` bytes. Raises Malformed past the end."""
+        """Skip `count` bytes. Raise Malformed past the end."""
         if count > self.left:
             raise Malformed("the message ends early")
         self._at += count
 
     def skip_signed(self) -> None:
-        """Skip one signed number (lib0 varInt)."""
+        """Skip one signed number (varInt of lib0), however long."""
         while self.byte() & 0x80:
             pass
 
@@ -173,8 +177,8 @@ class ByteReader:
 
 
 def parse(data: bytes) -> Message | None:
-    """Parse a message of the WebSocket; return None for an unknown kind. Raise Malformed if its
-    content does not match its kind."""
+    """Parse a message of the WebSocket; return None for a kind that is not known, which is ignored.
+    Raise Malformed if its content does not match its kind."""
     # Most are updates of less than 128 bytes.
     if data[:2] == _UPDATE and len(data) > 2 and data[2] <= min(0x7F, len(data) - 3):
         return Edit(data[3 : 3 + data[2]])
@@ -203,8 +207,8 @@ def _sync(reader: ByteReader) -> Message:
 
 
 def _one_entry(data: bytes) -> PresenceEntry | None:
-    """Read an awareness message with exactly one entry, as nearly all have. Return None for any other message,
-    also for one that cannot be read."""
+    """Read a presence message (Yjs awareness) with exactly one entry, as nearly all have. Return
+    None for any other message, also for one that cannot be read."""
     try:
         size, at = _short(data, 1)
         end = at + size
@@ -220,11 +224,9 @@ def _one_entry(data: bytes) -> PresenceEntry | None:
 
 
 def _short(data: bytes, at: int) -> tuple[int, int]:
-    """Read a variable-length unsigned integer (varUint) of at most five bytes at offset `at`, and
-    return the number with the offset of the byte after it.
-
-    Raises IndexError if the data end within the number, or if the number has more than five bytes.
-    """
+    """Read an unsigned number (varUint) of at most five bytes at offset `at`, and return it with
+    the offset of the byte after it. Raise IndexError if the data end within the number, or if it
+    has more than five bytes."""
     byte = data[at]
     if byte < 128:
         return byte, at + 1
@@ -253,7 +255,7 @@ _ACKS: Final = bytes((ACKS,))
 
 
 def number(value: int) -> bytes:
-    """Encode a number as lib0 varUint."""
+    """Encode an unsigned number as a varUint of lib0."""
     if value < 128:
         return _SMALL[value]
     if value < 1 << 14:
@@ -267,28 +269,29 @@ def number(value: int) -> bytes:
 
 
 def text(value: bytes) -> bytes:
-    """Return bytes encoded as a varUint8Array or, if they are UTF-8, as a varString, which has the
-    same form."""
+    """Encode bytes with their length (varUint8Array) or, if they are UTF-8, as a text (varString),
+    which has the same form."""
     return number(len(value)) + value
 
 
 def question(state: bytes) -> bytes:
-    """Encode a sync step 1 with a state vector."""
+    """Return the message of a sync step 1, which asks for what a state vector (what the sender has)
+    lacks."""
     return _QUESTION + text(state)
 
 
 def answer(update: bytes) -> bytes:
-    """Encode a sync step 2 with an update."""
+    """Return the message of a sync step 2, which answers step 1 with an update."""
     return _ANSWER + text(update)
 
 
 def change(update: bytes) -> bytes:
-    """Encode an update as a message."""
+    """Return the message that carries an update."""
     return _UPDATE + text(update)
 
 
 def presence(entries: Iterable[PresenceEntry]) -> bytes:
-    """Encode awareness entries as a message."""
+    """Return the message that carries presence entries (Yjs awareness)."""
     packed = [number(e.client) + number(e.clock) + text(e.state) for e in entries]
     return bytes((AWARENESS,)) + text(number(len(packed)) + b"".join(packed))
 
@@ -300,19 +303,20 @@ def acks(messages: int, seq: int) -> bytes:
 
 
 def compared(seq: int, entries: int, total: int) -> bytes:
-    """Return the message with the fingerprint of the document at `seq`: the number of its entries
-    and the sum of their hashes."""
+    """Return the message with the fingerprint of the document at `seq`: the number of its `entries`
+    and the sum of their hashes (`total`)."""
     return bytes((COMPARE,)) + number(seq) + number(entries) + number(total)
 
 
 def read_only(why: str) -> bytes:
-    """Return the message that the document cannot be changed by anybody. `why`: the reason, as a
+    """Return the message that the document cannot be changed at all. `why`: the reason, as a
     sentence."""
     return bytes((READ_ONLY,)) + text(why.encode())
 
 
 def epoch(name: str) -> bytes:
-    """Encode the message that names the epoch of the log."""
+    """Return the message that names the epoch of the log (its history, a new one after a restored
+    backup)."""
     return bytes((EPOCH,)) + text(name.encode())
 
 

@@ -15,8 +15,8 @@ Span: TypeAlias = tuple[int, int, int]
 
 
 class Placed(msgspec.Struct, frozen=True):
-    """A struct whose position is given by another struct, `client` and `clock`: `inside` of it,
-    else beside it."""
+    """A Yjs struct (an item, or a range of deleted ones) whose position is given by another struct,
+    `client` and `clock`: `inside` of it, else beside it."""
 
     span: Span
     client: int
@@ -25,19 +25,18 @@ class Placed(msgspec.Struct, frozen=True):
 
 
 class Nesting:
-    """The nesting depth of all structs that do not lie in a root. Documents of our page have none."""
+    """Tracks how deep the structs (items) of a Yjs document are nested. Only structs inside of
+    others are stored; documents of our page have none."""
 
     def __init__(self, spans: dict[int, list[tuple[int, int, int]]] | None = None) -> None:
         #: Per client `(first clock, clock after the last, depth)`, in order.
         self.spans: Final = spans or {}
 
     def depths(self, placed: tuple[Placed, ...], known: Mapping[int, int]) -> dict[Span, int]:
-        """Return how many types enclose each struct that an update adds, by the struct's span.
-        Structs that no type encloses are left out. `known` gives, for each client, the first
-        clock that the document does not have yet.
-
-        Raise Malformed if a struct lies too deep.
-        """
+        """Return how many types enclose each struct (item) that an update adds, by the struct's
+        span; structs that no type encloses are missing. `placed`: structs that name another one for
+        their position. `known`: per Yjs client, the first clock (number of an item) that the
+        document does not have yet. Raise Malformed if a struct lies too deep."""
         if not placed or (not self.spans and not any(each.inside for each in placed)):
             return {}
         news = [each for each in placed if each.span[2] > known.get(each.span[0], 0)]
@@ -51,13 +50,14 @@ class Nesting:
         }
 
     def learn(self, depths: Mapping[Span, int]) -> None:
-        """Note the depth of each span of an update that was applied to the document."""
+        """Store the depths of the spans of an update that was applied to the document."""
         for (client, start, end), depth in depths.items():
             insort(self.spans.setdefault(client, []), (start, end, depth))
 
     def _resolved(self, placed: list[Placed], known: Mapping[int, int]) -> dict[Span, int]:
-        """Return the depth of each struct, without recursion: a struct waits for the one that gives
-        its position."""
+        """Return the depth of each struct in `placed`, without recursion: a struct waits for the
+        one that gives its position. `known`: as in `depths`. Raise Malformed if structs wait for
+        each other in a circle."""
         by_client: dict[int, list[Placed]] = {}
         for each in placed:  # within a client they come in order
             by_client.setdefault(each.span[0], []).append(each)

@@ -44,9 +44,9 @@ class OpeningTime:
         return self._came
 
     def opened(self, seconds: float, size: int, came: int | None = None) -> None:
-        """Note a measurement: a document of `size` bytes was applied to an empty replica in
-        `seconds`. `came`: the number of structs that the document had received at that time;
-        None means now. A measurement older than the newest one is ignored."""
+        """Store a measurement: a document of `size` bytes was applied to an empty replica in
+        `seconds`. `came`: the number of structs that the document had received at that time; None
+        means now. A measurement older than the newest one is ignored."""
         then = self._came if came is None else came
         if then < self._came_then:
             return
@@ -58,7 +58,7 @@ class OpeningTime:
         self._bound()
 
     def took(self, structs: int) -> None:
-        """Count `structs` new structs of the document."""
+        """Count `structs` new structs (items) that the document has received."""
         self._came += structs
 
     def is_doubtful_with(self, size: int) -> bool:
@@ -85,7 +85,8 @@ class OpeningTime:
         return structs - self._measured_at + self._came_then
 
     def refuse(self, read: UpdateOutline) -> None:
-        """Raise QuotaExceeded for an update that brings something to a document that took too long."""
+        """Raise QuotaExceeded for an update (`read`: its outline) that adds content to a document
+        that takes too long to open."""
         if self.is_too_long and read.brings:
             said = f"a graph may take {self._limit:.1f} s to open; go on with a copy of it"
             raise QuotaExceeded(said)

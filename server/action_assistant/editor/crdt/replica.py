@@ -61,7 +61,7 @@ class EventColumns(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, events: Iterable[Event]) -> "EventColumns":
-        """Make columns of events, of which there must be at least one."""
+        """Make columns of events; there must be at least one."""
         rows = [(each.seq, each.kind, each.author, each.body) for each in events]
         seqs, kinds, authors, bodies = (list(column) for column in zip(*rows, strict=True))
         return cls(seqs[0], kinds, authors, bodies)
@@ -78,7 +78,7 @@ class EventColumns(msgspec.Struct, frozen=True):
 
     @property
     def last(self) -> int:
-        """Return the sequence number of the last event."""
+        """Return the sequence number (seq) of the last event."""
         return self.first + len(self) - 1
 
     @property
@@ -87,7 +87,7 @@ class EventColumns(msgspec.Struct, frozen=True):
         return sum(map(len, self.bodies))
 
     def part(self, start: int, end: int) -> "EventColumns":
-        """Return the events from place `start` up to, and without, place `end`."""
+        """Return the events from the index `start` up to, and without, the index `end`."""
         some = slice(start, end)
         return EventColumns(
             self.first + start, self.kinds[some], self.authors[some], self.bodies[some]
@@ -122,7 +122,7 @@ class ForeignClient(Exception):
 
 
 class TooMuchWaits(Exception):
-    """An author has sent too many updates that wait for earlier ones"""
+    """An author has sent too many updates that wait for earlier ones."""
 
 
 class Replica:
@@ -155,13 +155,11 @@ class Replica:
         holder: Callable[[int], str | None] = lambda _: None,
         read: UpdateOutline | None = None,
     ) -> UpdateEffect:
-        """Apply an update and return its effect. `holder` gives the person of a client id that has
-        not written yet; `read` is the outline of the update if the caller has it.
-
-        Raise Malformed, ForeignClient, QuotaExceeded or TooMuchWaits for an update that is refused;
-        the document is unchanged then. Raise Panicked if the CRDT library fails; the replica must
-        not be used then.
-        """
+        """Apply an update of `author` and return its effect. `holder` returns the person of a
+        client id that has not written yet; `read` is the outline of the update if the caller has
+        it. Raise Malformed, ForeignClient, QuotaExceeded or TooMuchWaits for an update that is
+        refused; the document is unchanged then. Raise Panicked if the CRDT library fails; the
+        replica must not be used then."""
         if self._waiting and update in self._waiting:
             return UpdateEffect.NOTHING
         read = read or outline(update)
@@ -178,7 +176,7 @@ class Replica:
     ) -> UpdateEffect:
         """Apply an update that was tried on a copy, as `take` does, but by its `pieces`, with
         pauses as long as each took. The caller must keep others from changing the document
-        meanwhile. Raises as `take` does."""
+        meanwhile. The other parameters and the errors are those of `take`."""
         if self._waiting and update in self._waiting:
             return UpdateEffect.NOTHING
         new = self._check(update, author, holder, read)
@@ -198,7 +196,7 @@ class Replica:
         holder: Callable[[int], str | None],
         read: UpdateOutline,
     ) -> list[int]:
-        """Return the clients of which an update has new structs. Raise the error for which `take`
+        """Return the Yjs clients of which an update has new items. Raise the error for which `take`
         refuses an update."""
         known = self._known
         new = [client for client, _, end in read.brings if end > known.get(client, 0)]
@@ -217,7 +215,9 @@ class Replica:
     def _take(
         self, update: bytes, author: str, read: UpdateOutline, new: list[int], *, is_applied: bool
     ) -> UpdateEffect:
-        """Apply an update that nothing forbids, unless its pieces were applied already."""
+        """Apply an update that `_check` has accepted, unless its pieces were applied already
+        (`is_applied`), or hold it back if it needs an earlier one. `new`: the clients that `_check`
+        returned."""
         if read.ready(self._known):
             brought = self._grew(update, read, is_applied=is_applied)
             check_whole(self.doc, read)
@@ -264,7 +264,7 @@ class Replica:
         return done
 
     def _replay_together(self, events: EventColumns) -> None:
-        """Replay updates at once, where neither these nor earlier updates wait."""
+        """Replay updates in one go; call it only if neither they nor earlier updates wait."""
         if self.nesting.spans or lies_deep(events.bodies) or has_paired_texts(events.bodies):
             self._replay_one_by_one(events)
             return
@@ -288,7 +288,8 @@ class Replica:
         self._known = clocks(self.doc.get_state())
 
     def begin(self, kept: "ReplicaState") -> None:
-        """Restore the replica from a snapshot. Raise Malformed or Panicked if it cannot be applied."""
+        """Restore this empty replica from a decoded snapshot. Raise Malformed or Panicked if it
+        cannot be applied."""
         self.open_piece(kept.state)
         self.go_on(kept, kept.state)
 
@@ -302,8 +303,8 @@ class Replica:
         return took
 
     def go_on(self, kept: "ReplicaState", state: bytes) -> None:
-        """Restore the state beside the document from a snapshot, after the document `state` was
-        applied in pieces. Raise Malformed if `state` cannot be read."""
+        """Restore from a decoded snapshot what a replica has beside the document, after the
+        document (`state`) was applied in pieces. Raise Malformed if `state` cannot be read."""
         self._state = state if len(state) > _KEPT_BYTES else None
         self.opening.opened(self.pieces_s, len(state))
         self._quota.took(len(state))
@@ -343,7 +344,8 @@ class Replica:
         self._apply(*together)
 
     def _learn(self, read: UpdateOutline, size: int) -> None:
-        """Update nesting, quota and opening time for an event of the log. Limits are not checked again."""
+        """Count an event of the log, of `size` bytes and with the outline `read`, for nesting,
+        quota and opening time. Limits are not checked again."""
         with suppress(Malformed):
             self.nesting.learn(self.nesting.depths(read.placed, self._known))
         self._count(read, size)
@@ -357,8 +359,9 @@ class Replica:
     def _grew(
         self, update: bytes, read: UpdateOutline, *, is_applied: bool = False
     ) -> UpdateEffect:
-        """Apply an update that is ready, then the waiting updates that become ready by it; return
-        the effect."""
+        """Apply an update for which nothing is missing, then the held-back updates that need
+        nothing else; return the effect. `read`: its outline; `is_applied`: its pieces were applied
+        already."""
         try:
             changed = self._applied(update, read, is_applied=is_applied)
         except Malformed as error:
@@ -376,7 +379,8 @@ class Replica:
         return released
 
     def freed_by(self, read: UpdateOutline) -> list[bytes]:
-        """Return the waiting updates that become ready once this update is applied."""
+        """Return the held-back updates that could be applied after the update with the outline
+        `read`."""
         known = dict(self._known)
         freed: dict[bytes, None] = {}
         news = [read] if read.ready(known) else []
@@ -402,7 +406,8 @@ class Replica:
         return sum(map(len, self._waiting))
 
     def held_back(self) -> list[tuple[bytes, str]]:
-        """Return the waiting updates with their authors, in the order of arrival."""
+        """Return the updates that wait for earlier ones, each with its author, in the order of
+        arrival."""
         return [(update, author) for update, (_, author) in self._waiting.items()]
 
     @property
@@ -411,8 +416,8 @@ class Replica:
         return tuple(self._waiting)
 
     def _applied(self, update: bytes, read: UpdateOutline, *, is_applied: bool = False) -> bool:
-        """Apply a ready update, unless its pieces were applied already; return whether the document
-        changed."""
+        """Apply an update for which nothing is missing, unless its pieces were applied already;
+        return whether the document changed. `read`: its outline."""
         known = self._known
         self._state = None
         depths = self.nesting.depths(read.placed, known)
@@ -453,7 +458,8 @@ class Replica:
             self._known[client] = max(end, self._known.get(client, 0))
 
     def _release(self) -> bool:
-        """Apply the waiting updates that are ready now; return whether there were any."""
+        """Apply the held-back updates for which nothing is missing now; return whether there were
+        any."""
         ready = [each for each, (read, _) in self._waiting.items() if read.ready(self._known)]
         for update in ready:
             read, _ = self._waiting.pop(update)
@@ -477,8 +483,8 @@ class Replica:
                 apply_updates(self.doc, *updates)
 
     def lacking(self, state: bytes) -> bytes:
-        """Return the update that a client with this state vector lacks. Raise Malformed or Panicked
-        if the vector cannot be read."""
+        """Return the update with all that a client lacks. `state`: the client's state vector (what
+        it has of each Yjs client). Raise Malformed or Panicked if it cannot be read."""
         if ByteReader(state).number() * 2 > len(state):
             raise Malformed("more clients than bytes")
         if state == NO_CLOCKS:
@@ -514,7 +520,7 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @classmethod
     def replica(cls, kept: bytes) -> Replica | None:
-        """Return the replica of a snapshot; None if the bytes are no snapshot."""
+        """Return the replica of an encoded snapshot; None if the bytes are no snapshot."""
         found = cls.read(kept)
         if found is None:
             return None
@@ -527,14 +533,14 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @classmethod
     def state_of(cls, kept: bytes) -> bytes:
-        """Return the document of a snapshot as one update; an empty update if the bytes are no
-        snapshot."""
+        """Return the document of an encoded snapshot as one update; an empty update if the bytes
+        are no snapshot."""
         found = cls.read(kept)
         return NOTHING_NEW if found is None else found.state
 
     @classmethod
     def read(cls, kept: bytes) -> "ReplicaState | None":
-        """Decode a snapshot, packed or not; return None if the bytes are no snapshot."""
+        """Decode a snapshot, compressed or not; return None if the bytes are no snapshot."""
         try:
             return msgspec.msgpack.decode(unpacked(kept), type=cls)
         except (msgspec.DecodeError, UnicodeDecodeError):
@@ -542,17 +548,18 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @staticmethod
     def packed(kept: bytes) -> bytes:
-        """Compress a large snapshot, for which all edits wait while the writer stores it. For threads and
-        workers."""
+        """Compress a large encoded snapshot; all edits wait while the writer stores it. Slow: call
+        it on a thread or in a worker."""
         return packed(kept, least=_LARGE)
 
     @staticmethod
     async def packed_aside(kept: bytes) -> bytes:
-        """Compress a large snapshot as `packed` does, on a thread; return a small one at once."""
+        """Compress a large encoded snapshot as `packed` does, on a thread; return a small one at
+        once."""
         return kept if len(kept) < _LARGE else await asyncio.to_thread(ReplicaState.packed, kept)
 
     @classmethod
     async def read_aside(cls, kept: bytes) -> "ReplicaState | None":
-        """Decode a snapshot as `read` does; decode a packed one on a thread, so that the event loop
-        is not blocked."""
+        """Decode a snapshot as `read` does; a compressed one on a thread, so that the event loop is
+        not blocked. Return None if the bytes are no snapshot."""
         return await asyncio.to_thread(cls.read, kept) if is_packed(kept) else cls.read(kept)

@@ -36,12 +36,12 @@ class Uncertain(Exception):
 
 
 class Clients:
-    """The client ids of some updates. `authors`: the first author of each; `ends`: its next clock
-    after the updates."""
+    """The Yjs client ids in some updates. `authors`: the first author of each; `ends`: the number
+    of its items (clock) after the updates."""
 
     def __init__(self, bodies: Sequence[bytes], authors: Sequence[str]) -> None:
-        """Read the client ids of updates and their authors. Raise Malformed if an update cannot be
-        read."""
+        """Read the client ids of updates (`bodies`) and their authors. Raise Malformed if an update
+        cannot be read."""
         self.authors: Final[dict[int, str]] = {}
         self.ends: Final[dict[int, int]] = {}
         last: dict[bytes, bytes] = {}  # of each client that is alone in an update
@@ -65,8 +65,8 @@ class Clients:
 
 
 def lies_deep(bodies: Sequence[bytes]) -> bool:
-    """Return whether any struct of these updates lies inside another one instead of in a root.
-    Raise Malformed if an update cannot be read."""
+    """Return whether any struct (item) of these updates lies inside another one instead of in a
+    root map. Raise Malformed if an update cannot be read."""
     return any(
         any(each.inside for each in stored_outline(body).placed)
         for body in map(bodies.__getitem__, _doubtful(bodies))
@@ -75,8 +75,8 @@ def lies_deep(bodies: Sequence[bytes]) -> bool:
 
 
 def _doubtful(bodies: Sequence[bytes]) -> list[int]:
-    """Return the indices of the updates whose bytes look as if a struct lay inside another one. All
-    updates with such a struct are among them, and some without."""
+    """Return the indices of the updates whose bytes suggest that a struct lies inside another one.
+    All updates with such a struct are among them, and some without."""
     text = _APART.join([body[:-1] for body in bodies]).translate(_KINDS)
     found: set[int] = set()
     starts: list[int] = []
@@ -91,13 +91,13 @@ def _doubtful(bodies: Sequence[bytes]) -> list[int]:
 
 
 def _starts(bodies: Sequence[bytes]) -> list[int]:
-    """Return the offset of each body in the joined text, and the length of that text. An empty body
-    counts one byte, its separator."""
+    """Return the offset of each update in their joined text, and the length of that text. An empty
+    update counts one byte, its separator."""
     return list(itertools.accumulate((len(body) or 1 for body in bodies), initial=0))
 
 
 def check_nothing_is_missing(known: Mapping[int, int], ends: Mapping[int, int]) -> None:
-    """Raise Uncertain if a document lacks Yjs structs that its updates contain. `known`: the next
-    clock of each client in the document; `ends`: the one that the updates lead to."""
+    """Raise Uncertain if a document lacks Yjs items that its updates contain. `known`: the number
+    of items of each client in the document (its clock); `ends`: the number after the updates."""
     if any(known.get(client, 0) < end for client, end in ends.items()):
         raise Uncertain

@@ -36,9 +36,10 @@ class TooSlow(Exception):
 
 
 def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> TriedOutline:
-    """Apply an update, and then the updates that waited for it, to a copy of the document `state`;
-    return its outline and the time to open the document. Run it in a worker, which ends if it
-    takes far too long. Raise Malformed, Panicked or TooSlow if the update must be refused."""
+    """Apply an update to a copy of the document `state`, and then the updates that waited for it
+    (`released`); return the outline of the update and the seconds that opening the document took.
+    Call it in a worker process, which ends if it takes far too long. Raise Malformed, Panicked or
+    TooSlow if the update must be refused."""
     read = outline(update)
     placed = read.placed if any(each.inside for each in read.placed) else ()
     if len(placed) > _INSIDE:
@@ -68,8 +69,8 @@ def tried(state: bytes, update: bytes, released: Sequence[bytes]) -> TriedOutlin
 
 
 def adds_nothing(state: bytes, update: bytes) -> bool:
-    """Return whether an update would change nothing in a document with this state vector. Raise
-    Malformed or Panicked if the update cannot be read."""
+    """Return whether an update would change nothing in a document with this state vector (what it
+    has of each Yjs client). Raise Malformed or Panicked if the update cannot be read."""
     if update == NOTHING_NEW:
         return True
     outline(update)
@@ -79,8 +80,8 @@ def adds_nothing(state: bytes, update: bytes) -> bool:
 
 @contextlib.contextmanager
 def _ended_after(seconds: float) -> Iterator[None]:
-    """Let this worker process end after so many seconds of processor time, since the library cannot
-    be interrupted."""
+    """Return a context during which this worker process ends itself after so many seconds of
+    processor time, since the library cannot be interrupted. Outside of a worker it does nothing."""
     if multiprocessing.parent_process() is None:
         yield
         return

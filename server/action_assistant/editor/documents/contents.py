@@ -29,7 +29,7 @@ _LABEL: Final = 60  # characters
 
 
 class GraphAtSeq(msgspec.Struct, frozen=True):
-    """A graph at one seq of its log: its document as one Yjs update."""
+    """A graph (its id) after its change `seq`. `state`: its document as one Yjs update."""
 
     graph: str
     seq: int
@@ -101,7 +101,8 @@ class Read:
         self._found: tuple[object, list[Problem]] | None = None
 
     def problems(self, inside: Inside = NOTHING_INSIDE) -> list[Problem]:
-        """Check the graph with these graphs inside, and return its problems. The last result is kept."""
+        """Return the problems of the graph, checked with the graphs `inside`. The last result is
+        cached."""
         if self._found is None or self._found[0] != inside.key:
             graph = self.moment.graph
             found = check_written(graph, graphs_of(inside), inside.resolution)
@@ -113,7 +114,8 @@ _recent: Final = LruCache[tuple[str, int], Read](_REMEMBERED, _ACTIONS)
 
 
 def read(sight: GraphAtSeq) -> Read:
-    """Return a graph decoded from its document; each worker caches the recent ones."""
+    """Return a graph at a change (`sight`), decoded from its document; each worker process caches
+    the recent ones."""
     key = sight.graph, sight.seq
     found = _recent.get(key)
     if found is None:
@@ -129,38 +131,39 @@ def graphs_of(inside: Inside) -> dict[str, Graph]:
 
 
 def maps_of(state: bytes) -> Maps:
-    """Return the maps of a document, given as one update."""
+    """Return the root maps of a document. `state`: the document as one Yjs update."""
     doc: Doc[Any] = Doc()
     doc.apply_update(state)
     return document.maps_of(doc)
 
 
 def info(sight: GraphAtSeq) -> GraphInfo:
-    """Return the facts about a graph that lists show, without graphs inside."""
+    """Return the facts that lists show about a graph at a change (`sight`), without graphs inside."""
     found = read(sight)
     return info_of(found.moment.graph, found.problems())
 
 
 def counted(sight: GraphAtSeq, inside: Inside) -> tuple[Counts, ProblemCounts]:
-    """Count the problems of a graph with the graphs inside."""
+    """Return the number of problems by severity of a graph at a change (`sight`), with the graphs
+    inside, and the numbers for people."""
     found = read(sight)
     problems = found.problems(inside)
     return _counts(problems), problem_counts(problems, found.moment.graph)
 
 
 def names(sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
-    """Return the name of a graph, and the names of its actions."""
+    """Return the name of a graph at a change (`sight`), and the names of its actions."""
     graph = read(sight).moment.graph
     return graph.name, uses_of(graph)
 
 
 def uses_of(graph: Graph) -> tuple[str, ...]:
-    """Return the names of a graph's actions."""
+    """Return the names of a graph's actions, sorted, each once."""
     return tuple(sorted({action.name for action in graph.actions if not action.missing} - {""}))
 
 
 def info_of(graph: Graph, problems: list[Problem]) -> GraphInfo:
-    """Return the facts about a graph that was read and checked already, as `info` does."""
+    """Return the facts that lists show about a graph that was read already and has these problems."""
     return GraphInfo(
         graph.name,
         graph.description,
@@ -180,17 +183,19 @@ def _counts(problems: list[Problem]) -> Counts:
 
 
 def first_action(graph: Graph) -> Action | None:
-    """Return the action of a library document: its first one, since clients may write several."""
+    """Return the action of a library document: its first one, since clients may write several; None
+    without any."""
     return next((action for action in graph.actions if not action.missing), None)
 
 
 def problems(sight: GraphAtSeq, inside: Inside = NOTHING_INSIDE) -> bytes:
-    """Return the problems of a graph with the graphs inside, as JSON."""
+    """Return the JSON of the problems of a graph at a change (`sight`), with the graphs inside."""
     return msgspec.json.encode(read(sight).problems(inside))
 
 
 def umrf(sight: GraphAtSeq, stamp: codec.Stamp | None = None) -> bytes:
-    """Return the canonical UMRF text of a graph."""
+    """Return the canonical UMRF text of a graph at a change (`sight`). `stamp`: ids to write into
+    it, None for none."""
     return codec.write(read(sight).moment.graph, stamp).encode()
 
 
@@ -215,7 +220,8 @@ class Released(msgspec.Struct, frozen=True):
 
 
 def released(sight: GraphAtSeq, stamp: codec.Stamp, inside: Inside) -> Released:
-    """Return the content of a version: digest and text of the graph and of all graphs inside."""
+    """Return the content of a version of a graph at a change (`sight`): digest and text of it and
+    of all graphs inside. `stamp`: ids to write into the text."""
     graph = read(sight).moment.graph
     parts = tuple(_part(name, each) for name, each in inside.graphs)
     own = digest(graph)
@@ -238,12 +244,12 @@ def _text(graph: Graph, stamp: codec.Stamp) -> bytes:
 
 
 def digest_at(sight: GraphAtSeq) -> str:
-    """Return the digest of a graph at one seq of its log."""
+    """Return the digest of a graph at a change (`sight`)."""
     return digest(read(sight).moment.graph)
 
 
 def shown(state: bytes) -> Fingerprint:
-    """Return the fingerprint of a document's content."""
+    """Return the fingerprint of a document's content. `state`: the document as one Yjs update."""
     return fingerprint(maps_of(state))
 
 

@@ -104,7 +104,8 @@ def _owners(fields: Fields) -> dict[str, dict[str, object]]:
 
 
 def _under(fields: Fields, prefix: str) -> _Extra:
-    """Return the JSON texts whose keys have this prefix, sorted by name."""
+    """Return the fields whose keys have this prefix and whose values are JSON texts, without the
+    prefix, sorted by name."""
     found = (
         (key.removeprefix(prefix), value)
         for key, value in fields.items()
@@ -114,7 +115,8 @@ def _under(fields: Fields, prefix: str) -> _Extra:
 
 
 def _extra(fields: Fields, head: str) -> _Extra:
-    """Return unknown fields in the stored order; fields that it lacks follow, sorted by name."""
+    """Return the unknown fields stored under `head`, in the stored order; fields that it lacks
+    follow, sorted by name."""
     texts = dict(_under(fields, f"{head}/"))
     return tuple((field, texts[field]) for field in _listed(texts, fields.get(head)))
 
@@ -123,7 +125,7 @@ def _extra(fields: Fields, head: str) -> _Extra:
 
 
 def _actions(fields: Fields, positions: Fields) -> list[Action]:
-    """Return the actions in the order of the file."""
+    """Return the actions in the maps of actions and positions, in the order of the file."""
     found: list[tuple[float, Key, Action]] = []
     for key, own in _owners(fields).items():
         name = values.text(own.get(""))
@@ -183,7 +185,8 @@ def _numbered(actions: list[Action]) -> list[Action]:
 
 
 def _shared_out(group: list[Action]) -> dict[Key, int]:
-    """Return the new numbers for those actions of one name that need one."""
+    """Return new numbers, by key, for the actions of a group with one name whose number another one
+    has."""
     fixed = [action.instance_id for action in group if action.twin or action.missing]
     taken: set[int] = set()
     rest: list[Key] = []
@@ -232,8 +235,8 @@ def _relations(fields: Fields, positions: Fields) -> list[Relation]:
 
 
 def _waypoints(positions: Fields) -> dict[str, dict[str, JsonText]]:
-    """Return the waypoints of arrows as JSON texts: for each id of a relation a mapping from
-    response to text."""
+    """Return the waypoints of arrows in the map of positions, as JSON texts: by id of the relation
+    and by response."""
     found: dict[str, dict[str, JsonText]] = defaultdict(dict)
     for line, text in _under(positions, "w/"):
         relation, _, response = line.partition("|")
@@ -284,8 +287,8 @@ def _ends(relation: Relation) -> Ends:
 
 
 def _redirected(relations: list[Relation], taken_up: Mapping[Key, Key]) -> list[Relation]:
-    """Return the arrows, with those of replaced ghosts led to the real action. If that pair has an
-    arrow already, the other gets the next listing."""
+    """Return the arrows, with each arrow at a replaced ghost moved to the real action (`taken_up`).
+    If there is an arrow between its ends already, it gets the next free listing number."""
     touching = [r for r in relations if r.parent in taken_up or r.child in taken_up]
     arrows = [r for r in relations if r.parent not in taken_up and r.child not in taken_up]
     taken = {relation_id(relation) for relation in arrows}
@@ -303,19 +306,19 @@ def _redirected(relations: list[Relation], taken_up: Mapping[Key, Key]) -> list[
 
 
 def new_aid() -> Key:
-    """Return a new random key for an action."""
+    """Return a new random key for an action in a document."""
     return random_id()
 
 
 def read(doc: Doc) -> Graph:  # type: ignore[type-arg]
-    """Return the graph that a document shows. The document is not changed, and no content of it
-    raises an error."""
+    """Return the graph that the content of a document describes. The document is not changed, and
+    no content of it raises an error."""
     return read_maps(maps_of(doc))
 
 
 def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
-    """Return the maps of a document as plain values, without nested shared types, which our page
-    never writes."""
+    """Return the root maps of a document as plain values, without nested shared types, which our
+    page never writes."""
     return {
         root: {key: value for key, value in _root(doc, root).items() if isinstance(value, PLAIN)}
         for root in ROOTS
@@ -323,22 +326,23 @@ def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
 
 
 def name_of(doc: Doc) -> str:  # type: ignore[type-arg]
-    """Return the name of the graph that a document shows. The rest of the document is not read."""
+    """Return the name of the graph in a document; "" without one. All else in the document is not
+    read."""
     name = _root(doc, "meta").get("name")
     return name if isinstance(name, str) else ""
 
 
 def fill(doc: Doc, graph: Graph) -> None:  # type: ignore[type-arg]
-    """Write a graph into an empty document. Keys of actions that are no aids are replaced by new
-    random keys."""
+    """Write a graph into an empty document. Keys of actions that a document cannot have are
+    replaced by new random keys."""
     with doc.transaction():
         for root, fields in flatten(with_aids(graph)).items():
             _root(doc, cast(Root, root)).update(fields)
 
 
 def change(doc: Doc, target: Mapping[str, Mapping[str, object]]) -> None:  # type: ignore[type-arg]
-    """Edit the document until its maps equal `target`. Keys whose values are equal already are not
-    touched."""
+    """Edit the document, in one transaction, until its root maps equal `target`. Keys whose values
+    are equal already are not touched."""
     with doc.transaction():
         now = maps_of(doc)
         for root in ROOTS:
@@ -351,8 +355,9 @@ def change(doc: Doc, target: Mapping[str, Mapping[str, object]]) -> None:  # typ
 
 
 def flatten(graph: Graph) -> Maps:
-    """Return the document's maps for a graph whose keys are aids; a missing key means the default.
-    Raise ValueError for other keys, which could look like fields."""
+    """Return the root maps of the document of a graph; a missing key means the default. Raise
+    ValueError if the key of an action is no aid (key of a document), since it could be mistaken for
+    a field."""
     meta: dict[str, object] = {"schema": SCHEMA, "name": graph.name}
     if graph.description:
         meta["description"] = graph.description
@@ -394,7 +399,8 @@ def _action_fields(action: Action, order: float) -> dict[str, object]:
 
 
 def _extra_fields(head: str, extra: tuple[tuple[str, JsonText], ...]) -> dict[str, object]:
-    """Return keys for unknown fields, and a key with their order unless they are sorted by name."""
+    """Return the entries of a document for unknown fields under `head`, and one with their order
+    unless they are sorted by name."""
     fields: dict[str, object] = {f"{head}/{field}": text for field, text in extra}
     names = [field for field, _ in extra]
     if names != sorted(names, key=by_text):
@@ -431,7 +437,8 @@ def _relation_fields(relation: Relation) -> dict[str, object]:
 
 
 def _remap_fields(head: str, remap: tuple[Remap, ...]) -> dict[str, object]:
-    """Return keys for renamings, and a key with their order unless they are sorted by name."""
+    """Return the entries of a document for renamings under `head`, and one with their order unless
+    they are sorted by name."""
     fields: dict[str, object] = {f"{head}|remap/{r.source}": r.target for r in remap}
     sources = [r.source for r in remap]
     if sources != sorted(sources, key=by_text):
@@ -475,10 +482,11 @@ def _root(doc: Doc, root: Root) -> Map:  # type: ignore[type-arg]
 
 
 def is_same(a: object, b: object) -> bool:
-    """Compare two plain values. Unlike in Python, `True` is not equal to 1."""
+    """Return whether two plain values are equal. Unlike in Python, `True` is not equal to 1."""
     return a == b and isinstance(a, bool) == isinstance(b, bool)
 
 
 def _plain(value: object) -> object:
-    """Return a value as it may be set: bytes come back from the library as bytearray."""
+    """Return a value in a form that the library accepts: bytes, which it returns as bytearray,
+    become bytes again."""
     return bytes(value) if isinstance(value, bytearray) else value

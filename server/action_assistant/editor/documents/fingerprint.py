@@ -27,7 +27,7 @@ class Fingerprint(msgspec.Struct, frozen=True):
 
 
 def fingerprint(maps: Maps) -> Fingerprint:
-    """Return the fingerprint of everything that a document shows."""
+    """Return the fingerprint of the content of a document, given by its root maps."""
     entries = total = 0
     for root, fields in maps.items():
         head = root.encode() + b"\0"

@@ -49,7 +49,7 @@ def relation_id(relation: Relation | Ends) -> str:
 
 
 def ends_of(head: str) -> Ends | None:
-    """Return the ends of the relation that has this id; None if the text is no id of a relation."""
+    """Return the ends of the relation with the id `head`; None if the text is no id of a relation."""
     parent, arrow, rest = head.partition(">")
     child, semicolon, count = rest.partition(";")
     if not arrow or (semicolon and not _LISTING.fullmatch(count)):
@@ -67,7 +67,8 @@ def text(value: object) -> str | None:
 
 
 def direction(value: object) -> Direction:
-    """Return the direction in which a graph is drawn; `down` where a document has none or an unknown one."""
+    """Return the direction in which a graph is drawn, from a value of a document; `down` for a
+    missing or unknown value."""
     return "right" if value == "right" else "down"
 
 
@@ -140,7 +141,7 @@ def _refuse(constant: str) -> None:
 
 
 def _depth(value: object, above: int) -> int:
-    """Return how deep values are nested; stop counting once it is too deep."""
+    """Return how deep a value is nested, counted from `above`; stop counting once it is too deep."""
     if not isinstance(value, dict | list) or above > _MAX_DEPTH:
         return above
     inner = value.values() if isinstance(value, dict) else value

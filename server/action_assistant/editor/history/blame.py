@@ -72,36 +72,38 @@ class DocumentStep(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Blame:
-    """Answers who changed what, from the index; answers are JSON that a worker wrote."""
+    """Answers who changed what in a graph, from the index of changes; answers are JSON that a
+    worker wrote."""
 
     def __init__(self, index: ChangeIndex) -> None:
         self._index = index
 
     async def of(self, graph: str, owner: str, seq: int | None) -> bytes:
-        """Return the JSON of `FieldBlame`s: one for each field of an action, arrow or note that has
-        a value after the change `seq`, by field. Raise NotFound if it did not exist then,
-        Unavailable if the journal cannot be read."""
+        """Return the JSON of `FieldBlame`s: one for each field of an action, arrow or note
+        (`owner`: its key) that has a value after the change `seq` (None: now), sorted by field.
+        Raise NotFound if it did not exist then, Unavailable if the journal cannot be read."""
         upto = await bring_up(self._index, graph, seq)
         return await self._index.text(fields_of, graph, owner, upto if seq is None else seq)
 
     async def of_field(self, graph: str, owner: str, field: str, seq: int | None) -> bytes:
-        """Return the JSON of all values that people gave a field up to `seq` (None: now), newest
-        first, as `FieldValue`s, also those that were overwritten at once. What one person typed in
-        one go is one value. Raise Unavailable if the journal cannot be read."""
+        """Return the JSON of all values that people gave a field of an action, arrow or note
+        (`owner`: its key) up to `seq` (None: now), newest first, as `FieldValue`s; values that were
+        overwritten at once are among them. What one person typed in one go is one value. Raise
+        Unavailable if the journal cannot be read."""
         upto = await bring_up(self._index, graph, seq)
         at = upto if seq is None else seq
         return await self._index.text(values_of, graph, owner, field, at)
 
     async def changes(self, graph: str, after: int, upto: int, limit: int) -> bytes:
-        """Return the JSON of the newest `limit` changes of keys with `after < seq <= upto`, oldest
-        first, as `DocumentStep`s. Raise Unavailable if the journal cannot be read."""
+        """Return the JSON of the newest `limit` changes of keys in a graph with `after < seq <=
+        upto`, oldest first, as `DocumentStep`s. Raise Unavailable if the journal cannot be read."""
         await self._index.upto(graph, upto)
         return await self._index.text(steps, graph, after, upto, limit)
 
 
 def fields_of(connection: Connection, graph: str, owner: str, at: int) -> list[FieldBlame]:
-    """Return who gave each field of an action or arrow its value at the change `at`. Raise NotFound
-    if it did not exist then."""
+    """Return who gave each field of an action, arrow or note (`owner`: its key) the value that it
+    has after the change `at`. Raise NotFound if it did not exist then."""
     found = index_queries.at(connection, graph, at, {owner})
     if not found:
         raise NotFound(f"There is nothing {owner!r} in this graph at that moment.")
@@ -115,8 +117,8 @@ def fields_of(connection: Connection, graph: str, owner: str, at: int) -> list[F
 def values_of(
     connection: Connection, graph: str, owner: str, field: str, at: int
 ) -> list[FieldValue]:
-    """Return all values of a field up to the change `at`, newest first. The value that stood last
-    comes before those that it overwrote."""
+    """Return all values of a field of an action, arrow or note (`owner`: its key) up to the change
+    `at`, newest first. The value that stayed comes before the values that it overwrote."""
     changes: list[LoggedChange] = []
     lost: list[OverwrittenValue] = []
     for root, key in keys_of(owner, field):
@@ -133,7 +135,7 @@ def values_of(
 def steps(
     connection: Connection, graph: str, after: int, upto: int, limit: int
 ) -> list[DocumentStep]:
-    """Return the newest `limit` changes of keys and values overwritten at once with
+    """Return the newest `limit` changes of keys in a graph, and values overwritten at once, with
     `after < seq <= upto`, oldest first."""
     found = [
         DocumentStep(c.seq, c.author, c.root, c.key, unpacked(c.before), unpacked(c.after))
@@ -149,7 +151,8 @@ def steps(
 def _values(
     connection: Connection, graph: str, changes: Sequence[LoggedChange]
 ) -> list[FieldValue]:
-    """Return the values that people gave a field. A value that was merged keeps the person who gave it."""
+    """Return the values that `changes` gave fields, with who did so. A merged value keeps the
+    person who gave it in the draft."""
     person = stored_people(connection)
     return [
         FieldValue(
@@ -165,8 +168,8 @@ def _values(
 
 
 def _overwritten(connection: Connection, lost: Sequence[OverwrittenValue]) -> list[FieldValue]:
-    """Return the values of a field that were overwritten at once: of those that one person typed in one go the
-    last."""
+    """Return the values of a field that were overwritten at once (`lost`); of several that one
+    person typed in one go, only the last."""
     person = stored_people(connection)
     last = [
         each
@@ -187,7 +190,8 @@ def _overwritten(connection: Connection, lost: Sequence[OverwrittenValue]) -> li
 
 
 def keys_of(owner: str, field: str) -> Sequence[tuple[Root, str]]:
-    """Return the keys that may hold a field of an owner."""
+    """Return the places (root map and key) that may hold a field of an action, arrow or note
+    (`owner`: its key)."""
     if owner == "":
         return [("meta", field)]
     if field == "position":

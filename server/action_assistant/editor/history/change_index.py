@@ -49,8 +49,8 @@ _TABLES: Final = (key_change, overwritten_value)
 
 
 class ChangeIndex:
-    """Keeps an index of the keys that each event changed. The index is derived from the log and may be deleted
-    at any time."""
+    """Maintains an index, in the database, of the keys that each event of a graph changed. It is
+    derived from the log and may be deleted at any time."""
 
     def __init__(self, journal: Journal, run_in_worker: RunInWorker = run_here) -> None:
         self._journal = journal
@@ -85,9 +85,10 @@ class ChangeIndex:
     async def value(
         self, question: Callable[Concatenate[Connection, P], T], *args: P.args, **kw: P.kwargs
     ) -> T:
-        """Answer a question from one consistent snapshot of the database, in a worker. The answer
-        must be small, since the event loop decodes it. Raise the question's errors; Unavailable
-        or TooMany if no worker can answer."""
+        """Call `question` with a database connection and these arguments, on one consistent
+        snapshot of the database in a worker process, and return the result. It must be small, since
+        the event loop decodes it. Raise the question's errors; Unavailable or TooMany if no worker
+        can answer."""
         bound: Callable[..., T] = partial(question, **kw) if kw else question
         if self._run_in_worker is run_here:
             return await self._journal.ask(lambda connection: bound(connection, *args))
@@ -96,12 +97,13 @@ class ChangeIndex:
     async def text(
         self, question: Callable[Concatenate[Connection, P], Any], *args: P.args, **kw: P.kwargs
     ) -> bytes:
-        """Answer a question as JSON, which the worker encodes. Raises as `value` does."""
+        """Call `question` as `value` does, and return the result as JSON, which the worker encodes.
+        Raise the errors of `value`."""
         return await self.value(_as_json, partial(question, **kw) if kw else question, args)
 
     @asynccontextmanager
     async def kept_up(self) -> AsyncIterator[None]:
-        """Keep the index up to date in the background, inside of the `async with`, so that a
+        """Return a context during which the index is kept up to date in the background, so that a
         request for a history rarely waits."""
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._keep_up)
@@ -145,8 +147,8 @@ class ChangeIndex:
         return {graph: numbers for graph, numbers in found.items() if graph is not None}
 
     async def _keep(self, graph: str, found: IndexGrowth) -> None:
-        """Store the new rows in slices, so that other commits come in between, and the head last.
-        Rows after the head do not count."""
+        """Store the new rows of a graph's index in slices, so that other commits come in between,
+        and then its head (how far the index goes). Rows after the head do not count."""
         if found.leftovers:
             await self._delete_after(graph, found.after)
         for each in found.slices:
@@ -164,7 +166,8 @@ class ChangeIndex:
         await self._journal.derive(keep)
 
     async def _forget(self, graph: str) -> None:
-        """Drop the index of a graph: first its head, without which no row counts, then the rows."""
+        """Delete the index of a graph: first its head (how far it goes), without which no row
+        counts, then the rows."""
         await self._journal.derive(partial(_drop_head, graph=graph))
         await self._delete_after(graph, 0)
 
@@ -175,7 +178,8 @@ class ChangeIndex:
 
 
 def _answered(url: str, question: Callable[..., T], args: tuple[Any, ...]) -> T:
-    """Ask the question with a connection of the worker's own. Runs in a worker."""
+    """Call `question` with a database connection of this worker process and the arguments `args`,
+    and return the result."""
     return ask_from_worker(url, lambda connection: question(connection, *args))
 
 
@@ -193,7 +197,8 @@ def _drop_head(connection: Connection, graph: str) -> None:
 
 
 def _delete_some(table: Table, connection: Connection, graph: str, after: int) -> bool:
-    """Delete some of the rows after a change; return whether any were left to be deleted."""
+    """Delete some of the rows of a graph in this table after the change `after`; return whether any
+    were deleted."""
     c = table.c
     keys = (c.seq, c.root, c.key)
     some = select(*keys).where(c.graph == graph, c.seq > after).limit(ROWS)

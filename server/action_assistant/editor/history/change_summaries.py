@@ -46,10 +46,10 @@ class ChangedThings(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Changes(ChangedThings, frozen=True, omit_defaults=True):
-    """The changes of somebody. `comments`: the number of threads with new comments. `overwritten`: the values
-    that this person set while somebody else, without knowing of it, set those that stayed: each as the
-    difference between what this person wanted (`before`) and what stayed (`after`). Of notes the text that this
-    person wanted."""
+    """The changes of one person. `comments`: the number of threads with new comments.
+    `overwritten`: the values that this person set while another, without knowing of it, set the
+    values that stayed: each as the difference between what this person wanted (`before`) and what
+    stayed (`after`). Of notes the text that this person wanted."""
 
     comments: int = 0
     overwritten: ChangedThings | None = None
@@ -98,12 +98,12 @@ def told(
 
 
 def state_of(changes: Iterable[LoggedChange]) -> State:
-    """Return the values of all keys after these changes, which are in order of time."""
+    """Return the value of each key after `changes`, which are in order of time."""
     return {change.place: change.after for change in changes}
 
 
 def maps_of(state: Mapping[Place, Packed]) -> Maps:
-    """Return values as the root maps of a document."""
+    """Return the values of a document as its root maps; values that are no value are missing."""
     maps: Maps = {root: {} for root in ROOTS}
     for (root, key), value in state.items():
         if value is not None:
@@ -112,8 +112,8 @@ def maps_of(state: Mapping[Place, Packed]) -> Maps:
 
 
 def document(changes: Sequence[LoggedChange]) -> bytes:
-    """Return the root maps after these changes as JSON; values that are bytes, which our page never
-    writes, are left out."""
+    """Return the JSON of the root maps of a document after `changes`; values that are bytes, which
+    our page never writes, are missing."""
     maps = maps_of(state_of(changes))
     plain = {
         root: {key: value for key, value in fields.items() if not isinstance(value, bytes)}
@@ -123,17 +123,17 @@ def document(changes: Sequence[LoggedChange]) -> bytes:
 
 
 def graph_of(state: Mapping[Place, Packed]) -> Graph:
-    """Return the graph that these values describe."""
+    """Return the graph that the values of a document describe."""
     return read_maps(maps_of(state))
 
 
 def document_at(connection: Connection, graph: str, seq: int) -> bytes:
-    """Return the maps of the document as they were after the change `seq`, as JSON."""
+    """Return the JSON of the root maps of a graph's document after its change `seq`."""
     return document(index_queries.at(connection, graph, seq))
 
 
 def differing(connection: Connection, graph: str, then: int, now: int) -> Difference:
-    """Return the difference between a graph after the changes `then` and `now`."""
+    """Return the difference between a graph after its change `then` and after its change `now`."""
     was, is_now = (
         graph_of(state_of(index_queries.at(connection, graph, seq))) for seq in (then, now)
     )
@@ -143,16 +143,17 @@ def differing(connection: Connection, graph: str, then: int, now: int) -> Differ
 def names_between(
     connection: Connection, graph: str, after: int, upto: int, limit: int
 ) -> tuple[str, tuple[str, ...]]:
-    """Return the name of a graph after the change `upto`, and all names of its actions since the
-    change `after`. Raise TooLarge if there are more than `limit` changes in between."""
+    """Return the name of a graph after its change `upto`, and all names that its actions had since
+    its change `after`. Raise TooLarge if there are more than `limit` changes in between."""
     return names(stretch_of(connection, graph, after, upto, limit, whole=True))
 
 
 def stretch_of(
     connection: Connection, graph: str, after: int, upto: int, limit: int, *, whole: bool = False
 ) -> list[LoggedChange]:
-    """Return the changes of a graph with `after < seq <= upto`; with `whole`, precede them by the
-    changes that make up the state at `after`. Raise TooLarge if there are more than `limit`."""
+    """Return the changes of keys of a graph with `after < seq <= upto`; with `whole`, precede them
+    by the changes that make up the state at `after`. Raise TooLarge if there are more than `limit`.
+    """
     found = index_queries.between(connection, graph, after, upto, limit + 1)
     if len(found) > limit:
         raise TooLarge("That is too long ago; name a later moment that was good.")
@@ -191,8 +192,8 @@ class _Current:
             self._of.setdefault(stretch.author, []).append((n, stretch))
 
     def of(self, change: LoggedChange | OverwrittenValue) -> int | None:
-        """Return the number of the stretch of a change, of which later ones are asked for only; None where
-        there is none."""
+        """Return the index of the stretch to which a change belongs; None for no stretch. Call it
+        with changes in order of time."""
         mine = self._of.get(change.author, [])
         while mine and mine[0][1].last < change.seq:
             mine.pop(0)
@@ -206,7 +207,8 @@ def _told(
     gone: State,
 ) -> Changes:
     """Return the difference that one person made to the things they touched, without later changes
-    by others."""
+    by others. `own`: the old and new value of each key; `lost`: their values that were overwritten
+    at once; `state`: all values after the changes; `gone`: the last names of deleted actions."""
     owners = {owner_of(*place) for place in own}
     around = _around(owners, state)
     before = around | {place: old for place, (old, _) in own.items()}
@@ -217,7 +219,8 @@ def _told(
 
 
 def _around(owners: Set[str], state: State) -> State:
-    """Return the values of some owners, and the names of the actions between which arrows are."""
+    """Return the values in `state` of the actions and arrows with these keys, and the names of the
+    actions at the ends of the arrows."""
     names = {("actions", key) for owner in owners for key in _ends(owner)}
     return {p: value for p, value in state.items() if owner_of(*p) in owners or p in names}
 
@@ -225,8 +228,9 @@ def _around(owners: Set[str], state: State) -> State:
 def _overwritten(
     lost: Mapping[Place, OverwrittenValue], state: State, gone: State
 ) -> ChangedThings | None:
-    """Return the values that were lost as differences to those that stayed; None where nothing tells of them, as
-    of comments. An action that was deleted meanwhile is called by its last name."""
+    """Return the values that were lost as differences to the values that stayed; None where that
+    shows no difference, as for comments. An action that was deleted meanwhile is called by its last
+    name (`gone`)."""
     owners = {owner_of(*place) for place in lost}
     around = _around(owners, gone) | {
         p: v for p, v in _around(owners, state).items() if v is not None
@@ -249,8 +253,9 @@ def _ends(owner: str) -> set[str]:
 
 
 def shortened(found: Difference, owners: Set[str]) -> Changes:
-    """Return at most 30 items of each kind, without changes that only follow from others, such as a
-    new number after a name was taken."""
+    """Return a difference with at most 30 items of each kind, and only the actions with keys in
+    `owners`: others changed only as a consequence, such as by a new number after a name was taken.
+    """
     actions = tuple(change for change in found.actions if change.aid in owners)
     comments = sum(owner.startswith("c/") for owner in owners)
     kinds: tuple[tuple[Any, ...], ...] = (actions, found.relations, found.notes)
@@ -265,7 +270,7 @@ def shortened(found: Difference, owners: Set[str]) -> Changes:
 
 
 def _most(actions: Sequence[ActionChange]) -> tuple[ActionChange, ...]:
-    """Return at most 30 changes of actions; changes of the position only come last."""
+    """Return at most 30 changes of actions, mere changes of the position last."""
 
     def moved_only(change: ActionChange) -> bool:
         return change.change == "changed" and all(f.field == "position" for f in change.fields)

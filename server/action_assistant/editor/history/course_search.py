@@ -85,8 +85,8 @@ def followed_between(
     named_at: int,
     inside: Inside,
 ) -> Followed:
-    """Search the changes of a graph between the changes `good` and `bad`, as `followed` does. Raise
-    TooLarge if there are more than `limit`."""
+    """Search the changes of a graph between its changes `good` and `bad`, as `followed` does. Raise
+    TooLarge if there are more than `limit`. `script`, `named_at`, `inside`: as in `followed`."""
     changes = stretch_of(connection, graph, good, bad, limit)
     base = index_queries.at(connection, graph, good)
     return followed(base, changes, script, named_at, inside=inside)
@@ -100,9 +100,10 @@ def followed(
     budget_s: float = _BUDGET_S,
     inside: Inside = NOTHING_INSIDE,
 ) -> Followed:
-    """Find the changes after which the simulated course differs from the first one. `changes`: in
-    order of time. `base`: the value of each key before them. `named_at`: the change after which
-    actions had the names in `script`. `inside`: the graphs inside, the same for every change."""
+    """Find the changes after which the simulated course of a graph differs from the first one, for
+    at most `budget_s` seconds of processor time. `changes`: in order of time. `base`: the value of
+    each key before them. `script`: how the actions act. `named_at`: the change after which actions
+    had the names in `script`. `inside`: the graphs inside, the same for every change."""
     past = _Past(base, changes, script, named_at, graphs_of(inside))
     if not past.moments:
         return Followed(True, True, 1, ())
@@ -112,8 +113,8 @@ def followed(
 
 
 def _flips(past: "_Past", budget_s: float) -> tuple[list[tuple[int, int]], bool]:
-    """Return neighbouring changes between which the course changes, and whether these are certainly
-    all."""
+    """Return pairs of neighbouring states between which the course changes, and whether they are
+    certainly all: not if `budget_s` seconds of processor time were over before."""
     last = len(past.moments)
     parts = last if last <= _EACH else _SAMPLES
     marks = sorted({last * n // parts for n in range(parts + 1)})
@@ -134,8 +135,8 @@ def _flips(past: "_Past", budget_s: float) -> tuple[list[tuple[int, int]], bool]
 
 
 def _narrowed(past: "_Past", left: int, right: int) -> tuple[int, int]:
-    """Return the two neighbours between `left` and `right`, whose courses differ, at which the
-    course changes."""
+    """Return the two neighbouring states between the states `left` and `right`, whose courses
+    differ, at which the course changes."""
     verdict = past.is_same(left)
     while right - left > 1:
         middle = (left + right) // 2
@@ -168,16 +169,16 @@ class _Past:
 
     @property
     def looked(self) -> int:
-        """The number of states that were simulated."""
+        """The number of states that were simulated so far."""
         return len(self._courses)
 
     def is_same(self, moment: int) -> bool:
-        """Return whether the course of a state equals that of state 0."""
+        """Return whether the course of the state with the number `moment` equals that of state 0."""
         return self._course(moment) == self._reference
 
     def parting(self, left: int, right: int) -> CourseParting:
-        """Return how the courses of two neighbouring states differ, as a description of the later
-        change."""
+        """Return how the courses of the neighbouring states `left` and `right` (numbers) differ, as
+        a description of the later change."""
         change = self.moments[right - 1]
         before, after = self._graph(left), self._graph(right)
         apart = departure(self._course(left), self._course(right))
@@ -214,7 +215,7 @@ class _Past:
 
 
 def _noticed(changes: Sequence[LoggedChange]) -> Iterator[LoggedChange]:
-    """Yield one change for each event that an engine can notice."""
+    """Yield the first change of each event that can make a difference to an engine."""
     last = 0
     for change in changes:
         if change.seq != last and _is_noticed(change):
@@ -297,9 +298,9 @@ class CourseSearch:
         self._people = people
 
     async def since(self, graph: str, asked: AskingSince) -> SinceWhen:
-        """Search between two changes of a graph for those that change its course. Raise BadInput
-        for a bad request, TooLarge for too many changes, Unavailable if the journal cannot be
-        read."""
+        """Search between two changes of a graph for the changes that alter its course. `asked`: the
+        two changes and the script. Raise BadInput for a bad request, TooLarge for too many changes,
+        Unavailable if the journal cannot be read."""
         try:
             script = script_from(asked.script)
         except ValueError as error:

@@ -64,8 +64,8 @@ class EditSession(msgspec.Struct, frozen=True):
 
 
 def edit_sessions(steps: Iterable[Step]) -> list[EditSession]:
-    """Group steps, given in order of time, into sessions, sorted by their ends. A step that is no
-    edit ends all open sessions, since it may refer to the document at that time."""
+    """Group steps, which are in order of time, into sessions, sorted by their ends. A step that is
+    no edit ends all open sessions, since it may refer to the document at that time."""
     done: dict[int, EditSession] = {}
     open_of: dict[str, int] = {}
     seq = 1
@@ -166,14 +166,14 @@ class HistoryEntry(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True
 
 
 class GraphHistory:
-    """Answers what happened to graphs, as JSON that a worker wrote."""
+    """Answers, for a page of a graph's history, what happened to it, as JSON that a worker wrote."""
 
     def __init__(self, index: ChangeIndex) -> None:
         self._index = index
 
     async def of(self, graph: str, *, limit: int, before: int | None) -> bytes:
         """Return the JSON of up to `limit` `HistoryEntry`s of a graph, newest first; with `before`,
-        only those before that change. Raise Unavailable if the journal cannot be read."""
+        only entries before that change. Raise Unavailable if the journal cannot be read."""
         if last := await self._index.value(last_edit_of, graph, limit, before):
             await self._index.upto(graph, last)
         return await self._index.text(history_of, graph, limit, before)
@@ -196,8 +196,8 @@ def history_of(
 
 
 def last_edit_of(connection: Connection, graph: str, limit: int, before: int | None) -> int:
-    """Return the last change that this page of the history shows, up to which it needs the index; 0
-    if it shows none."""
+    """Return the number of the last change that a page of the history shows, up to which it needs
+    the index; 0 if it shows none. `limit`, `before`: as in `history_of`."""
     special = _special(connection, graph, stored_people(connection))
     edits = _edits(_shown(connection, graph, special, limit, before))
     return max((each.last for each in edits), default=0)
@@ -214,7 +214,7 @@ def _shown(
 
 
 def _edits(shown: Sequence[EditSession]) -> list[Stretch]:
-    """Return the sessions that changed the document as stretches of changes."""
+    """Return the sessions of a page that changed the document, as stretches of changes."""
     return [
         Stretch(session.author, session.from_seq, session.seq)
         for session in shown
@@ -229,8 +229,9 @@ def _edit_sessions(
     limit: int,
     before: int | None,
 ) -> list[EditSession]:
-    """Return more than `limit` sessions, or all that the last events make up. The first one may be
-    incomplete."""
+    """Return more than `limit` sessions of a graph before the change `before` (None: the newest),
+    or all that there are. The first one may be incomplete. `special`: restores, reverts and merges
+    by seq."""
     for most in _EVENTS:
         rows = _rows(connection, graph, before, most)
         found = edit_sessions(step for row in reversed(rows) if (step := _step(row, special)))
@@ -268,8 +269,8 @@ def _changes(
     connection: Connection, graph: str, shown: Sequence[EditSession]
 ) -> dict[tuple[str, int], Changes]:
     """Return the changes that each session made, keyed by the author of the session and the number
-    of its last change. Old sessions are left out if all of them together have too many changes
-    to read."""
+    of its last change. Old sessions are missing if all of them together have too many changes to
+    read."""
     edits = _edits(shown)
     if not edits:
         return {}
@@ -304,8 +305,9 @@ def _rows(connection: Connection, graph: str, before: int | None, most: int) -> 
 def _special(
     connection: Connection, graph: str, person: Callable[[str], PersonRef]
 ) -> dict[int, _Special]:
-    """Return the changes that were a restore, an adaption, a revert or a merge, by seq. A merge
-    that changed nothing has the key 0."""
+    """Return, by seq, the changes of a graph that were a restore, an adaption, a revert or a merge,
+    with what the log says of them. A merge that changed nothing has the key 0. `person`: returns
+    the person of an author's id."""
     event = editor_tables.editor_event.c
     kinds = [h.RESTORED, h.ADAPTED, h.REVERTED, h.MERGED]
     chosen = select(event.kind, event.body).where(
@@ -336,7 +338,8 @@ def _merged(merged: h.GraphMerged, person: Callable[[str], PersonRef]) -> Merged
 
 
 def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
-    """Return an event as a step to be grouped; None if the history does not show it."""
+    """Return the event in `row` as a step to be grouped; None if the history does not show it.
+    `special`: restores, reverts and merges by seq."""
     at = h.when(row.at)
     if row.kind in {h.UPDATED, h.DEFERRED}:
         if row.seq == 1:
@@ -359,7 +362,8 @@ def _step(row: Row[Any], special: Mapping[int, _Special]) -> Step | None:
 
 
 def _touched(rows: Sequence[LoggedChange | OverwrittenValue]) -> set[str]:
-    """Return the owners of the changed keys, and the actions at both ends of changed arrows."""
+    """Return the keys of the actions, arrows and notes that these rows changed, and of the actions
+    at both ends of changed arrows."""
     owners = {owner_of(row.root, row.key) for row in rows}
     ends = {end for owner in owners if (found := ends_of(owner)) for end in found[:2]}
     return owners | ends

@@ -63,7 +63,8 @@ class IndexGrowth(msgspec.Struct, frozen=True):
 
 
 def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth | None:
-    """Return what the next events of a graph add to its index; None if there are no more events."""
+    """Return the rows that the next events of a graph add to its index, in slices of `slice_rows`;
+    None if there are no more events."""
     seq, kept = _head(connection, graph)
     document = unpacked(kept)
     leftovers = any(
@@ -91,8 +92,8 @@ def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth |
 def between(
     connection: Connection, graph: str, after: int, upto: int, limit: int, by: str | None = None
 ) -> list[LoggedChange]:
-    """Return the newest `limit` changes with `after < seq <= upto`, oldest first; with `by` only
-    those of this person."""
+    """Return the newest `limit` changes of a graph with `after < seq <= upto`, oldest first; with
+    `by` only changes of the person with this id."""
     chosen = _CHANGE.where(_c.graph == graph, _c.seq > after, _c.seq <= upto)
     if by is not None:
         chosen = chosen.where(_c.author == by)
@@ -103,7 +104,8 @@ def between(
 def overwritten_between(
     connection: Connection, graph: str, after: int, upto: int, limit: int
 ) -> list[OverwrittenValue]:
-    """Return the newest values with `after < seq <= upto` that were overwritten at once, in order of time."""
+    """Return the newest `limit` values in a graph with `after < seq <= upto` that were overwritten
+    at once, in order of time."""
     chosen = _OVERWRITTEN.where(_o.graph == graph, _o.seq > after, _o.seq <= upto)
     newest_first = chosen.order_by(_o.seq.desc(), _o.root, _o.key).limit(limit)
     return [OverwrittenValue._make(row) for row in connection.execute(newest_first)][::-1]
@@ -112,7 +114,8 @@ def overwritten_between(
 def overwritten_of_key(
     connection: Connection, graph: str, root: Root, key: str, upto: int
 ) -> list[OverwrittenValue]:
-    """Return the values of one key that were overwritten at once, in order of time."""
+    """Return the values of one key (in the map `root`) of a graph, up to the change `upto`, that
+    were overwritten at once, in order of time."""
     same = (_o.graph == graph, _o.root == root, _o.key == key, _o.seq <= upto)
     chosen = _OVERWRITTEN.where(*same).order_by(_o.seq)
     return [OverwrittenValue._make(row) for row in connection.execute(chosen)]
@@ -121,17 +124,17 @@ def overwritten_of_key(
 def at(
     connection: Connection, graph: str, seq: int, of: Collection[str] | None = None
 ) -> list[LoggedChange]:
-    """Return the change that gave each key the value that it has after the change `seq`: of everything, or
-    of some owners."""
+    """Return, for each key of a graph that has a value after the change `seq`, the change that gave
+    it; only for keys of the owners `of` (actions, arrows …), None for all."""
     if of is None:
         return _changes(connection, _last(graph, seq).where(_c.after.is_not(None)))
     return [each for each in latest(connection, graph, seq, of) if each.after is not None]
 
 
 def latest(connection: Connection, graph: str, seq: int, of: Collection[str]) -> list[LoggedChange]:
-    """Return the last change of each key up to the change `seq`, also of keys that no longer exist.
-    Only keys of the owners `of` count; an owner is what a key speaks of, such as an action or a
-    relation (`owner_of`)."""
+    """Return the last change of each key of a graph up to the change `seq`, also of keys that no
+    longer exist. Only keys of the owners `of` count; an owner is what a key describes, such as an
+    action or a relation (`owner_of`)."""
     owners = sorted(of)
     found: list[LoggedChange] = []
     for start in range(0, len(owners), _OWNERS):
@@ -141,7 +144,8 @@ def latest(connection: Connection, graph: str, seq: int, of: Collection[str]) ->
 
 
 def latest_since(connection: Connection, graph: str, seq: int) -> dict[Place, int]:
-    """Return the last change of each key that was changed at or after the change `seq`."""
+    """Return the number of the last change of each key of a graph that was changed at or after the
+    change `seq`."""
     head, _ = _head(connection, graph)
     newest = select(_c.root, _c.key, func.max(_c.seq).label("seq"))
     chosen = newest.where(_c.graph == graph, _c.seq >= seq, _c.seq <= head)
@@ -152,7 +156,7 @@ def latest_since(connection: Connection, graph: str, seq: int) -> dict[Place, in
 def of_key(
     connection: Connection, graph: str, root: Root, key: str, upto: int
 ) -> list[LoggedChange]:
-    """Return all changes of one key up to `upto`, oldest first."""
+    """Return all changes of one key (in the map `root`) of a graph up to `upto`, oldest first."""
     same = (_c.graph == graph, _c.root == root, _c.key == key, _c.seq <= upto)
     return _changes(connection, _CHANGE.where(*same).order_by(_c.seq))
 
@@ -194,7 +198,8 @@ def _changes(connection: Connection, chosen: Select[Any]) -> list[LoggedChange]:
 
 
 def _last(graph: str, seq: int, *also: ColumnElement[bool]) -> Select[Any]:
-    """Return the query for the last change of each key up to `seq`."""
+    """Return the query for the last change of each key of a graph up to `seq`, with the further
+    conditions `also`."""
     newest = (
         select(_c.root, _c.key, func.max(_c.seq).label("seq"))
         .where(_c.graph == graph, _c.seq <= seq, *also)

@@ -54,8 +54,9 @@ class LostValues:
         self._places: _Places | None = None  # they are read when the first value is lost
 
     def found(self, event: Event, set_keys: int) -> list[LostValue]:
-        """Return the values that were lost when `event` was applied, at most one for each key. `set_keys`: the
-        number of keys for which the maps showed a new value. Raises Malformed."""
+        """Return the values that were lost when `event` was applied, at most one for each key.
+        `set_keys`: the number of keys for which the maps showed a new value. Raise Malformed if an
+        update cannot be read."""
         lost: dict[tuple[Root, str], LostValue] = {}
         updates = [(written(body), author) for body, author in self._applied(event)]
         deleted = _Ranges(update for update, _ in updates)
@@ -74,8 +75,8 @@ class LostValues:
         return list(lost.values())
 
     def _applied(self, event: Event) -> list[tuple[bytes, str]]:
-        """Return the updates that were applied with an event, and their authors: its own, unless that waits for
-        an earlier one, and those that had waited for it."""
+        """Return the updates that were applied with an event, and their authors: its own, unless
+        that waits for an earlier one, and updates that had waited for it."""
         replica, waited = self._replica, self._waiting
         self._waiting = dict(replica.held_back()) if replica.waits else {}
         own = [] if event.body in self._waiting else [(event.body, event.author)]
@@ -108,7 +109,7 @@ class LostValues:
 
 
 class _Ranges:
-    """The clocks that some updates delete."""
+    """The items that some updates delete, as ranges of clocks (item numbers) by Yjs client."""
 
     def __init__(self, updates: Iterable[WrittenUpdate]) -> None:
         self._of: dict[int, list[tuple[int, int]]] = {}
@@ -124,28 +125,30 @@ class _Ranges:
             self._of[client] = apart
 
     def has(self, client: int, clock: int) -> bool:
-        """Tell whether this clock of a client is deleted."""
+        """Return whether the item with this clock (number) of a Yjs client is deleted."""
         ranges = self._of.get(client, [])
         n = bisect_right(ranges, clock, key=lambda each: each[0]) - 1
         return n >= 0 and clock < ranges[n][1]
 
 
 class _Places:
-    """The root and the key of each item of a document. Most items only name the item that stood there before."""
+    """Finds the root map and the key of each item of a document. Most items only name the item that
+    was there before."""
 
     def __init__(self, items: Iterable[WrittenItem]) -> None:
         self._of: dict[int, list[WrittenItem]] = {}
         self.add(items)
 
     def add(self, items: Iterable[WrittenItem]) -> None:
-        """Take over the items that are new, in the order of the clocks of each client."""
+        """Add those of the items that are new, in the order of the clocks (item numbers) of each
+        client."""
         for item in items:
             mine = self._of.setdefault(item.client, [])
             if not mine or item.end > mine[-1].end:
                 mine.append(item)
 
     def of(self, item: WrittenItem | None) -> tuple[bytes, bytes] | None:
-        """Return the place of an item; None where it lies in no key of a root."""
+        """Return the root map and key of an item; None where it lies in no key of a root map."""
         while item is not None and item.place is None and item.beside is not None:
             item = self._at(*item.beside)
         return None if item is None else item.place
@@ -220,8 +223,8 @@ class ObservedEvents(msgspec.Struct, frozen=True):
 
 
 def observed(document: bytes, events: Sequence[Event]) -> ObservedEvents | None:
-    """Apply events to a document, given as the bytes of a snapshot or empty, and return the keys that each
-    changed. Return None when these bytes are no snapshot."""
+    """Apply events to a document (`document`: the bytes of a snapshot, or empty), and return the
+    changes of keys by each. Return None if the bytes are no snapshot."""
     replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None
@@ -248,8 +251,8 @@ def observed(document: bytes, events: Sequence[Event]) -> ObservedEvents | None:
 
 
 def owner_of(root: Root, key: str) -> str:
-    """Return the owner of a key: an action or an end by its key, a relation by its id, a note as `g/ID`, a
-    thread as `c/THREAD`, the graph as ""."""
+    """Return the owner of a key in the map `root`, that is, what it describes: an action or an end
+    by its key, a relation by its id, a note as `g/ID`, a thread as `c/THREAD`, the graph as ""."""
     if root == "meta":
         return ""
     if root == "comments":
@@ -298,7 +301,7 @@ class _Observer:
         ]
 
     def close(self) -> None:
-        """Let the document be freed."""
+        """Stop observing, so that the document can be freed."""
         for root, shared in self._maps.items():
             shared.unobserve(self._subscriptions[root])
 
@@ -325,7 +328,8 @@ def _packed(value: object) -> Packed:
 
 
 def places_of(state: bytes) -> dict[Place, Any]:
-    """Return the values of a document by their place (root and key)."""
+    """Return the values of a document by their place (root map and key). `state`: the document as
+    one Yjs update."""
     doc: Doc[Any] = Doc()
     doc.apply_update(state)
     maps = document.maps_of(doc)
@@ -334,11 +338,8 @@ def places_of(state: bytes) -> dict[Place, Any]:
 
 def field_of(root: Root, key: str) -> str:
     """Return the name of the field that a key of the document stores, within the action, arrow or
-    note that `owner_of` returns for this key.
-
-    `root` is the top-level map that has the key. The field of `ID|type` is `type`; the field of
-    `ID` alone in `actions` is an empty text.
-    """
+    note that `owner_of` returns for this key. `root` is the root map that has the key. The field of
+    `ID|type` is `type`; the field of `ID` alone in `actions` is an empty text."""
     if root == "meta":
         return key
     if root == "positions":
@@ -347,7 +348,7 @@ def field_of(root: Root, key: str) -> str:
 
 
 def proves(place: Place) -> bool:
-    """Return whether the owner of a key exists because of this key."""
+    """Return whether the action, arrow or note to which a key belongs exists because of this key."""
     root, key = place
     match root:
         case "actions":
@@ -359,13 +360,13 @@ def proves(place: Place) -> bool:
 
 
 def is_place_of_card(place: Place) -> bool:
-    """Return whether a key holds the position of a card or of a line."""
+    """Return whether a key stores the position of an action's card or of a line."""
     root, key = place
     return root == "positions" and not key.startswith("g/")
 
 
 def by_owner(places: Iterable[Place]) -> dict[str, list[Place]]:
-    """Group keys of a document by the action, arrow or note that they describe."""
+    """Group places (root map and key) by the action, arrow or note that they describe (`owner_of`)."""
     found: dict[str, list[Place]] = defaultdict(list)
     for place in places:
         found[owner_of(*place)].append(place)
@@ -373,7 +374,7 @@ def by_owner(places: Iterable[Place]) -> dict[str, list[Place]]:
 
 
 def arrows_of(owners: Iterable[str]) -> dict[str, set[str]]:
-    """Return the arrows of each action."""
+    """Return the arrows at each action, by the action's key. `owners`: keys of actions and arrows."""
     found: dict[str, set[str]] = defaultdict(set)
     for owner in owners:
         for end in (ends_of(owner) or ())[:2]:
@@ -382,5 +383,5 @@ def arrows_of(owners: Iterable[str]) -> dict[str, set[str]]:
 
 
 def exist(places: Mapping[Place, Any]) -> set[str]:
-    """Return the actions, arrows and notes that exist in these values."""
+    """Return the keys of the actions, arrows and notes that exist according to these values."""
     return {owner_of(*place) for place in places if proves(place)}

@@ -66,13 +66,14 @@ async def bring_up(index: ChangeIndex, graph: str, seq: int | None = None) -> in
 
 
 def sources(connection: Connection, graph: str) -> list[tuple[str, int]]:
-    """Return the graphs from which changes came into this graph, by a merge or when it was made as
-    a draft, each with the number of its last change that came."""
+    """Return the ids of the graphs from which changes came into this graph, by a merge or when it
+    was made as a draft, each with the number of its last change that came."""
     return sorted({(graft.source, graft.upto) for graft in grafts_of(connection, graph).values()})
 
 
 def grafts_of(connection: Connection, graph: str) -> dict[int, MergeOrigin]:
-    """Return the merges into a graph, by the change that each made."""
+    """Return the merges into a graph, and its beginning as a draft, by the number of the change
+    that each made."""
     event = editor_event.c
     rows = connection.execute(
         select(event.kind, event.body).where(
@@ -94,8 +95,8 @@ def grafts_of(connection: Connection, graph: str) -> dict[int, MergeOrigin]:
 def originals(
     connection: Connection, graph: str, changes: Sequence[LoggedChange]
 ) -> list[Original]:
-    """Return each change where it was first made, in this graph or a merged one. Call `bring_up`
-    first."""
+    """Return, for each of `changes` of a graph, the change by which the value was first made, in
+    this graph or a merged one. Call `bring_up` first."""
     grafts = grafts_of(connection, graph)
     found = [Original(change) for change in changes]
     by_graft: dict[int, list[int]] = defaultdict(list)
@@ -116,7 +117,8 @@ def originals(
 def _there(
     connection: Connection, graft: MergeOrigin, changes: Iterable[LoggedChange]
 ) -> dict[Place, LoggedChange]:
-    """Return the changes that gave the same keys the same values in the merged graph."""
+    """Return, by place, the changes in the merged graph (`graft`) that gave the same keys the same
+    values as `changes`."""
     wanted = {change.place: change.after for change in changes}
     owners = {owner_of(*place) for place in wanted}
     return {
@@ -130,7 +132,8 @@ def merged_by(
     change: LoggedChange, original: Original, person: Callable[[str], PersonRef]
 ) -> MergedBy | None:
     """Return how a change came into the graph; None if it was made in the graph or the draft began
-    with it. `person`: returns the person of an author's id."""
+    with it. `original`: where the value was first made; `person`: returns the person of an author's
+    id."""
     via = original.via
     if via is None or via.name is None:
         return None

@@ -47,8 +47,9 @@ class RevertedEdits(msgspec.Struct, frozen=True):
 def reverting_edits(
     connection: Connection, graph: str, state: bytes, author: str, first: int, last: int, limit: int
 ) -> RevertedEdits | None:
-    """Return the edits that revert what `author` changed from the change `first` to `last`; None if
-    there is nothing to revert. Raise TooLarge if there are more than `limit` changes."""
+    """Return the update that reverts what `author` changed in a graph from the change `first` to
+    `last`; None if there is nothing to revert. `state`: its present document. Raise TooLarge if
+    there are more than `limit` changes."""
     changes = index_queries.between(connection, graph, first - 1, last, limit + 1, author)
     if len(changes) > limit:
         raise TooLarge("That is too much to take back at once; go back to the moment before.")
@@ -58,8 +59,9 @@ def reverting_edits(
 
 
 def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, owner: str) -> bytes:
-    """Return the update that restores one action or arrow to its state after the change `seq`.
-    Raise NotFound if it did not exist then."""
+    """Return the update that restores one action, arrow or note (`owner`: its key) of a graph to
+    its state after the change `seq`. `state`: its present document. Raise NotFound if it did not
+    exist then."""
     then = index_queries.at(connection, graph, seq)
     if not owner or all(owner_of(*change.place) != owner for change in then):
         raise NotFound(f"There was nothing {owner!r} in this graph after its change {seq}.")
@@ -69,21 +71,20 @@ def one_as_it_was(connection: Connection, graph: str, state: bytes, seq: int, ow
 def reverting(
     state: bytes, changes: Sequence[LoggedChange], latest: Mapping[Place, int]
 ) -> RevertedEdits:
-    """Return the update that reverts the changes of one person in a sitting, given in order of
-    time, and what it leaves. `latest`: the last change by anybody of each key, since the sitting
-    began.
-
-    A field that was set since stays; one that another person set during the sitting gets that
-    person's value. A thing made in the sitting is removed only if nobody has changed it or
-    connected an arrow to it since; its position does not matter.
-    """
+    """Return the update that reverts `changes`, those of one person in a sitting (edits close in
+    time), and what it does not revert. `state`: the present document. `latest`: the number of the
+    last change of each key since the sitting began. A field that was set since stays; one that
+    another person set during the sitting gets that person's value. A thing made in the sitting is
+    removed only if no other person has changed it or connected an arrow to it since; its position
+    does not matter."""
     session = _EditSession(changes, places_of(state), latest)
     return RevertedEdits(_setting(state, session.targets()), session.left())
 
 
 def as_it_was(state: bytes, then: Sequence[LoggedChange], owner: str) -> bytes:
-    """Return the update that restores an action, arrow or note. `then`: the changes that made up
-    the graph at that time. A removed action comes back with its arrows."""
+    """Return the update that restores an action, arrow or note (`owner`: its key). `state`: the
+    present document; `then`: the changes that made up the graph at that time. A removed action
+    comes back with its arrows."""
     now = places_of(state)
     owners = {owner}
     if ("actions", owner) not in now:
@@ -133,7 +134,7 @@ class _EditSession:
         return {p: old for p, old in self._first.items() if self._goes_back(p)}
 
     def left(self) -> tuple[str, ...]:
-        """Return the owners of which something is not reverted."""
+        """Return the keys of the actions, arrows and notes that are not fully reverted."""
         stay = {
             owner_of(*place)
             for place, old in self._first.items()
@@ -151,17 +152,20 @@ class _EditSession:
         return place in self._last and self._is_untouched(place)
 
     def _is_untouched(self, place: Place) -> bool:
-        """Return whether a key still has the value that this person gave it last."""
+        """Return whether a key (`place`: root map and key) still has the value that this person
+        gave it last."""
         mine = self._last[place]
         return self._latest[place] == mine.seq and self._now.get(place) == unpacked(mine.after)
 
     def _was_made(self, owner: str) -> bool:
-        """Return whether a thing that exists now was made by these changes."""
+        """Return whether a thing (`owner`: its key) that exists now was made by the changes of this
+        person."""
         proofs = [place for place in self._places.get(owner, ()) if proves(place)]
         return bool(proofs) and all(self._first.get(place, b"") is None for place in proofs)
 
     def _is_in_use(self, owner: str) -> bool:
-        """Return whether others have changed a thing, or connected an arrow to it that stays."""
+        """Return whether others have changed a thing (`owner`: its key), or connected an arrow to
+        it that stays."""
         own = [place for place in self._places[owner] if not is_place_of_card(place)]
         if any(place in self._latest and not self._is_mine(place) for place in own):
             return True
@@ -216,8 +220,9 @@ class Restoring:
         self._run_in_worker = run_in_worker
 
     async def restore(self, graph: str, author: str, seq: int) -> GoneBack:
-        """Restore a graph to its state after the change `seq`. Raise NotFound for an unknown graph,
-        Conflict for an unknown change, Unavailable if the journal cannot be read or written."""
+        """Restore a graph to its state after the change `seq`, in the name of `author`. Raise
+        NotFound for an unknown graph, Conflict for an unknown change, Unavailable if the journal
+        cannot be read or written."""
         then = await self._graph_reader.at(graph, seq)
         async with self._rooms.enter(h.graph_stream(graph)) as room:
             before = room.seq
@@ -227,9 +232,9 @@ class Restoring:
         return await self._said(graph, author, before, seq, now)
 
     async def restore_one(self, graph: str, author: str, seq: int, owner: str) -> GoneBack:
-        """Restore one action, arrow or note to its state after the change `seq`. Raise NotFound if
-        it did not exist then, Conflict for an unknown change, Unavailable if the journal cannot
-        be read or written."""
+        """Restore one action, arrow or note (`owner`: its key) of a graph to its state after the
+        change `seq`, in the name of `author`. Raise NotFound if it did not exist then, Conflict for
+        an unknown change, Unavailable if the journal cannot be read or written."""
         upto = await self._index.upto(graph)
         if not 1 <= seq <= upto:
             raise Conflict(
@@ -243,9 +248,9 @@ class Restoring:
         return await self._said(graph, author, before, seq, now)
 
     async def revert(self, graph: str, author: str, edits: EditsOfOne) -> GoneBack:
-        """Revert the edits of one person. Raise BadInput for an impossible range, NotFound for an
-        unknown graph, TooLarge for too many changes, Unavailable if the journal cannot be read
-        or written."""
+        """Revert the edits of one person in a graph, in the name of `author`. Raise BadInput for an
+        impossible range, NotFound for an unknown graph or if there was no change, TooLarge for too
+        many changes, Unavailable if the journal cannot be read or written."""
         first, last = edits.from_seq, edits.seq
         if not 2 <= first <= last:
             raise BadInput(

@@ -65,7 +65,8 @@ class PackageContents(msgspec.Struct, frozen=True):
 
 
 def listed(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
-    """Return the packages of a graph's actions, as JSON of a `PackageList`."""
+    """Return the JSON of a `PackageList`: the C++ packages of the actions in a document at a change
+    (`sight`). `kind`: a graph, or an action of the library."""
     graph = _of(sight, kind)
     refusals = tuple(dict.fromkeys(_refusals(graph, kind)))
     refused = {refusal.action for refusal in refusals}
@@ -78,8 +79,9 @@ def listed(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
 
 
 def contents(sight: GraphAtSeq, kind: DocumentKind, package: str) -> bytes:
-    """Return the JSON of `PackageContents`: the generated files of one package. Raise NotFound if
-    no action has this package."""
+    """Return the JSON of `PackageContents`: the generated files of one package of a document at a
+    change (`sight`). `kind`: a graph, or an action of the library. Raise NotFound if no action has
+    this package."""
     action = _chosen(sight, kind, (package,))[0]
     files = tuple(
         PackageFile(path, content.decode()) for path, content in package_files(action).items()
@@ -88,8 +90,9 @@ def contents(sight: GraphAtSeq, kind: DocumentKind, package: str) -> bytes:
 
 
 def archive(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> bytes:
-    """Return a ZIP file with a folder for each named package, or for every package if none is
-    named; equal actions give equal bytes. Raise NotFound if no action has such a package."""
+    """Return a ZIP file with a folder for each package in `packages`, or for every package if that
+    is empty, of a document at a change (`sight`); equal actions give equal bytes. Raise NotFound if
+    no action has such a package."""
     return _packed(_chosen(sight, kind, packages))
 
 
@@ -111,7 +114,8 @@ def _packed(actions: Sequence[Action]) -> bytes:
 
 
 def _of(sight: GraphAtSeq, kind: DocumentKind) -> Graph:
-    """Return the graph of a document; for an action of the library a graph with this action alone."""
+    """Return the graph of a document at a change (`sight`); for an action of the library (`kind`) a
+    graph with this action alone."""
     graph = read(sight).moment.graph
     if kind == "graph":
         return graph
@@ -120,8 +124,8 @@ def _of(sight: GraphAtSeq, kind: DocumentKind) -> Graph:
 
 
 def _actions(graph: Graph, kind: DocumentKind) -> tuple[Action, ...]:
-    """Return one action of each name: in a graph without values, since each use gives its own; in
-    the library with them."""
+    """Return one action of each name: of a graph without values, since each use has its own; of a
+    library document with them."""
     return distinct_actions(graph) if kind == "graph" else graph.actions
 
 

@@ -25,8 +25,8 @@ Side: TypeAlias = Literal["ours", "theirs"]
 
 
 def chosen(base: object, ours: object, theirs: object) -> Side | None:
-    """Return the side whose value wins; None if both sides changed it in different ways. UNSET
-    stands for no value."""
+    """Return the side of a merge whose value of a key wins; None if both sides changed it, in
+    different ways. UNSET stands for no value."""
     if is_same(ours, theirs) or is_same(theirs, base):
         return "ours"
     return "theirs" if is_same(ours, base) else None
@@ -54,8 +54,8 @@ def first(graph: Graph) -> bytes:
 
 
 def drafted(then: GraphAtSeq) -> tuple[bytes, GraphInfo]:
-    """Return the update that makes a document with the content and keys of another one, without
-    comments; and its description for lists."""
+    """Return the update that makes a new document with the content and keys of the graph `then`,
+    without comments; and its facts for lists."""
     maps = {**maps_of(then.state), "comments": {}}
     update = difference(b"", lambda doc: document.change(doc, maps))
     return update, info(then)
@@ -64,8 +64,8 @@ def drafted(then: GraphAtSeq) -> tuple[bytes, GraphInfo]:
 def renaming(
     state: bytes, name: str | None, description: str | None, kind: DocumentKind = "graph"
 ) -> bytes:
-    """Return the update that gives a graph, or the action of a library document, another name or
-    description; None keeps the old one."""
+    """Return the update that gives a graph, or (`kind`) the action of a library document, another
+    name or description; None keeps the old one. `state`: the encoded document."""
 
     def renamed(old: Graph) -> Graph:
         action = first_action(old)
@@ -82,9 +82,9 @@ def renaming(
 
 
 def calling_actions(state: bytes, before: str, name: str) -> bytes:
-    """Return the update that renames every action called `before` and changes nothing else. Of
-    actions that then share a name and an instance number, all but one get another number when the
-    document is read."""
+    """Return the update of the document `state` that renames all actions called `before` to `name`
+    and changes nothing else. Of actions that then share a name and an instance number, all but one
+    get another number when the document is read."""
 
     def edit(doc: Doc[Any]) -> None:
         actions = doc.get("actions", type=Map)
@@ -97,7 +97,8 @@ def calling_actions(state: bytes, before: str, name: str) -> bytes:
 
 
 def editing(state: bytes, edit: Callable[[Graph], Graph]) -> bytes:
-    """Return the update that changes the graph to the result of `edit`, and touches no other keys."""
+    """Return the update of the document `state` that changes its graph to the result of `edit`, and
+    touches no other keys."""
 
     def edited(doc: Doc[Any]) -> None:
         maps = document.maps_of(doc)
@@ -108,8 +109,8 @@ def editing(state: bytes, edit: Callable[[Graph], Graph]) -> bytes:
 
 
 def setting(state: bytes, targets: Mapping[tuple[str, str], object]) -> bytes:
-    """Return the update that gives keys of root maps these values (UNSET: removes them), and
-    touches no other keys."""
+    """Return the update of the document `state` that sets the keys in `targets` (root map and key)
+    to these values, or removes them for UNSET, and touches no other keys."""
 
     def edit(doc: Doc[Any]) -> None:
         maps = document.maps_of(doc)
@@ -124,7 +125,8 @@ def setting(state: bytes, targets: Mapping[tuple[str, str], object]) -> bytes:
 
 
 def restoring(state: bytes, then: bytes) -> bytes:
-    """Return the update that gives a document the content of the document `then`; comments stay."""
+    """Return the update that gives the document `state` the content of the document `then`;
+    comments stay. Both are encoded as one update."""
 
     def edit(doc: Doc[Any]) -> None:
         comments = document.maps_of(doc)["comments"]
@@ -134,7 +136,8 @@ def restoring(state: bytes, then: bytes) -> bytes:
 
 
 def changed(maps: Maps, old: Graph, new: Graph) -> Maps:
-    """Return the maps with the difference between two graphs applied; all other keys stay."""
+    """Return the root maps `maps` with the difference between the graphs `old` and `new` made in
+    them; all other keys stay."""
     before, after = document.flatten(old), document.flatten(new)
     result = {root: dict(fields) for root, fields in maps.items()}
     for root, fields in after.items():

@@ -59,8 +59,8 @@ class TextEdit(msgspec.Struct, frozen=True):
 
 
 def edited_text(sight: GraphAtSeq, text: bytes, inside: Inside) -> bytes:
-    """Compare an edited text with its graph; return JSON of a `TextEdit`. For workers. Raises as `text_edit`
-    does."""
+    """Compare an edited text with the graph it was edited from (`sight`); return the JSON of a
+    `TextEdit`. Call it in a worker process. Raise the errors of `text_edit`."""
     found = read(sight)
     return msgspec.json.encode(text_edit(found.moment, text, found.problems(inside), inside))
 
@@ -72,10 +72,8 @@ def text_edit(
     inside: Inside = NOTHING_INSIDE,
 ) -> TextEdit:
     """Compare `text`, edited from the canonical text of `moment`, with its graph, and return the
-    changes. `known`: the present problems of the graph, with these graphs `inside`.
-
-    Raise BadInput, NotUmrf or TooLarge, with the place, for a text that cannot be read.
-    """
+    changes. `known`: the present problems of the graph, with the graphs `inside`. Raise BadInput,
+    NotUmrf or TooLarge, with the place, for a text that cannot be read."""
     shown = codec.read(codec.write(moment.graph))
     wanted = importing.read(text)
     _refuse(shown, wanted)
@@ -88,7 +86,8 @@ def text_edit(
 
 
 def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
-    """Raise NotUmrf for an edited text from which an import would drop or assume something."""
+    """Raise NotUmrf for an edited text (`wanted`) from which an import would drop or assume
+    something, unless the original (`shown`) had that problem already."""
     if wanted.dialect != "D3":
         raise NotUmrf(
             f"This reads as an older form of UMRF ({wanted.dialect}). Import it as a graph of its "
@@ -101,7 +100,8 @@ def _refuse(shown: codec.Reading, wanted: codec.Reading) -> None:
 
 
 def _worse(known: Iterable[Problem], new: Graph, inside: Inside) -> tuple[Problem, ...]:
-    """Return the errors that are new in the edited graph."""
+    """Return the errors that the edited graph (`new`) has and the original had not (`known`: its
+    problems), the first ones only."""
     old = {(problem.code, problem.message) for problem in known}
     found = check(new, graphs=graphs_of(inside), resolution=inside.resolution)
     errors = [problem for problem in found if problem.severity == "error"]
@@ -116,8 +116,8 @@ def _real(graph: Graph) -> list[Action]:
 
 
 def _keys_of(moment: Graph, shown: Graph) -> dict[Key, Key]:
-    """Return the original key of each action that was written and read again: actions by index,
-    ghosts by name."""
+    """Return the original key, in `moment`, of each action of `shown`, the same graph written and
+    read again: actions by index, ghosts by name."""
     pairs = zip(_real(shown), _real(moment), strict=True)
     keys = {copy.key: action.key for copy, action in pairs}
     ghosts = {action.full_name: action.key for action in moment.actions if action.missing}
@@ -128,8 +128,9 @@ def _keys_of(moment: Graph, shown: Graph) -> dict[Key, Key]:
 
 
 def _aligned(old: Graph, wanted: Graph) -> dict[Key, Key]:
-    """Return the keys of the edited actions: the key of the action with the same full name, else of
-    the renamed action at the same position between its neighbours, else a new one."""
+    """Return the keys for the actions of the edited graph: the key of the action of `old` with the
+    same full name, else of the renamed action at the same position between its neighbours, else a
+    new one."""
     free: dict[tuple[str, bool], list[Key]] = defaultdict(list)
     for action in old.actions:
         free[action.full_name, action.missing].append(action.key)
@@ -146,8 +147,8 @@ def _aligned(old: Graph, wanted: Graph) -> dict[Key, Key]:
 
 
 def _gaps(order: Sequence[Key], kept: set[Key]) -> dict[Key, list[Key]]:
-    """Group the keys that are not in `kept` by the kept key before them; "" stands for the
-    beginning."""
+    """Group the keys in `order` that are not in `kept` by the key of `kept` before them; "" stands
+    for the beginning."""
     found: dict[Key, list[Key]] = defaultdict(list)
     last = ""
     for key in order:
@@ -168,8 +169,8 @@ def _under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
 
 
 def _refuse_ghosts(old: Graph, new: Graph, text: str) -> None:
-    """Raise NotUmrf for a new arrow to an action that does not exist, most often half of a
-    renaming."""
+    """Raise NotUmrf, with the place in `text`, for a new arrow to an action that does not exist,
+    most often half of a renaming."""
     known = {action.full_name for action in old.actions if action.missing}
     for action in new.actions:
         if action.missing and action.full_name not in known:
@@ -179,14 +180,16 @@ def _refuse_ghosts(old: Graph, new: Graph, text: str) -> None:
 
 
 def _place(text: str, path: str) -> dict[str, object] | None:
-    """Return a place for a refusal; None for the whole text."""
+    """Return the place (pointer, line, column) of the JSON pointer `path` in a text, for a refusal;
+    None for the whole text."""
     found = places_of(text, [path])[path]
     place: dict[str, object] = {"path": found.path, "line": found.line, "column": found.column}
     return place if found.path else None
 
 
 def _naming(file: object, ghost: Action) -> str:
-    """Return the JSON pointer at which a file first names an action in a list of relations."""
+    """Return the JSON pointer at which a parsed file first names the missing action `ghost` in a
+    list of relations."""
     if not isinstance(file, dict):
         return ""
     lists: list[tuple[tuple[str | int, ...], object]] = [
@@ -210,7 +213,8 @@ def _naming(file: object, ghost: Action) -> str:
 
 
 def key_changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
-    """Return the changes of keys that make a document with these maps, which shows `old`, show `new`."""
+    """Return the changes of keys that make a document with the root maps `maps`, which shows the
+    graph `old`, show `new`."""
     wanted = _fields(old, new) | _orders(maps, old, new) | _leftovers(maps, old, new)
     changes = []
     for (root, key), after in sorted(wanted.items(), key=lambda item: item[0]):
@@ -223,7 +227,8 @@ def key_changes(maps: Maps, old: Graph, new: Graph) -> list[KeyChange]:
 
 
 def _fields(old: Graph, new: Graph) -> _Wanted:
-    """Return the keys whose values differ between both graphs, without keys that hold an order."""
+    """Return the entries whose values differ between the graphs `old` and `new` (UNSET: removed),
+    without entries that store an order."""
     before, after = document.flatten(old), document.flatten(new)
     wanted: _Wanted = {}
     for root, fields in after.items():
@@ -238,7 +243,8 @@ def _fields(old: Graph, new: Graph) -> _Wanted:
 
 
 def _leftovers(maps: Maps, old: Graph, new: Graph) -> _Wanted:
-    """Return the other keys of removed actions and relations, to be removed."""
+    """Return the remaining entries in `maps` of actions and relations that `new` lacks, to be
+    removed."""
     gone = {action.key for action in old.actions} - {action.key for action in new.actions}
     there = {f"{r.parent}>{r.child};{r.listing}" for r in new.relations}
     lost = {f"{r.parent}>{r.child};{r.listing}" for r in old.relations} - there
@@ -256,8 +262,8 @@ def _leftovers(maps: Maps, old: Graph, new: Graph) -> _Wanted:
 
 
 def _orders(maps: Maps, old: Graph, new: Graph) -> _Wanted:
-    """Return order numbers for items that are new or moved, between the numbers of their
-    neighbours."""
+    """Return order numbers for the actions and relations of `new` that are new or moved, between
+    the numbers of their neighbours."""
     wanted: _Wanted = {}
     lists = [("actions", "order", _by_place(old), _by_place(new))]
     before, after = _by_end(old), _by_end(new)
@@ -278,8 +284,8 @@ def _by_place(graph: Graph) -> list[str]:
 
 
 def _by_end(graph: Graph) -> dict[tuple[str, Key], list[str]]:
-    """Return the relations at each action, in their order: by parent under `po`, by child under
-    `co`."""
+    """Return the ids of the relations at each action, in their order: as the parent under (`po`,
+    key), as the child under (`co`, key)."""
     flat = document.flatten(graph)["relations"]
     found: dict[tuple[str, Key], list[tuple[float, str]]] = defaultdict(list)
     for key, value in flat.items():
@@ -294,11 +300,11 @@ def _by_end(graph: Graph) -> dict[tuple[str, Key], list[str]]:
 def _numbered(
     was: Sequence[str], now: Sequence[str], numbers: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return the numbers of heads that have to change so that sorting by number gives the order
-    `now`. `was` is the order before, `numbers` the number of each head. The result is empty if
-    no number has to change. If the heads in both orders keep their relative order, they keep
-    their numbers, and only new heads get numbers between these; otherwise every head gets a new
-    number."""
+    """Return the numbers that have to change so that sorting by number gives the order `now`. Items
+    are named by the beginning of their keys. `was` is the order before, `numbers` the number of
+    each item. The result is empty if no number has to change. If the items in both orders keep
+    their relative order, they keep their numbers, and only new ones get numbers in between;
+    otherwise every item gets a new number."""
     kept = [head for head in now if head in numbers]
     there = set(now)
     if kept == [head for head in was if head in there]:
@@ -311,7 +317,7 @@ def _numbered(
 
 
 def _between(now: Sequence[str], numbers: Mapping[str, float]) -> dict[str, float]:
-    """Return numbers for the heads of `now` that have no number yet, evenly spaced between the
+    """Return numbers for the items of `now` that have no number yet, evenly spaced between the
     numbers of their neighbours."""
     found: dict[str, float] = {}
     run: list[str] = []
@@ -353,6 +359,7 @@ def merging(then: GraphAtSeq, state: bytes, text: bytes, inside: Inside) -> Merg
 
 
 def _is_other(now: Maps, change: KeyChange) -> bool:
-    """Return whether a key has neither the value from before the edit nor the wanted one."""
+    """Return whether a key has, in the maps `now`, neither the value from before the edit
+    (`change`) nor the wanted one."""
     value = now.get(change.root, {}).get(change.key, UNSET)
     return chosen(change.before, value, change.after) is None

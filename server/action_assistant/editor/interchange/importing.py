@@ -77,7 +77,7 @@ class ImportedFile(msgspec.Struct, frozen=True):
 
 
 def imported(body: bytes, keys: tuple[Key, ...] = ()) -> ImportedFile:
-    """Return what is stored of a file. `keys`: the keys of its actions in order; without them
+    """Return what is stored of a UMRF file. `keys`: the keys of its actions in order; without them
     actions get new ones. Raise BadInput, NotUmrf or TooLarge, with the place, for a file that
     cannot be imported."""
     found = fitting(read_graph(body))
@@ -150,7 +150,7 @@ def _directed(graph: Graph) -> Graph:
 
 
 def fitting(found: codec.Reading) -> codec.Reading:
-    """Return the reading. Raise TooLarge if a document cannot hold its graph."""
+    """Return the graph as read from a file. Raise TooLarge if a document cannot hold it."""
     refuse_too_much(found.graph, found.dialect)
     refuse_too_wide(document.flatten(document.with_aids(found.graph)))
     return found

@@ -49,9 +49,9 @@ class Rehearsal(msgspec.Struct, frozen=True):
 
 
 def rehearsed(sight: GraphAtSeq, wanted: Rehearsing, inside: Inside = NOTHING_INSIDE) -> bytes:
-    """Simulate a graph, with these graphs inside, to its end or up to a limit; return the JSON of a
-    `Rehearsal`. For workers. Raise BadInput for a bad request, Conflict if the graph cannot be
-    simulated."""
+    """Simulate a graph at a change (`sight`), with the graphs `inside`, to its end or up to a
+    limit; return the JSON of a `Rehearsal`. `wanted`: the script and the commands. Call it in a
+    worker process. Raise BadInput for a bad request, Conflict if the graph cannot be simulated."""
     script = _script(wanted.script)
     if not 0 < wanted.for_ms <= 24 * HOUR_MS:
         raise BadInput("A rehearsal lasts up to a day.", where={"path": "/for_ms"})

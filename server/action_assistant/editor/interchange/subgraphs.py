@@ -86,13 +86,14 @@ class SubGraphFile(msgspec.Struct, frozen=True):
 
 
 def extraction_look(sight: GraphAtSeq, chosen: ChosenActions) -> bytes:
-    """Preview moving actions into a sub-graph; return JSON of an `ExtractionLook`."""
+    """Preview moving chosen actions of a graph at a change (`sight`) into a sub-graph; return the
+    JSON of an `ExtractionLook`."""
     return msgspec.json.encode(_look(sight, _extraction(sight, chosen), chosen))
 
 
 def subgraph_file(sight: GraphAtSeq, chosen: ChosenActions) -> SubGraphFile:
-    """Return the new sub-graph. Raise Conflict if it is impossible, or may behave differently
-    without `otherwise`."""
+    """Return the new sub-graph for chosen actions of a graph at a change (`sight`), and the changes
+    for it. Raise Conflict if it is impossible, or may behave differently without `otherwise`."""
     found = _extraction(sight, chosen)
     look = _look(sight, found, chosen)
     for reason in look.reasons:
@@ -131,8 +132,9 @@ def _look(sight: GraphAtSeq, found: Extraction, chosen: ChosenActions) -> Extrac
 def unpacking_look(
     sight: GraphAtSeq, action: Key, at: Position | None, inside: GraphAtSeq
 ) -> bytes:
-    """Return the JSON of an `UnpackingLook`. `at`: where the action is drawn if it has no stored
-    position."""
+    """Preview replacing the action with the key `action` by the actions of the graph `inside`;
+    return the JSON of an `UnpackingLook`. `sight`: the graph with the action; `at`: where the
+    action is drawn if it has no stored position."""
     moment = read(sight).moment
     drawn = tuple(
         replace(a, position=a.position or at) if a.key == action else a
@@ -154,7 +156,8 @@ def unpacking_look(
 
 
 def name_of_action(sight: GraphAtSeq, action: Key) -> str:
-    """Return the name of an action. Raise NotFound if the graph no longer has it."""
+    """Return the name of the action with this key in a graph at a change (`sight`). Raise NotFound
+    if the graph does not have it."""
     for each in read(sight).moment.graph.actions:
         if each.key == action and not each.missing:
             return each.name
@@ -177,7 +180,8 @@ class FlatGraph(msgspec.Struct, frozen=True):
 
 
 def flat_graph(sight: GraphAtSeq, inside: Inside) -> bytes:
-    """Flatten a graph; return JSON of a `FlatGraph`."""
+    """Flatten a graph at a change (`sight`) with the graphs inside; return the JSON of a
+    `FlatGraph`."""
     found = flattened(read(sight).moment.graph, graphs_of(inside))
     if isinstance(found, Unflattenable):
         return msgspec.json.encode(FlatGraph(sight.seq, None, reasons=found.reasons))
@@ -186,8 +190,8 @@ def flat_graph(sight: GraphAtSeq, inside: Inside) -> bytes:
 
 
 def flat_text(sight: GraphAtSeq, inside: Inside, name: str) -> bytes:
-    """Return the UMRF of the flat graph under another name; its description names its source. Raise
-    Conflict if no flat graph does the same."""
+    """Return the UMRF text of the flat graph of `sight` under another name; its description names
+    its source. Raise Conflict if no flat graph does the same."""
     graph = read(sight).moment.graph
     found = flattened(graph, graphs_of(inside))
     if isinstance(found, Unflattenable):
@@ -198,8 +202,8 @@ def flat_text(sight: GraphAtSeq, inside: Inside, name: str) -> bytes:
 
 
 def zipped(graphs: Iterable[tuple[str, bytes]]) -> bytes:
-    """Return a ZIP file with one file for each of these graphs, given by name and text. The files are named so
-    that an engine indexes them: `*graph.json`."""
+    """Return a ZIP file with one file for each graph, given as pairs of name and text. The files
+    are named so that an engine indexes them: `*graph.json`."""
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as file:
         taken: set[str] = set()
@@ -212,8 +216,8 @@ def zipped(graphs: Iterable[tuple[str, bytes]]) -> bytes:
 
 
 def _free_name(graph: str, taken: set[str]) -> str:
-    """Return a file name that is not in `taken`, and add it there in lower case, since some file
-    systems ignore case."""
+    """Return a file name for the graph of this name that is not in `taken`, and add it there in
+    lower case, since some file systems ignore case."""
     number = 1
     while (name := graph_file_name(graph, number)).lower() in taken:
         number += 1

@@ -84,7 +84,8 @@ NOTHING: Final = msgspec.msgpack.encode(FoundActions())
 
 
 def found(sight: GraphAtSeq, kind: DocumentKind) -> bytes:
-    """Return the actions of a document, as msgpack of `FoundActions`."""
+    """Return the actions of a document at a change (`sight`), as msgpack of `FoundActions`. `kind`:
+    a graph, or an action of the library."""
     graph = read(sight).moment.graph
     if kind == "graph":
         actions = _distinct(graph)
@@ -120,7 +121,8 @@ def merged(sources: list[tuple[ActionSource, bytes]]) -> bytes:
 
 def as_actions(sources: list[tuple[ActionSource, bytes]]) -> bytes:
     """Return the JSON of a list of `GraphAsAction`, sorted by name; of equal names the oldest
-    first, for which actions of that name stand."""
+    first, for which actions of that name stand. `sources`: documents, each with its actions as
+    `found` encodes them."""
     aged = sorted(sources, key=lambda each: (each[0].made_at, each[0].document))
     listed = [
         GraphAsAction(
@@ -137,7 +139,7 @@ def as_actions(sources: list[tuple[ActionSource, bytes]]) -> bytes:
 
 
 def _by_age(uses: list[tuple[ActionSource, Action]]) -> tuple[str, ...]:
-    """Return the graphs of these uses, oldest first."""
+    """Return the ids of the graphs in `uses`, the oldest first, each once."""
     ordered = sorted(uses, key=lambda use: (use[0].made_at, use[0].document))
     return tuple(dict.fromkeys(source.document for source, _ in ordered))
 
@@ -179,7 +181,8 @@ def _of_uses(name: str, uses: list[tuple[ActionSource, Action]]) -> LibraryActio
 
 
 def together(name: str, uses: Sequence[Action]) -> Action:
-    """Combine several uses into one action without values; where they differ, the first use counts."""
+    """Combine several uses of an action into one action with this name and without values; where
+    they differ, the first use counts."""
     return Action(
         key="",
         name=name,
@@ -214,9 +217,9 @@ def _described(parameter: Parameter) -> LibraryParameter:
 
 
 def _distinct(graph: Graph) -> tuple[Action, ...]:
-    """Return one action for each different combination of the fields that a library stores (name,
-    type, description, inputs and outputs). An action that exists only because a relation refers
-    to it is left out."""
+    """Return one action of a graph for each different combination of the fields that a library
+    stores (name, type, description, inputs and outputs). An action that exists only because a
+    relation refers to it is skipped."""
     found: dict[object, Action] = {}
     for action in graph.actions:
         if action.missing:

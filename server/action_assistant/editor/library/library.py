@@ -42,7 +42,8 @@ _Listing = Callable[[list[tuple[ActionSource, bytes]]], bytes]
 
 
 class Library:
-    """Reads a document again only when it has changed."""
+    """Lists the actions of the library and of graphs. A document is read again only when it has
+    changed."""
 
     def __init__(self, journal: Journal, graph_reader: GraphReader) -> None:
         self._journal = journal
@@ -52,8 +53,8 @@ class Library:
         self._shown: dict[_Listing, tuple[dict[str, int], bytes]] = {}
 
     async def all(self) -> bytes:
-        """Return every action, sorted by name: the JSON of a list of `LibraryAction`. Documents
-        that cannot be read are left out."""
+        """Return all actions, sorted by name: the JSON of a list of `LibraryAction`. Documents that
+        cannot be read are skipped."""
         return await self._listed(merged)
 
     async def graphs(self) -> bytes:
@@ -72,8 +73,8 @@ class Library:
             return before[1]
 
     async def _sources(self) -> list[tuple[ActionSource, bytes]]:
-        """Return the action that each document holds, with its text; the document that changed last comes
-        first."""
+        """Return all documents with actions, the last changed first, each with its actions as
+        `found` encodes them."""
         graph, event = editor_tables.graph, editor_tables.editor_event
         last = (
             select(event.c.seq)
@@ -144,7 +145,8 @@ class UpdatedGraph(msgspec.Struct, frozen=True):
 
 
 class LibraryEdits:
-    """Commands of people; each has been permitted already."""
+    """Carries out commands of people on actions of the library; the caller has checked their role.
+    `action`: the id of the document of an action; `author`: the id of the person."""
 
     def __init__(
         self,
@@ -164,9 +166,10 @@ class LibraryEdits:
         self._making = anyio.Lock()
 
     async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
-        """Create the document of an action from a `NewAction` or from a file; for a file also
-        return the JSON of an `ImportReport`. Raise BadInput, NotUmrf or TooLarge, with the
-        place, for a bad file; Conflict for a taken name; NotFound if no graph uses the action."""
+        """Create the document of an action from a `NewAction` or from a file (`body`). Return it
+        and, for a file, the JSON of an `ImportReport`, else None. Raise BadInput, NotUmrf or
+        TooLarge, with the place, for a bad file; Conflict for a taken name; NotFound if no graph
+        uses the action."""
         try:
             wanted = msgspec.json.decode(body, type=NewAction)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
@@ -206,7 +209,8 @@ class LibraryEdits:
         return action
 
     async def uses(self, action: str, renames: Renames) -> tuple[int, bytes]:
-        """Return the action's last change, and the JSON of a list of `ActionUse` for it."""
+        """Return the number of the action's last change, and the JSON of a list of `ActionUse` for
+        it. `renames`: parameters that were renamed."""
         sight = await self._graph_reader.now(action)
         name = (await self._catalogue.get(action)).name
         graphs = await self._using(name)
@@ -216,8 +220,10 @@ class LibraryEdits:
     async def update_uses(
         self, action: str, seq: int, graphs: Sequence[GraphMoment], renames: Renames, author: str
     ) -> list[UpdatedGraph]:
-        """Update the uses in graphs to the action after its change `seq`, one edit for each graph.
-        Raise Conflict, before anything is written, if a graph has changed meanwhile."""
+        """Update the uses of an action in graphs to its parameters after its change `seq`, by one
+        edit for each graph. `graphs`: with the change that the person has seen; `renames`:
+        parameters that were renamed. Raise BadInput if a graph is named twice; Conflict, before
+        anything is written, if a graph has changed meanwhile."""
         sight = await self._graph_reader.at(action, seq)
         name = (await self._catalogue.get(action)).name
         if len({each.graph for each in graphs}) < len(graphs):
@@ -243,8 +249,9 @@ class LibraryEdits:
             ]
 
     async def take(self, action: str, graph: str, aid: str | None, author: str) -> GraphView:
-        """Give an action of the library the parameters that its use in a graph has. Raise NotFound
-        if the action, the graph or the use does not exist."""
+        """Give an action of the library the parameters that its use in a graph has (`aid`: the key
+        of that action; None: the first use that differs), and return it. Raise NotFound if the
+        action, the graph or the use does not exist."""
         await self._catalogue.require(action, "action")
         await self._catalogue.require(graph, "graph")
         source = await self._graph_reader.now(graph)
@@ -256,7 +263,8 @@ class LibraryEdits:
         return await self._catalogue.get(action)
 
     async def replacing_would(self, action: str, body: bytes) -> bytes:
-        """Return the JSON of the `Difference` that `replace` would make. Raises as `replace` does."""
+        """Return the JSON of the `Difference` that `replace` with this file (`body`) would make.
+        Raise the errors of `replace`."""
         await self._catalogue.require(action, "action")
         sight = await self._graph_reader.now(action)
         found: bytes = await self._files(library_updates.replacing_would, sight, body)
@@ -265,9 +273,9 @@ class LibraryEdits:
     async def replace(
         self, action: str, body: bytes, author: str, seq: int | None = None
     ) -> GraphView:
-        """Replace an action by the content of its file. Raise BadInput, NotUmrf or TooLarge, with
-        the place, for a bad file; Conflict for the file of another action, or if `seq` is not
-        the last change."""
+        """Replace an action by the content of its file (`body`), and return it. Raise BadInput,
+        NotUmrf or TooLarge, with the place, for a bad file; Conflict for the file of another
+        action, or if `seq` is not the last change."""
         await self._catalogue.require(action, "action")
         name = (await self._catalogue.get(action)).name
         async with self._rooms.enter(h.graph_stream(action)) as room:
@@ -281,8 +289,8 @@ class LibraryEdits:
         return await self._catalogue.get(action)
 
     async def built(self, action: str, build: h.ActionBuilt, author: str) -> None:
-        """Store the report of a build of an action's package. Raise NotFound if the action does not
-        exist."""
+        """Store a report about a build of an action's package. Raise NotFound if the action does
+        not exist."""
         await self._catalogue.require(action, "action")
         await self._journal.append(h.about_stream(action), [h.draft(h.BUILT, author, build)])
 
@@ -320,7 +328,8 @@ class LibraryEdits:
         return UpdatedGraph(document, seq, seq > before)
 
     async def _using(self, name: str) -> list[GraphAtSeq]:
-        """Return the graphs that use an action, the last changed first."""
+        """Return the graphs that use the action of this name, in their present state, the last
+        changed first."""
         known = msgspec.json.decode(await self._library.all(), type=list[LibraryAction])
         used_in = {graph for each in known if each.name == name for graph in each.used_in}
         views = [view for view in await self._catalogue.all() if view.id in used_in]
@@ -332,7 +341,8 @@ async def _now(room: Room, document: str) -> GraphAtSeq:
 
 
 async def _seen(room: Room, moment: GraphMoment) -> GraphAtSeq:
-    """Return the graph that a person has seen. Raise Conflict if it has changed since."""
+    """Return the graph in this room if its last change is still the one that a person has seen
+    (`moment`); raise Conflict if not."""
     found = await _now(room, moment.graph)
     if found.seq != moment.seq:
         raise _changed(moment, found.seq)

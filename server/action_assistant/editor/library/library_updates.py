@@ -52,8 +52,8 @@ class BroughtAction(msgspec.Struct, frozen=True):
 
 
 def brought(body: bytes) -> BroughtAction:
-    """Return the action of a UMRF file of one action. Raise BadInput, NotUmrf or TooLarge, with the
-    place, for any other file."""
+    """Return the action in a UMRF file of one action (`body`). Raise BadInput, NotUmrf or TooLarge,
+    with the place, for any other file."""
     found = importing.read(body)
     if found.dialect not in ACTION_DIALECTS:
         raise NotUmrf(
@@ -73,7 +73,8 @@ def brought(body: bytes) -> BroughtAction:
 
 
 def preview(body: bytes) -> bytes:
-    """Read the file of an action and return JSON of its `Preview`. Raises as `brought` does."""
+    """Read the file of an action (`body`) and return the JSON of its `Preview`. Raise the errors of
+    `brought`."""
     found = brought(body)
     report = msgspec.json.decode(found.reading, type=importing.ImportReport)
     return msgspec.json.encode(
@@ -84,8 +85,8 @@ def preview(body: bytes) -> bytes:
 
 
 def of_graphs(name: str, sights: Sequence[GraphAtSeq]) -> Action:
-    """Return an action with the parameters that its uses in these graphs have, without values.
-    Raise NotFound if no graph uses it."""
+    """Return an action with the parameters that the uses of this name in graphs have, without
+    values. `sights`: the graphs. Raise NotFound if no graph uses it."""
     uses = [use for sight in sights for use in uses_of(read(sight).moment.graph, name)]
     if not uses:
         raise NotFound(f"No graph has an action {name!r}.", where={"path": "/name"})
@@ -93,7 +94,8 @@ def of_graphs(name: str, sights: Sequence[GraphAtSeq]) -> Action:
 
 
 def written(sight: GraphAtSeq) -> bytes:
-    """Return the file of the action of a library document. Raise NotFound if the document has none."""
+    """Return the UMRF file of the action of a library document (`sight`). Raise NotFound if the
+    document has none."""
     return write_action(_action_of(sight)).encode()
 
 
@@ -126,15 +128,16 @@ def _use(action: Action, sight: GraphAtSeq, renames: Renames) -> ActionUse | Non
 
 
 def updating(sight: GraphAtSeq, graph: GraphAtSeq, renames: Renames) -> bytes:
-    """Return the update of a graph's document that makes its uses equal to the library's action."""
+    """Return the update of a graph's document that makes its uses of the action in the library
+    document `sight` equal to that. `renames`: parameters that were renamed."""
     action = _action_of(sight)
     return editing(graph.state, lambda old: updated(old, action, renames))
 
 
 def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
     """Return the update of a library document (`sight`) that gives its action the parameters of a
-    use in `graph`: of the use with the key `aid`, or, if `aid` is None, of the first use that
-    differs. Values in the library stay. Raise NotFound if the graph has no such use."""
+    use in `graph`: of the use with the key `aid`, or, for None, of the first use that differs.
+    Values in the library stay. Raise NotFound if the graph has no such use."""
     action = _action_of(sight)
     found = [
         use
@@ -157,13 +160,15 @@ def taking(sight: GraphAtSeq, graph: GraphAtSeq, aid: str | None) -> bytes:
 
 
 def replacing(sight: GraphAtSeq, body: bytes) -> bytes:
-    """Return the update that makes the action equal to a file, except for its position. Raises as
-    `brought` does, and Conflict for the file of another action."""
+    """Return the update of a library document (`sight`) that makes its action equal to that of a
+    file (`body`), except for its position. Raise the errors of `brought`, and Conflict for the file
+    of another action."""
     return editing(sight.state, _replaced(_action_of(sight), body))
 
 
 def replacing_would(sight: GraphAtSeq, body: bytes) -> bytes:
-    """Return the changes that `replacing` would make, as JSON of a `Difference`. Raises as `replacing` does."""
+    """Return the JSON of the `Difference` that `replacing` would make. The parameters and errors
+    are those of `replacing`."""
     graph = read(sight).moment.graph
     after = _replaced(_action_of(sight), body)(graph)
     return msgspec.json.encode(difference((sight.seq, graph), (sight.seq, after)))

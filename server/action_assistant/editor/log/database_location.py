@@ -35,8 +35,9 @@ class StoredLocation(msgspec.Struct, frozen=True):
 
 
 def of(data: Path) -> str:
-    """Return the URL of the database with the graphs of a folder, for a command without --database.
-    Raise CannotStart if the graphs are in a database that the folder does not remember."""
+    """Return the URL of the database with the graphs of the data folder `data`, for a command
+    without --database. Raise CannotStart if the graphs are in a database whose URL is not stored in
+    the folder."""
     known = remembered(data)
     if known is not None:
         return known
@@ -49,8 +50,8 @@ def of(data: Path) -> str:
 
 
 def journal_of(data: Path, given: str | None) -> str | None:
-    """Return the URL of the journal with the graphs of a folder; None if it has no graphs. Raise
-    CannotStart if its database is missing."""
+    """Return the URL of the journal with the graphs of the data folder `data`, or `given` if it is
+    not None; None if the folder has no graphs. Raise CannotStart if the database is missing."""
     url = given or of(data)
     if not _is_nowhere(url):
         return url
@@ -60,7 +61,7 @@ def journal_of(data: Path, given: str | None) -> str | None:
 
 
 def is_own(data: Path, url: str) -> bool:
-    """Return whether a URL names the SQLite file in the folder itself."""
+    """Return whether a URL names the SQLite file in the data folder itself."""
     return same(url, _own(data))
 
 
@@ -81,8 +82,8 @@ def remembered(data: Path) -> str | None:
 
 
 def check(data: Path, url: str, *, switch: bool) -> None:
-    """Refuse a database that lacks the graphs of this folder, unless `switch` is set. Raise
-    CannotStart in that case."""
+    """Raise CannotStart if the database at `url` lacks the graphs of the data folder `data`, unless
+    `switch` is set."""
     if switch:
         return
     known = remembered(data)
@@ -135,7 +136,7 @@ def _own(data: Path) -> str:
 
 
 def same(one: str, other: str) -> bool:
-    """Return whether two URLs name one database."""
+    """Return whether two URLs name the same database."""
     return _address(one) == _address(other)
 
 
@@ -150,7 +151,8 @@ def _address(url: str) -> tuple[object, ...]:
 
 
 def _graphs(url: str) -> int | None:
-    """Return the number of graphs in a database; None if it cannot be read."""
+    """Return the number of graphs in the database at `url` that are not deleted; None if it cannot
+    be read."""
     counted = select(func.count()).where(_graph.deleted_at.is_(None))
 
     def count(connection: Connection) -> int:
@@ -167,8 +169,9 @@ def _graphs(url: str) -> int | None:
 
 
 def _holds(url: str, mark: Path) -> bool:
-    """Return whether a database holds the last event that this folder has seen: it is the same
-    database by another name, or a copy. Raise CannotStart if it cannot be read."""
+    """Return whether the database at `url` has the last event that the data folder has seen
+    (`mark`: the file that names it): it is the same database by another name, or a copy. Raise
+    CannotStart if it cannot be read."""
     if _is_nowhere(url):
         return False
     try:
@@ -187,7 +190,8 @@ def _holds(url: str, mark: Path) -> bool:
 
 
 def _is_nowhere(url: str) -> bool:
-    """Return whether a URL names a SQLite file that does not exist. Raises CannotStart for an invalid URL."""
+    """Return whether a URL names a SQLite file that does not exist. Raise CannotStart for an
+    invalid URL."""
     database_of(url)
     parsed = make_url(url)
     return parsed.get_backend_name() == "sqlite" and not Path(parsed.database or "").exists()

@@ -49,7 +49,8 @@ class EpochMark(msgspec.Struct, frozen=True):
 
 
 async def begin(journal: Journal, why: Why) -> str:
-    """Begin an epoch and return its id. Raise Unavailable if the journal cannot be written."""
+    """Begin an epoch (a new history of all graphs, as after a restored backup) and return its id.
+    `why`: the reason, for the log. Raise Unavailable if the journal cannot be written."""
     begun = EpochBegun(secrets.token_hex(8), why)
     await journal.append(_STREAM, [h.draft(h.EPOCH, h.SERVER, begun)])
     return begun.id
@@ -57,8 +58,9 @@ async def begin(journal: Journal, why: Why) -> str:
 
 @asynccontextmanager
 async def living_in(journal: Journal, data: Path) -> AsyncIterator[str]:
-    """Yield the epoch of this log, begun if there is none; keep the mark up to date inside of the
-    `async with`."""
+    """Return a context with the id of the epoch of this log, which is begun if there is none;
+    during it the file with the last event seen (mark) is kept up to date. `data`: the data folder.
+    """
     mark = data / MARK
     try:
         epoch = await _epoch(journal, mark)
@@ -88,7 +90,8 @@ async def _epoch(journal: Journal, mark: Path) -> str:
 
 
 async def _follows(journal: Journal, mark: EpochMark | None) -> bool:
-    """Return whether the log still holds the event of the mark."""
+    """Return whether the log still has the event of the mark, with the same hash chain; True
+    without a mark."""
     return mark is None or await _chain(journal, mark.position) == mark.chain
 
 
@@ -98,7 +101,8 @@ async def _chain(journal: Journal, position: int) -> str:
 
 
 def marked(mark: Path) -> EpochMark | None:
-    """Read the last event that a folder has seen; return None if its file is missing or unreadable."""
+    """Return the last event that a data folder has seen, from the file `mark`; None if the file is
+    missing or unreadable."""
     try:
         return msgspec.json.decode(mark.read_bytes(), type=EpochMark)
     except (OSError, msgspec.DecodeError):  # a new folder, or one of an older version

@@ -85,8 +85,8 @@ class GraphRestored(msgspec.Struct, frozen=True):
 
 
 class GraphReverted(msgspec.Struct, frozen=True):
-    """The edit `seq` reverted what `author` had changed between `from_seq` and `upto`, where nobody
-    had changed it since."""
+    """The edit `seq` reverted what `author` had changed between `from_seq` and `upto`, except for
+    what another person had changed since."""
 
     author: str
     from_seq: int
@@ -116,8 +116,8 @@ class GraphDrafted(msgspec.Struct, frozen=True):
 
 class GraphMerged(msgspec.Struct, frozen=True):
     """The edit `seq` merged what `authors` had changed in the graph `source` from `from_seq` to
-    `upto`. `draft`, `name`: the draft among the two graphs, and its name. `seq` 0: nothing
-    changed, since people chose so."""
+    `upto`. `draft`, `name`: the draft among the two graphs, and its name. `seq` 0: the merge
+    changed nothing, since people chose so."""
 
     draft: str
     name: str
@@ -236,7 +236,7 @@ def graph_of(stream: str) -> str | None:
 
 
 def draft(kind: str, author: str, body: msgspec.Struct | None = None) -> Draft:
-    """Return a pending event with a JSON body."""
+    """Return an event to be stored, with the JSON of `body` (None: without a body)."""
     return Draft(kind, author, msgspec.json.encode(body) if body is not None else b"")
 
 
@@ -245,8 +245,8 @@ _NUL: Final = re.compile(rb"(?<!\\)((?:\\\\)*)\\u0000")
 
 
 def _read(event: Event, kind: type[T]) -> T:
-    """Decode the body of an event for the tables. A NUL, which Postgres cannot store in a text, is replaced;
-    the event keeps it."""
+    """Decode the body of an event, of this type, for the tables. A NUL, which Postgres cannot store
+    in a text, is replaced; the stored event keeps it."""
     body = event.body
     if b"\\u0000" in body:
         body = _NUL.sub(rb"\1\\ufffd", body)
@@ -254,7 +254,7 @@ def _read(event: Event, kind: type[T]) -> T:
 
 
 def fold(event: Event) -> Sequence[Executable]:
-    """Return the statements by which an event changes the tables."""
+    """Return the statements by which a stored event changes the tables."""
     if event.kind in {UPDATED, DEFERRED}:
         return ()
     stream, _, name = event.stream.partition("/")

@@ -50,7 +50,7 @@ class TurnEnd:
         self._work: list[Callable[[], None]] = []
 
     def do(self, work: Callable[[], None]) -> None:
-        """Call this function at the end of the present turn of the event loop."""
+        """Call `work` once at the end of the present turn of the event loop."""
         if not self._work:
             self._loop.call_soon(self._all, context=self._context)
         self._work.append(work)
@@ -104,7 +104,8 @@ class BatchWindow:
             self.turn_end.do(work)
 
     def _adapt_length(self, now: float) -> None:
-        """Set the length of windows by the share of the time that the loop has worked lately."""
+        """Set the length of windows by the share of the time, up to `now` (seconds of the event
+        loop), that the loop has worked lately."""
         worked = time.thread_time()
         busy = (worked - self._worked) / (now - self._looked_at)
         self._worked, self._looked_at = worked, now
@@ -123,7 +124,8 @@ class SubmittedEdit(msgspec.Struct, frozen=True):
 
 
 class SyncRequest(msgspec.Struct, frozen=True):
-    """A socket asks for the part of the document that is not in its state vector `state`."""
+    """A socket asks for the part of the document that it lacks. `state`: its state vector (what it
+    has of each Yjs client)."""
 
     member: Member
     state: bytes
@@ -205,8 +207,8 @@ OBJECTIONS: Final = (
 
 
 def refuse(edit: SubmittedEdit, error: Objection) -> None:
-    """Refuse an edit: close its socket with the reason, or raise the reason in the server code that
-    waits for it."""
+    """Refuse an edit for the reason `error`: close its socket with the reason, or raise it in the
+    server code that waits for the edit."""
     code, reason, text = _answer(error)
     if edit.member is not None:
         edit.member.refuse(code, text)
@@ -215,7 +217,8 @@ def refuse(edit: SubmittedEdit, error: Objection) -> None:
 
 
 def _answer(error: Objection) -> tuple[int, Refused, str | None]:
-    """Return the close code, the error, and the text of the close, if there is one."""
+    """Return the close code for a socket, the error for server code, and the text of the close,
+    None without one."""
     match error:
         case Malformed():
             return messages.MALFORMED, BadInput(f"The update cannot be read: {error}."), None
@@ -239,10 +242,10 @@ def _answer(error: Objection) -> tuple[int, Refused, str | None]:
 async def tried_first(
     edit: SubmittedEdit, replica: Replica, run_in_worker: RunInWorker
 ) -> UpdateOutline | None:
-    """Try an edit on a copy of the document in a worker if needed, and return its outline. Return
-    None if the outline has to be read again, since in a document with nested types it depends on
-    the present neighbours. Raise Malformed, Panicked, TooSlow or QuotaExceeded for a bad edit,
-    NotNow if the trial itself fails."""
+    """Try an edit on a copy of the document (`replica`) in a worker process if that is needed, and
+    return its outline. Return None if the outline has to be read again, since in a document with
+    nested types it depends on the present neighbours. Raise Malformed, Panicked, TooSlow or
+    QuotaExceeded for a bad edit, NotNow if the trial itself fails."""
     read = None if len(edit.update) > LARGE else outline(edit.update)
     released = [] if read is None else replica.freed_by(read)
     freed = sum(map(len, released))
@@ -271,14 +274,16 @@ async def tried_for(
     update: bytes,
     released: Sequence[bytes] = (),
 ) -> TriedOutline:
-    """Try an update on a document of this state, and after it the updates that waited for it
-    (`released`). Return its outline. Raise Malformed, Panicked or TooSlow for a bad update,
-    NotNow if the trial itself fails."""
+    """Try an update on a document of this state in a worker process, and after it the updates that
+    waited for it (`released`); return its outline. `person`: on whose account the worker's time
+    goes. Raise Malformed, Panicked or TooSlow for a bad update, NotNow if the trial itself fails.
+    """
     return await _done_for(person, run_in_worker, tried, state, update, released)
 
 
 async def adds_nothing_aside(edit: SubmittedEdit, state: bytes, run_in_worker: RunInWorker) -> bool:
-    """Call `adds_nothing` for a large edit in a worker. Raises as `tried_for` does."""
+    """Return whether a large edit would change nothing in a document with the state vector `state`,
+    by `adds_nothing` in a worker process. Raise the errors of `tried_for`."""
     return await _done_for(edit.author, run_in_worker, adds_nothing, state, edit.update)
 
 
@@ -305,8 +310,8 @@ async def _done_for(
 def batch_of(
     items: list[QueueItem], *, one: bool = False
 ) -> tuple[list[QueueItem], list[QueueItem]]:
-    """Return the items of the next commit, and the rest. A batch is small enough for clients that read in
-    time; a large update is a batch of its own; with `one` every item is."""
+    """Return the items of the next commit, and the remaining items. A batch is small enough for
+    clients that read in time; a large update is a batch of its own; with `one` every item is."""
     size = count = 0
     for item in items[: 1 if one else _BATCH_ITEMS]:
         own = len(item.update) if isinstance(item, SubmittedEdit) else 0
@@ -334,8 +339,8 @@ def before_doubt(items: Sequence[QueueItem], is_doubtful: Callable[[int], bool])
 def next_batch(
     waiting: list[QueueItem], replica: Replica
 ) -> tuple[list[QueueItem], list[QueueItem], bool]:
-    """Return the next batch, the remaining items, and whether the batch is one edit that has to be
-    tried on a copy first."""
+    """Return the next batch of the `waiting` items, the remaining items, and whether the batch is
+    one edit that has to be tried on a copy of the document (`replica`) first."""
     match waiting:  # nearly always
         case [SubmittedEdit(update)] if (
             len(update) <= LARGE
@@ -357,7 +362,8 @@ def next_batch(
 
 
 def merged(updates: list[bytes]) -> list[bytes]:
-    """Merge updates into few, none so large that a client that echoes it would be refused."""
+    """Merge updates into few updates, none so large that a client that sends it back would be
+    refused."""
     groups: list[list[bytes]] = []
     size = 0
     for update in updates:

@@ -49,23 +49,25 @@ class RoomSnapshots:
         self._task: asyncio.Task[None] | None = None
 
     def grew(self, size: int) -> None:
-        """Count `size` bytes of updates that were stored."""
+        """Count `size` bytes of updates that were stored since the last snapshot."""
         self._unkept += size
 
     def store_if_due(self, seq: int, replica: Replica) -> None:
-        """Start to store a snapshot if one is due. The document must be committed up to `seq`."""
+        """Start to store a snapshot of the document if one is due; do not wait for it. The document
+        must be committed up to `seq`."""
         if seq - self._kept >= SNAPSHOT_EVENTS or self._unkept >= _SNAPSHOT_BYTES:
             state = self._state(seq, replica)
             self._task = asyncio.get_running_loop().create_task(self._store(seq, state))
 
     async def store_now(self, seq: int, replica: Replica) -> None:
-        """Store a snapshot unless the newest one is of `seq`. Return also where storing it failed."""
+        """Store a snapshot of the document unless the newest one is of `seq`, and wait for it. A
+        failure is not raised."""
         if seq != self._kept:
             await self._store(seq, self._state(seq, replica))
 
     def _state(self, seq: int, replica: Replica) -> bytes:
         """Return a snapshot of the document as it is now, in bytes, with the updates that wait for
-        earlier ones. Note `seq` as the change up to which a snapshot is stored."""
+        earlier ones. From now on `seq` counts as the change up to which a snapshot is stored."""
         self._kept, self._unkept = seq, 0
         return ReplicaState.of(replica)
 
@@ -90,12 +92,13 @@ class OpeningTimeMeasurement:
         self._task: asyncio.Task[None] | None = None
 
     def measure_if_due(self, replica: Replica) -> None:
-        """Start a measurement if one is due. Everything in the document must be committed."""
+        """Start a measurement in the background if one is due. Everything in the document
+        (`replica`) must be committed."""
         if replica.opening.is_due and self._task is None and self._loop.time() >= self._not_before:
             self._task = self._loop.create_task(self._measure(replica))
 
     def cancel(self) -> None:
-        """Cancel the measurement that is under way."""
+        """Cancel the measurement that is under way, if any."""
         if self._task is not None:
             self._task.cancel()
 
@@ -124,7 +127,7 @@ class ComparedRoom(Protocol):
 
     @property
     def seq(self) -> int:
-        """The sequence number of the last committed change."""
+        """The sequence number of the room's last committed change."""
         ...
 
     async def quiet(self) -> Replica:
@@ -146,8 +149,8 @@ class Comparisons:
         self._task: asyncio.Task[None] | None = None
 
     def ask(self, compare: ComparisonRequest) -> None:
-        """Answer a client with the fingerprint of the document, unless the document has changed
-        since the client's own."""
+        """Queue an answer to a client with the fingerprint of the document. If the document has
+        changed since the client's own fingerprint, do nothing."""
         if compare.shown.seq != self._room.seq:
             return
         self._waiting.append(compare)
@@ -155,7 +158,7 @@ class Comparisons:
             self._task = asyncio.create_task(self._compare_all())
 
     def cancel(self) -> None:
-        """Stop answering clients of the room."""
+        """Cancel all answers to clients that still wait."""
         if self._task is not None:
             self._task.cancel()
 

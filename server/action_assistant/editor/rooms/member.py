@@ -25,14 +25,14 @@ _UNHANDLED_EDITS: Final = 256  # of one socket that may wait in the room
 
 
 class ByteRateLimits:
-    """Counts the bytes that each person sends. Without `limits` it never delays anybody."""
+    """Limits the bytes that each person sends per time. Without `limits` it never delays anyone."""
 
     def __init__(self, *, limits: bool, clock: Clock = time.monotonic) -> None:
         self._limits = limits
         self._buckets: Final = TokenBuckets(AT_ONCE, PER_MINUTE / 60, clock)
 
     def spend_on_presence(self, person: str, size: int) -> float:
-        """Count a presence message of `size` bytes; return as `spend` does."""
+        """Count a presence message of `size` bytes that a person sent; return as `spend` does."""
         return self.spend(person, max(size, _PRESENCE_BYTES))
 
     def spend(self, person: str, size: int) -> float:
@@ -93,7 +93,8 @@ class Member:
         self._closed: asyncio.Future[int] = self._loop.create_future()
 
     def post(self, frame: bytes) -> None:
-        """Append a message to the send queue. Close the socket if the queue is full."""
+        """Append a message to the send queue without waiting. Close the socket if the queue is
+        full."""
         if self._closed.done():
             return
         if len(self._frames) >= WAITING_FRAMES or self._bytes > WAITING_BYTES:
@@ -104,9 +105,9 @@ class Member:
         self.on_news()
 
     def send_now(self, news: bytes, durable: int | None = None) -> bool:
-        """Write framed messages to the socket at once, followed by the acknowledgement that
-        everything up to `durable` is stored. Return False if the queue is not empty, so that
-        they must be posted."""
+        """Write framed messages (`news`) to the socket at once, followed by the acknowledgement
+        that everything up to `durable` is stored. Return False, without writing, if the queue is
+        not empty or the socket accepts nothing now, so that they must be posted."""
         if self._frames or self._ack is not None or self._presence is not None:
             return False
         says = self._last_ack
@@ -123,15 +124,15 @@ class Member:
         return True
 
     def begins_sync(self) -> bool:
-        """Note that the socket asks for the document. Return False while an earlier answer is still on its way:
-        changes are sent behind it, so a second answer would hold nothing new."""
+        """Record that the socket asks for the document. Return False while an earlier answer is
+        still on its way: changes are sent after it, so a second answer would have nothing new."""
         if self._answer is not _SyncState.NONE:
             return False
         self._answer = _SyncState.WANTED
         return True
 
     def post_answer(self, frame: bytes) -> None:
-        """Append the requested document to the send queue, whatever its size."""
+        """Append the message with the requested document to the send queue, whatever its size."""
         self._answer = _SyncState.WAITS
         self._frames.append(frame)
         self.on_news()
@@ -147,7 +148,7 @@ class Member:
             self.post(messages.read_only(why))
 
     def post_presence(self, news: PresenceNews) -> None:
-        """Send presence entries; of each client only the newest waits in the queue."""
+        """Queue presence entries; of each client only the newest waits in the queue."""
         if news.entries:
             waiting = self._presence
             self._presence = news if waiting is None else waiting.followed_by(news)
@@ -175,13 +176,13 @@ class Member:
             self._news.set()
 
     def all_sent(self) -> None:
-        """Note that the messages that `gather` returned have been sent."""
+        """Record that the messages that `gather` returned were sent."""
         if self._answer is _SyncState.LEFT:
             self._answer = _SyncState.NONE
 
     @property
     def has_news(self) -> bool:
-        """Return whether anything waits in the send queue."""
+        """Return whether any message waits in the send queue."""
         return bool(self._frames or self._presence is not None or self._ack is not None)
 
     def gather(self) -> list[bytes]:
@@ -205,11 +206,11 @@ class Member:
             self.post(messages.BEAT)
 
     def edit_received(self) -> None:
-        """Count an edit that the socket sent."""
+        """Count an edit that the socket has sent to the room."""
         self._received += 1
 
     def used_cpu(self, seconds: float) -> None:
-        """Count the processor time that an edit of this socket took from the event loop."""
+        """Count `seconds` of processor time that an edit of this socket took from the event loop."""
         self._cpu.spend(seconds)
 
     @property
@@ -273,5 +274,5 @@ def _framed_acks(handled: int, seq: int) -> bytes:
 
 
 def _never(_: bytes) -> bool:
-    """Return that the owner of the socket cannot write at once."""
+    """Return False: the owner of the socket cannot write messages at once."""
     return False

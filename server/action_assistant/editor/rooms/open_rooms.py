@@ -52,8 +52,8 @@ class Rooms:
 
     @asynccontextmanager
     async def enter(self, stream: str) -> AsyncIterator[Room]:
-        """Yield the room of a stream, loaded if needed; it stays loaded inside of the `async with`.
-        Raise Unavailable if it cannot be loaded."""
+        """Return a context with the room of a stream, which is loaded if needed and stays loaded
+        during it. Raise Unavailable if it cannot be loaded."""
         self._holders[stream] = self._holders.get(stream, 0) + 1
         timer = self._timers.pop(stream, None)
         if timer is not None:
@@ -71,22 +71,23 @@ class Rooms:
         return self._rooms.get(stream)
 
     def open_rooms(self) -> list[Room]:
-        """Return all rooms that are open."""
+        """Return all rooms that are open now."""
         return list(self._rooms.values())
 
     @property
     def divergences(self) -> int:
-        """Count the pages that showed something else than their room, since this process began."""
+        """The number of pages that showed something else than their room, since this process began."""
         return self._divergences + sum(room.comparisons.divergences for room in self.open_rooms())
 
     def is_joined(self, stream: str) -> bool:
-        """Return whether a graph certainly exists, without a query: sockets are in its room, and no
-        deletion has begun."""
+        """Return whether the graph of this stream certainly exists, without a query: sockets are in
+        its room, and no deletion has begun."""
         room = self._rooms.get(stream)
         return room is not None and bool(room.members) and room.graph_exists
 
     def check_existence(self, stream: str) -> None:
-        """Have the tables asked from now on whether this graph exists: it may be deleted soon."""
+        """Have the database asked, from now on, whether the graph of this stream exists: it may be
+        deleted soon."""
         room = self._rooms.get(stream)
         if room is not None:
             room.graph_exists = False
@@ -101,15 +102,16 @@ class Rooms:
             member.close(messages.NO_SUCH_GRAPH)
 
     def readmit(self, stream: str) -> None:
-        """Let sockets into a graph that was recovered."""
+        """Admit sockets to the graph of this stream again, since it was recovered."""
         self._deleted.discard(stream)
 
     def is_deleted(self, stream: str) -> bool:
-        """Return whether this graph was deleted since this process began."""
+        """Return whether the graph of this stream was deleted since this process began, and not
+        recovered."""
         return stream in self._deleted
 
     async def close(self) -> None:
-        """Finish and unload every room."""
+        """Finish the work of every room, and unload all."""
         self._closed = True
         self._heartbeat.cancel()
         for timer in self._timers.values():
@@ -160,7 +162,7 @@ class Rooms:
             del self._loading[stream]
 
     def _unload_later(self, stream: str) -> None:
-        """Unload a room that nobody uses after some seconds."""
+        """Unload the room of this stream after some seconds, unless it is used again."""
         if stream in self._rooms and not self._closed:
             loop = asyncio.get_running_loop()
             self._timers[stream] = loop.call_later(self._linger, self._unload, stream)

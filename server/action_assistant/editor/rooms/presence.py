@@ -28,7 +28,8 @@ _decode: Final = msgspec.json.Decoder(dict[str, msgspec.Raw])
 
 
 def colour_at(place: int) -> str:
-    """Return the colour at a place of the palette. Beyond its end the colours come again, slightly changed."""
+    """Return the colour with this index in the palette. Beyond its end the colours come again,
+    slightly changed."""
     turn, at = divmod(place, len(PALETTE))
     red_and_green, blue = PALETTE[at][:5], int(PALETTE[at][5:], 16)
     return f"{red_and_green}{(blue + turn if blue < 128 else blue - turn) % 256:02x}"
@@ -88,7 +89,7 @@ class PersonStamp(msgspec.Struct, frozen=True):
 
 
 def stamp_of(person: PersonRef, colour: str) -> bytes:
-    """Return the JSON of a person's `PersonStamp`."""
+    """Return the JSON of a person's `PersonStamp` with this colour."""
     return msgspec.json.encode(PersonStamp(person.id, person.name, colour))
 
 
@@ -125,7 +126,7 @@ class PresenceNews:
 
     @cached_property
     def frame(self) -> bytes:
-        """The entries as an awareness message."""
+        """The entries as one presence message of Yjs (awareness)."""
         return messages.presence(self.entries.values())
 
     @cached_property
@@ -134,7 +135,7 @@ class PresenceNews:
         return framed(self.frame)
 
     def followed_by(self, later: "PresenceNews") -> "PresenceNews":
-        """Return these entries and later ones together; the later entry of a client replaces the
+        """Return both collections of entries together; a later entry of a client replaces the
         earlier one."""
         return PresenceNews((self.entries | later.entries).values())
 
@@ -149,8 +150,8 @@ class RoomPresence:
     def update(
         self, owner: PresenceOwner, entries: tuple[PresenceEntry, ...]
     ) -> list[PresenceEntry]:
-        """Store the entries that a socket sent, and return those to be sent on. Entries for other clients
-        are dropped."""
+        """Store the entries that a socket (`owner`) sent, and return the ones to be sent to the
+        others. Entries for other clients are dropped."""
         accepted: list[PresenceEntry] = []
         for entry in entries:
             if not self._is_own(owner, entry):
@@ -168,7 +169,9 @@ class RoomPresence:
         return accepted
 
     def leave(self, owner: PresenceOwner, clock: int | None = None) -> list[PresenceEntry]:
-        """Remove the entry of a socket, and return the entries that tell the others."""
+        """Remove the entry of a socket (`owner`), and return the entries that say so to the others;
+        none if it had none. `clock`: the number of the client's own last entry, None to use that of
+        the stored one."""
         client, owner.client = owner.client, None
         if client is None or self._owners.get(client) is not owner:
             return []
@@ -178,7 +181,8 @@ class RoomPresence:
         return [PresenceEntry(client, last.clock if clock is None else clock, _GONE)]
 
     def holder(self, client: int) -> str | None:
-        """Return the id of the person whose socket sends for a client; None where there is none."""
+        """Return the id of the person whose socket sends for this Yjs client id; None if no socket
+        does."""
         owner = self._owners.get(client)
         return None if owner is None else owner.person.id
 
@@ -191,15 +195,13 @@ class RoomPresence:
         )
 
     def everyone(self) -> tuple[PresenceEntry, ...]:
-        """Return the entries of everybody in the room."""
+        """Return the presence entries of all clients in the room."""
         return tuple(self._entries.values())
 
     def _is_own(self, owner: PresenceOwner, entry: PresenceEntry) -> bool:
-        """Return whether a socket may send this entry. Stock clients also echo the entries of others.
-
-        A socket sends for the first client id that it names. If another socket of the same person already
-        sends for that id, it is the connection before this one.
-        """
+        """Return whether a socket (`owner`) may send this entry. Common clients also send back the
+        entries of others. A socket sends for the first client id that it names. If another socket
+        of the same person already sends for that id, it is the connection before this one."""
         if owner.client is not None:
             return owner.client == entry.client
         if entry.state == _GONE:

@@ -72,7 +72,8 @@ _ENDS: Final = (asyncio.CancelledError, KeyboardInterrupt, SystemExit)
 
 
 class RoomMetrics(Collector):
-    """Counts for all rooms of a process. Not thread-safe: only the event loop updates it."""
+    """Counts edits and their delays for all rooms of a process. Not thread-safe: only the event
+    loop updates it."""
 
     def __init__(self) -> None:
         self.opened = 0
@@ -87,13 +88,14 @@ class RoomMetrics(Collector):
         )
 
     def acknowledged(self, edits: Sequence[SubmittedEdit]) -> None:
-        """Observe how long edits waited that are durable now, or that changed nothing."""
+        """Record how long these edits waited until they were stored, or were found to change
+        nothing."""
         now = time.perf_counter()
         for edit in edits:
             self._acks.observe(now - edit.at)
 
     def objected(self, error: Objection) -> None:
-        """Count an edit that was refused for this reason."""
+        """Count an edit that was refused for the reason `error`."""
         self.refused[_label(error)] += 1
 
     def collect(self) -> Iterator[Metric]:
@@ -102,7 +104,7 @@ class RoomMetrics(Collector):
 
 
 def _label(error: Objection) -> str:
-    """Return the name of a reason in snake case, as labels are written."""
+    """Return the name of the class of an error in snake case, as labels of metrics are written."""
     name = type(error).__name__
     return "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
 
@@ -124,8 +126,8 @@ class UpdateBroadcast:
         self._seq = 0
 
     def send(self, outcome: BatchOutcome, seq: int) -> None:
-        """Send the updates of a committed batch to everybody but its author, and acknowledge every edit of
-        it. `seq` is the newest sequence number."""
+        """Send the updates of a committed batch (`outcome`) to all members but their author, and
+        acknowledge its edits. `seq` is the newest sequence number."""
         self._seq = seq
         authors: dict[Member, None] = {}
         for edit in outcome.handled:
@@ -151,7 +153,7 @@ class UpdateBroadcast:
         self._metrics.acknowledged(outcome.handled)
 
     def end(self) -> None:
-        """Cancel the announcement that waits."""
+        """Cancel the announcement of a sequence number that waits."""
         if self._timer is not None:
             self._timer.cancel()
 
@@ -186,8 +188,8 @@ class PresenceBroadcast:
         self._said: dict[int, tuple[PresenceEntry, Member]] = {}  # in this window, by client
 
     def add(self, entries: Sequence[PresenceEntry], speaker: Member) -> None:
-        """Send these entries of a member to the others when this window opens; of each client only
-        the last entry is sent."""
+        """Send entries of a member (`speaker`) to the others when the batch window opens; of each
+        client only the last entry is sent."""
         if entries and not self._said:
             self._window.when_open(self._send)
         for entry in entries:
@@ -208,7 +210,8 @@ class PresenceBroadcast:
 def answer_requests(
     outcome: BatchOutcome, replica: Replica, seq: int, comparisons: Comparisons
 ) -> None:
-    """Answer the requests of a batch, once the edits before them are committed up to `seq`."""
+    """Answer the requests of a batch (`outcome`) from the document (`replica`), once the edits
+    before them are committed up to `seq`. `comparisons`: answers the fingerprints."""
     for request in outcome.sync_requests:
         _send_document(request, replica, seq)
     for comparison in outcome.comparisons:
@@ -218,7 +221,8 @@ def answer_requests(
 
 
 def _send_document(request: SyncRequest, replica: Replica, seq: int) -> None:
-    """Answer a client's sync step 1 with step 2: the updates that it lacks."""
+    """Answer a client's sync step 1 with step 2: the updates that it lacks. Close its socket if it
+    asks in a wrong form."""
     try:
         lacking = replica.lacking(request.state)
     except Malformed:
@@ -239,9 +243,9 @@ def _answer_read(request: ReadRequest, replica: Replica, seq: int) -> None:
 
 
 class Room:
-    """Holds the document of one graph in memory while it is in use. `on_end` is called when nobody
-    may join any more. `run_in_worker` runs work that grows with the document, `tried` runs
-    trials of large edits."""
+    """Holds the document of one graph in memory while it is in use, and applies, stores and
+    broadcasts its edits. `on_end` is called when no member may join any more. `run_in_worker` runs
+    work that grows with the document, `tried` runs trials of large edits."""
 
     def __init__(
         self,
@@ -287,8 +291,8 @@ class Room:
     # --- members --------------------------------------------------------------------------------
 
     def join(self, member: Member) -> None:
-        """Add a socket: ask which updates it lacks (sync step 1), and send it the presence of the
-        others."""
+        """Add the socket of a member: ask which updates it has that the room lacks (sync step 1),
+        and send it the presence of the others."""
         self.members.add(member)
         if self.damaged is not None:
             member.edits = False
@@ -300,12 +304,13 @@ class Room:
         member.post_presence(PresenceNews(self.presence.everyone()))
 
     def leave(self, member: Member) -> None:
-        """Remove a socket, and its presence entry with it."""
+        """Remove the socket of a member, and its presence entry with it."""
         self.members.discard(member)
         self._presence_updates.add(self.presence.leave(member.presence_owner), member)
 
     def receive(self, member: Member, message: messages.Message) -> None:
-        """Take a message of a socket. Never blocks; the answer is posted to the member later."""
+        """Process a message of a member's socket. The call never waits; the answer is posted to the
+        member later."""
         match message:
             case messages.Edit(update):
                 member.edit_received()
@@ -329,12 +334,11 @@ class Room:
     # --- requests of the server itself ----------------------------------------------------------
 
     async def submit(self, update: bytes, author: str) -> int:
-        """Apply and store an edit of the server itself (rule R9). Return the sequence number up to
-        which the log is committed then, also if the edit changed nothing.
-
-        Raise BadInput or TooLarge if the edit is refused, Conflict if the log is damaged,
-        Unavailable if the room is closed or the edit cannot be stored.
-        """
+        """Apply and store an edit (`update`) of the server itself in the name of `author` (rule
+        R9), and wait for the commit. Return the number (seq) of the last committed change then,
+        also if the edit changed nothing. Raise BadInput or TooLarge if the edit is refused,
+        Conflict if the log is damaged, Unavailable if the room is closed or the edit cannot be
+        stored."""
         if self.damaged is not None:
             raise Conflict(_DAMAGED.format(self.damaged.seq))
         if self._ended:
@@ -412,8 +416,8 @@ class Room:
         self._journal.append_then(addition, partial(self._stored, outcome))
 
     def _stored(self, outcome: BatchOutcome, seq: int | None, error: BaseException | None) -> None:
-        """Continue after the commit with the sequence number `seq`, or end the room if the commit
-        failed with `error`."""
+        """Continue with the batch `outcome` after its commit with the sequence number `seq`, or end
+        the room if the commit failed with `error`."""
         if self._ended:
             return
         try:
@@ -437,7 +441,7 @@ class Room:
         self._answer(outcome)
 
     def _answer(self, outcome: BatchOutcome) -> None:
-        """Answer the requests of the batch, which ends it, and begin the next one."""
+        """Answer the requests of the batch `outcome`, which ends it, and begin the next one."""
         answer_requests(outcome, self._replica, self.seq, self.comparisons)
         if outcome.to_store:
             self._opening_time.measure_if_due(self._replica)
@@ -516,8 +520,8 @@ class Room:
     async def _check_large_edit_of_viewer(
         self, edit: SubmittedEdit, member: Member, outcome: BatchOutcome
     ) -> None:
-        """Acknowledge an edit of a person who may only view, if it changes nothing. Raise
-        NotAllowed if it changes anything."""
+        """Acknowledge an edit of a person who may only view, if it changes nothing: it is added to
+        `outcome`. Raise NotAllowed if it changes anything."""
         if member.refused:
             return
         state = self._replica.doc.get_state()
@@ -528,7 +532,8 @@ class Room:
     def _apply(
         self, edit: SubmittedEdit, outcome: BatchOutcome, read: UpdateOutline | None = None
     ) -> None:
-        """Apply one edit, or refuse it. `read`: its outline, if the caller has it."""
+        """Apply one edit and add it to `outcome`, or refuse it. `read`: its outline, if the caller
+        has it."""
         begun = time.thread_time()
         try:
             effect = self._effect_of(edit, read)
@@ -545,7 +550,8 @@ class Room:
     async def _apply_in_pieces(
         self, edit: SubmittedEdit, outcome: BatchOutcome, read: UpdateOutline
     ) -> None:
-        """Apply one large edit that was tried, or refuse it. Other tasks run between its pieces."""
+        """Apply one large edit that was tried, and add it to `outcome`, or refuse it. `read`: its
+        outline. Other tasks run between its pieces."""
         pieces = await pieces_aside(edit.update, self._tried)
         member, holder = edit.member, self.presence.holder
         if member is not None and member.refused:
@@ -566,7 +572,8 @@ class Room:
     def _note_effect(
         self, edit: SubmittedEdit, outcome: BatchOutcome, effect: UpdateEffect
     ) -> None:
-        """Add an applied edit to the outcome: the event to store, and the updates to send."""
+        """Add an edit that was applied with this effect to the outcome: the event to store, and the
+        updates to send."""
         outcome.handled.append(edit)
         if effect is UpdateEffect.WAITS:
             outcome.to_store.append((edit, DEFERRED))
@@ -583,7 +590,9 @@ class Room:
         refuse(edit, error)
 
     def _effect_of(self, edit: SubmittedEdit, read: UpdateOutline | None) -> UpdateEffect | None:
-        """Apply one edit and return its effect; None if its socket was refused before."""
+        """Apply one edit and return its effect; None if its socket was refused before. `read`: its
+        outline, if the caller has it. Raise NotAllowed if its person may only view and it changes
+        anything."""
         member = edit.member
         if member is not None and member.refused:
             return None

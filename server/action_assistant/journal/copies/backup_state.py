@@ -89,16 +89,16 @@ class BackupState(msgspec.Struct, frozen=True, kw_only=True):
     schedule: BackupSchedule | None = None
 
     def is_late(self, now: float) -> bool:
-        """Return whether a scheduled backup is late: the process that makes them does not run, or
-        fails."""
+        """Return whether a scheduled backup is late at the time `now` (seconds since 1970): the
+        process that makes backups does not run, or fails."""
         if self.schedule is None:
             return False
         return now > self.schedule.next + max(_LATE, self.schedule.every / 4)
 
 
 def backup_state(data: Path) -> BackupState | None:
-    """Return the state of the backups; None if it cannot be read, which does not mean that there
-    are none."""
+    """Return the stored state of the backups of a data folder; None if it cannot be read, which
+    does not mean that no backup exists."""
     try:
         return msgspec.json.decode((data / FILE).read_bytes(), type=BackupState)
     except FileNotFoundError:
@@ -108,7 +108,8 @@ def backup_state(data: Path) -> BackupState | None:
 
 
 def note(data: Path, change: Callable[[BackupState], BackupState]) -> None:
-    """Update the stored state by `change`."""
+    """Update the stored state of the backups of a data folder by `change`, under a lock. A failure
+    is only logged."""
     path = data / FILE
     try:
         guard = opener(str(path.with_name(f"{FILE}.lock")), os.O_RDWR | os.O_CREAT)
@@ -124,23 +125,23 @@ def note(data: Path, change: Callable[[BackupState], BackupState]) -> None:
 
 
 def made(data: Path, backup: BackupMade) -> None:
-    """Note a finished backup in the state."""
+    """Record a finished backup in the state of a data folder."""
     note(data, lambda state: msgspec.structs.replace(state, last=backup, failed=None))
 
 
 def failed(data: Path, why: str) -> None:
-    """Record that a backup failed."""
+    """Record that a backup of a data folder failed, and why."""
     said = BackupFailed(time.time(), why)
     note(data, lambda state: msgspec.structs.replace(state, failed=said))
 
 
 def scheduled(data: Path, schedule: BackupSchedule) -> None:
-    """Record when the next backup is due."""
+    """Record when the next backup of a data folder is due."""
     note(data, lambda state: msgspec.structs.replace(state, schedule=schedule))
 
 
 def rehearsed(data: Path, rehearsal: BackupRehearsed) -> None:
-    """Record the outcome of a trial restore."""
+    """Record the outcome of a trial restore of a backup."""
 
     def change(state: BackupState) -> BackupState:
         proven = rehearsal if rehearsal.why is None else state.proven

@@ -39,7 +39,8 @@ _COLUMNS: Final = (*Event.__struct_fields__, "chain")
 
 
 class UpgradeCopy(NamedTuple):
-    """A copy: its file, whose it is, at which revision, and when it was made."""
+    """A copy of a journal from before an upgrade: its file, the branch (editor or runner), the
+    revision of the tables, and when it was made."""
 
     path: Path
     branch: Branch
@@ -48,7 +49,7 @@ class UpgradeCopy(NamedTuple):
 
 
 def copy_at(path: Path) -> UpgradeCopy | None:
-    """Return the copy that a file name describes; None for other names."""
+    """Return the copy that the file name of `path` describes; None for other names."""
     revision, _, stamp = path.stem.partition("-")
     named = revision.partition("_")[0]
     try:
@@ -69,8 +70,9 @@ def copies_in(folder: Path) -> list[UpgradeCopy]:
 
 
 def keep_copy(folder: Path, connection: Connection, branch: Branch, revision: str) -> Path:
-    """Copy a database into a folder, in the transaction in which it is about to change. Raises
-    CannotStart, and then nothing has changed."""
+    """Copy a database of a branch, at this revision of its tables, into a folder, in the
+    transaction in which it is about to change; return the file. Raise CannotStart if that fails;
+    nothing has changed then."""
     begun = time.monotonic()
     try:
         make_folder(folder)
@@ -107,7 +109,8 @@ def _superfluous(copies: list[UpgradeCopy]) -> list[UpgradeCopy]:
 
 
 def _written(target: Path, connection: Connection, branch: Branch, revision: str) -> int:
-    """Write a copy, verify it, and rename it to `target`; return the number of its events."""
+    """Write a copy of the database, verify it, and rename it to `target`; return the number of its
+    events."""
     for left in target.parent.glob(
         f".{branch}_*.part*"
     ):  # of one that was killed: we are alone here
@@ -127,7 +130,8 @@ def _written(target: Path, connection: Connection, branch: Branch, revision: str
 
 
 def _free(folder: Path, revision: str) -> Path:
-    """Return a file name that no copy has yet."""
+    """Return a file name for a copy at this revision that no copy in the folder has yet; wait for
+    one if needed."""
     while True:
         target = folder / f"{revision}-{datetime.now(UTC).strftime(_STAMP)}.db"
         if not target.exists():
@@ -153,8 +157,8 @@ def _check_room(folder: Path, size: int) -> None:
 def _copy_file(
     connection: Connection, branch: Branch, revision: str, part: Path
 ) -> Callable[[], list[Damage]]:
-    """Copy the SQLite file with its write-ahead log; return a function that returns the damage of
-    the original."""
+    """Copy the SQLite file of `connection`, with its write-ahead log, to `part`; return a function
+    that returns the damage of the original."""
     del branch, revision
     row = connection.exec_driver_sql("PRAGMA database_list").first()
     source = Path(str(row[2]) if row is not None else "")
@@ -177,8 +181,8 @@ def _copy_file(
 def _copy_rows(
     connection: Connection, branch: Branch, revision: str, part: Path
 ) -> Callable[[], list[Damage]]:
-    """Copy all our tables into a SQLite file of the same revision; return a function that returns
-    the damage of the original."""
+    """Copy all tables of this program into a SQLite file (`part`) of the same revision; return a
+    function that returns the damage of the original."""
     _check_room(
         part.parent,
         connection.execute(text("SELECT pg_database_size(current_database())")).scalar_one(),
@@ -205,8 +209,9 @@ def _copy_rows(
 
 
 def _rows_of(connection: Connection, table: Table) -> Iterator[list[dict[str, Any]]]:
-    """Yield the rows of a table in batches, events in order. Its cursor is closed before the tables
-    change; the driver's own stays open until the end of the transaction."""
+    """Yield the rows of a table in batches, events in the order of their positions. Its cursor is
+    closed before the tables change; the driver's own stays open until the end of the transaction.
+    """
     cursor = f"copied_{table.name}"
     order = " ORDER BY position" if table.name == "event" else ""
     command = f'DECLARE {cursor} CURSOR FOR SELECT * FROM "{table.name}"{order}'
@@ -217,11 +222,9 @@ def _rows_of(connection: Connection, table: Table) -> Iterator[list[dict[str, An
 
 
 def _proven(part: Path, before: Callable[[], list[Damage]]) -> int:
-    """Return the number of events in a copy. Raise CannotStart if it has damage that the original
-    had not.
-
-    Damage of the original is copied as well, and logged.
-    """
+    """Return the number of events in the copy `part`. Raise CannotStart if it has damage that the
+    original (`before`: returns its damage) had not. Damage of the original is copied as well, and
+    logged."""
     events, damages = inspected(part)
     if damages and damages != before():
         raise CannotStart(_refusal(part.parent, "the copy is not what was copied"))
@@ -237,7 +240,7 @@ def _proven(part: Path, before: Callable[[], list[Damage]]) -> int:
 
 
 def _telling(what: str) -> Callable[[str], None]:
-    """Return a function that logs progress, once a second at most."""
+    """Return a function that logs progress of `what`, once a second at most."""
     last = time.monotonic()
 
     def tell(how_far: str) -> None:

@@ -33,14 +33,14 @@ def copy(
     over_older: bool = False,
     then: Callable[[], None] = lambda: None,
 ) -> int:
-    """Copy a consistent state of a journal, while others may write; return the number of events.
-    The tables are folded again in the same transaction, so that all or nothing is copied.
+    """Copy a consistent state of the journal of a branch from one database to another, while others
+    may write; return the number of events. The tables are folded again in the same transaction, so
+    that all or nothing is copied. `tell` is called with the number of events copied so far. With
+    `over_older`, the target may have an earlier state of the very same log, which is replaced.
+    `then` is called before others may write to the target.
 
-    `tell` is called with the number of events copied so far. With `over_older`, the target may hold
-    an earlier state of the very same log, which is replaced. `then` is called before others may
-    write to the target. Call this where no event loop runs, and not from one server to another.
-    Raise CannotStart if the source is damaged, a database is not reached, or the target holds other
-    data.
+    The call blocks: use it where no event loop runs, and not from one server to another. Raise
+    CannotStart if the source is damaged, a database is not reached, or the target has other data.
     """
 
     def pour(here: Connection) -> int:
@@ -64,7 +64,7 @@ def copy(
 
 
 def sentence(damage: Damage) -> str:
-    """Return a damage as a sentence."""
+    """Return the clause that describes a damage of a journal."""
     return f"{damage.stream or 'the file'}, event {damage.seq}: {damage.why}"
 
 
@@ -116,10 +116,8 @@ def _copy(
 
 
 def _is_older(old: Connection, new: Connection) -> bool:
-    """Return whether a log holds exactly the first events of another log.
-
-    The links of the chains are compared, which stand for everything that an event holds.
-    """
+    """Return whether the log in `old` has exactly the first events of the log in `new`. The links
+    of the hash chains are compared, which stand for all fields of an event."""
     event = editor_event.c
     chosen = select(event.position, event.stream, event.seq, event.chain).order_by(event.position)
     after = 0

@@ -58,10 +58,11 @@ class Marked(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The sum of one action of a run that is over. `visits`: how often it ran, with `at_least`
-    perhaps more often. `results`: the number of visits by known result, without those whose result a
-    person gave by word, which are in `said`; `inferred`: visits that nobody saw; `spans`: durations of ended visits, at most the newest hundred. `took`: lower
-    bounds in microseconds, from older versions."""
+    """The totals of one action of a run that is over. `visits`: how often it ran, with `at_least`
+    perhaps more often. `results`: the number of visits by known result, without those whose result
+    a person stated, which are in `said`; `inferred`: visits that nobody saw; `spans`: durations of
+    ended visits, at most the newest hundred. `took`: lower bounds in microseconds, from older
+    versions."""
 
     aid: str | None = None
     visits: int = 0
@@ -74,8 +75,9 @@ class ActionSum(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The sum of a run that is over, so that lists and statistics need not read its events.
-    `figures` is `FIGURES` as of the sum; a run with an older value is summed up again."""
+    """The event with the totals of a run that is over, so that lists and statistics need not read
+    its events. `figures`: the value of `FIGURES` when they were computed; a run with an older value
+    is summed up again."""
 
     kind: ClassVar[str] = "run.summed_up.v1"
 
@@ -116,7 +118,7 @@ class RunArchived(msgspec.Struct, frozen=True):
 
 
 def stream_about(run: str) -> str:
-    """Return the stream of annotations of a run."""
+    """Return the name of the stream of annotations of a run."""
     return f"{_PREFIX}{run}"
 
 
@@ -126,7 +128,7 @@ def is_about(stream: str) -> bool:
 
 
 def draft(event: Marked | SummedUp | RunArchived) -> Draft:
-    """Encode an annotation for the journal."""
+    """Encode an annotation of a run for the journal."""
     author = event.author.id if isinstance(event, Marked) else ""
     return draft_of(event, author)
 
@@ -173,7 +175,8 @@ def _sum(action: ActionRun, count: VisitCount, by_word: Set[int]) -> ActionSum:
 
 
 def fold(event: Event) -> Sequence[Executable]:
-    """Return the statements that an annotation means for the tables."""
+    """Return the statements by which a stored annotation changes the tables; () for one of an
+    unknown kind."""
     run = event.stream.removeprefix(_PREFIX)
     match event.kind:
         case Marked.kind:
@@ -225,8 +228,8 @@ def _put_sum(run: str, summed: SummedUp) -> Sequence[Executable]:
 
 
 def _archive(run_id: str, archived: RunArchived) -> Sequence[Executable]:
-    """Update the row of a run, or restore it where the tables are rebuilt without the run's
-    events."""
+    """Return the statements that note in a run's row that it was archived. Where the tables are
+    rebuilt without the run's events, they restore the row."""
     row: Mapping[str, Any] = {
         **archived.row,
         "archived_at": archived.at,
@@ -246,7 +249,8 @@ def _review(run: str, fields: Mapping[str, object]) -> Executable:
 
 
 def _summary_changes(run: str, summed: SummedUp) -> Sequence[Executable]:
-    """Store cause and duration of a run for the list."""
+    """Return the statement that stores the cause and the duration of a run for lists; () if there
+    is neither."""
     changes: list[object] = ["$.figures", summed.figures] if summed.figures else []
     if summed.cause:
         changes += ["$.cause", summed.cause]

@@ -34,7 +34,8 @@ _SAME_S: Final = 0.101  # bounds that are no further apart are told as one figur
 
 
 def cause_sentence(cause: Cause, run: Run) -> str:
-    """Return a cause as one sentence without its time. Names of right-to-left scripts are isolated."""
+    """Return a cause as one sentence without its time. `run`: for the names of its actions. Names
+    of right-to-left scripts are isolated."""
     return sentence(_in_words(cause, run))
 
 
@@ -105,7 +106,7 @@ def _stop_in_words(cause: OperatorStop, run: Run) -> str:
 
 def _while_in_words(ran: Sequence[RunningAction], run: Run, lead: str = " while ") -> str:
     """Return a phrase that says which actions ran at the time of the cause, and how long they had
-    run by then."""
+    run by then; "" for none. `lead`: the text before the names."""
     if not ran:
         return ""
     names = [f"{short_name(run, each.action)} ({_lasted(each)})" for each in ran[:_NAMED]]
@@ -123,7 +124,8 @@ def _listed(names: Sequence[str], count: int) -> str:
 
 
 def _lasted(ran: RunningAction) -> str:
-    """Return how long an action had run, as one figure or as bounds, in seconds."""
+    """Return, in seconds, how long an action had run, as one number or as bounds ("≤ 2 s", "1–2
+    s")."""
     least, most = math.floor(ran.least / _TENTH_US) / 10, math.ceil(ran.most / _TENTH_US) / 10
     if most - least <= _SAME_S:
         return f"{round(ran.most / 1e6, 1)} s"

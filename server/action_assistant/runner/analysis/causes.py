@@ -111,8 +111,8 @@ class EngineRestarted(_Evidence, frozen=True, tag="engine_restarted", tag_field=
 
 
 class ForeignCause(_Evidence, frozen=True, tag="foreign", tag_field="kind"):
-    """A command of somebody else to the robot. `ended`: the run was over after it, without a Stop
-    from here."""
+    """Another program sent a command to the robot. `ended`: the run was over after it, without a
+    Stop from here."""
 
     command: str
     graph: str
@@ -198,7 +198,8 @@ def _found(run: Run, graph: Graph | None) -> Iterator[Cause]:
 
 
 def operator(run: Run) -> tuple[OperatorStop | OperatorPause | OperatorChange, ...]:
-    """Return the commands of people at this runner that affected a run, a Stop first."""
+    """Return the commands of people at this runner that affected the end of a run, a Stop first; ()
+    without any."""
     found: list[OperatorStop | OperatorPause | OperatorChange] = []
     asked = run.interventions
     found += [_stop(run, each) for each in asked if each.kind == "stop"]
@@ -235,7 +236,8 @@ def _stop(run: Run, asked: Intervention) -> OperatorStop:
 
 
 def _ran(run: Run, asked: Intervention) -> tuple[RunningAction, ...]:
-    """Return the innermost actions that ran when a command was given, proven ones first."""
+    """Return the actions that ran when a person gave a command (`asked`), the ones that were
+    certainly running first. An action around another one that ran is not listed."""
     found: list[RunningAction] = []
     for name in asked.active:
         visit = _at(run.actions.get(name, ActionRun()), asked.at)
@@ -249,8 +251,8 @@ def _ran(run: Run, asked: Intervention) -> tuple[RunningAction, ...]:
 
 
 def _at(action: ActionRun, moment: int) -> Visit | None:
-    """Return the visit of an action that may have been running at `moment` (microseconds UTC); None
-    if there is none."""
+    """Return the visit of an action that may have been running at `moment` (µs UTC); None if no
+    visit may."""
     for visit in reversed(action.visits):
         if visit.not_before <= moment:
             ended = visit.not_after is not None and visit.not_after < moment
@@ -259,9 +261,9 @@ def _at(action: ActionRun, moment: int) -> Visit | None:
 
 
 def _surely_ran(run: Run, name: str, visit: Visit, asked: Intervention) -> bool:
-    """Return whether events prove that a visit was going on when a person asked for something
-    (`asked`). For a Stop, a visit that ended *stopped* was going on if nothing but this Stop can
-    have stopped it."""
+    """Return whether events prove that a visit of the action `name` was going on when a person gave
+    the command `asked`. For a Stop, a visit that ended *stopped* was going on if nothing but this
+    Stop can have stopped it."""
     if visit.start > asked.at:
         return False
     if visit.until is not None and visit.until >= asked.at:
@@ -299,8 +301,9 @@ _ENDS: Final[dict[str, frozenset[str]]] = {
 
 
 def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
-    """Return whether a foreign command ended the run: it can end runs in this way, came before the
-    end, nobody at this runner requested the end, and nothing else caused it."""
+    """Return whether the command of another program, of which `alarm` tells, ended the run: such a
+    command can end runs in this way, it came before the end, no person at this runner had pressed
+    Stop, and the engine was not restarted."""
     others = [
         each for each in run.alarms if each.code == RESTARTED and each.at <= (run.ended_at or 0)
     ]
@@ -315,8 +318,9 @@ def _ended_by(run: Run, command: str, alarm: Alarm) -> bool:
 
 
 def _refusals(run: Run, graph: Graph | None) -> Iterator[Cause]:
-    """Yield the refusal of a start, from the engine's log; and the actions that the engine is known
-    to lack."""
+    """Yield the refusal of a start as a cause, from the engine's log or the end of the run; instead
+    of it the actions that the engine lacks, if the refusal is about those. `graph`: as it was sent,
+    None if unknown."""
     said = (each for each in run.log if each.text.startswith(_REFUSAL))
     line = next(said, None) if run.end == "refused" or not _shown(run) else None
     lacking = [each for each in run.despite if each.code in _PROBLEMS]
@@ -339,7 +343,7 @@ def _refusals(run: Run, graph: Graph | None) -> Iterator[Cause]:
 
 
 def _shown(run: Run) -> bool:
-    """Return whether the engine ever showed the run."""
+    """Return whether the engine ever showed the run in an answer or feedback."""
     return run.graph_state is not None
 
 
@@ -364,7 +368,8 @@ def _parameters(run: Run, graph: Graph) -> Iterator[Cause]:
 
 
 def _given(action: Action, problem: Overridden) -> tuple[str, str]:
-    """Return the name and the sent value of the parameter that a problem is about."""
+    """Return the name of the parameter that a problem is about, and the value that was sent for it,
+    as text ("nothing" without one)."""
     path = problem.path.rpartition("_parameters/")[2]
     leaf = next((parse_small(each.text) for each in action.inputs if each.path == path), None)
     value = leaf.get("pvf_value") if isinstance(leaf, dict) else None
@@ -380,7 +385,8 @@ def _was_given(visit: Visit, parameter: str, value: str) -> bool:
 
 
 def _failures(run: Run, graph: Graph | None) -> Iterator[Cause]:
-    """Yield the action whose failure ended the run, however deep inside."""
+    """Yield the action whose failure ended the run: of a failed sub-graph the innermost action
+    inside. `graph`: as it was sent, None if unknown."""
     failing = _failing_visit(run, graph)
     if failing is not None:
         at, name, visit = failing
@@ -394,13 +400,10 @@ def _failures(run: Run, graph: Graph | None) -> Iterator[Cause]:
 
 
 def _failing_visit(run: Run, graph: Graph | None) -> EndedVisit | None:
-    """Return the visit that explains a bad end; None if there is none. It is the first that ended
-    in error, or, in a run that ended false, the last top-level visit that ended false.
-
-    An error from which the run recovered comes last: an action around it ended true, or an action
-    that it started by an arrow of `graph`. In a run that a person stopped such an error does not
-    count.
-    """
+    """Return the visit that explains a bad end; None if no visit does. It is the first that ended
+    in error, or, in a run that ended false, the last top-level visit that ended false. An error
+    from which the run recovered comes last: an action around it ended true, or an action that it
+    started by an arrow of `graph`. In a run that a person stopped such an error does not count."""
     found = places_of(run)
     ended = _ended_visits(run, found, run.actions)
     errors = [each for each in ended if each[2].result == "error"]
@@ -425,8 +428,8 @@ def _failing_visit(run: Run, graph: Graph | None) -> EndedVisit | None:
 def _ended_visits(
     run: Run, found: Mapping[str, LevelPlace], names: Iterable[str]
 ) -> list[EndedVisit]:
-    """Return the ended visits of these actions, sorted by their ends; at equal times, inner ones
-    first."""
+    """Return the ended visits of the actions `names`, sorted by their ends; at equal times, inner
+    ones first. `found`: the place of each action by name."""
     visits = [
         (visit.not_after or visit.start, name, visit)
         for name in names
@@ -462,7 +465,8 @@ def _recovery(graph: Graph | None) -> Mapping[str, frozenset[str]]:
 
 
 def _handled(run: Run, recovery: Mapping[str, frozenset[str]], wrong: EndedVisit) -> bool:
-    """Return whether an action that this error started began after it and ended true."""
+    """Return whether an error (`wrong`) was handled: an action that an arrow starts after it
+    (`recovery`, by the full name of the failed action) began after it and ended true."""
     at, name, visit = wrong
     return any(
         later.result == "true" and later.start >= (visit.until or at)
@@ -474,8 +478,8 @@ def _handled(run: Run, recovery: Mapping[str, frozenset[str]], wrong: EndedVisit
 
 def _inmost(run: Run, found: dict[str, LevelPlace], wrong: EndedVisit) -> EndedVisit:
     """Return the innermost visit that explains `wrong`: a visit inside of its action that ended in
-    the same way, then a visit inside of that one, and so on. Return `wrong` itself if there is
-    none inside."""
+    the same way, then a visit inside of that one, and so on. Return `wrong` itself if no visit
+    inside does. `found`: the place of each action by name."""
     _, name, around = wrong
     inside = [
         each
@@ -494,7 +498,8 @@ def _holds(around: Visit, visit: Visit) -> bool:
 
 
 def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
-    """Yield the reasons why a run stood still until its end, each with the action that waited."""
+    """Yield the reasons for which a run stood still until its end, each with the action that
+    waited. `graph`: as it was sent, None if unknown."""
     alarm = next((each for each in reversed(run.alarms) if each.code == stall.STALLED), None)
     visits = (visit for action in run.actions.values() for visit in action.visits)
     if alarm is None or any(visit.start > alarm.at for visit in visits):
@@ -507,8 +512,8 @@ def _stalls(run: Run, graph: Graph | None) -> Iterator[Stalled]:
 
 
 def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
-    """Yield the joins whose action never ran, since a parent kept it waiting when the run was given
-    up."""
+    """Yield the actions that waited for several others and never ran, since one of these had not
+    ended when the run was stopped, fell silent or ended. `graph`: as it was sent."""
     if run.end in {"finished", "error", "refused"}:
         return
     moment = _given_up(run)
@@ -522,7 +527,7 @@ def _waits(run: Run, graph: Graph) -> Iterator[Cause]:
 
 
 def _around(run: Run, going: set[str]) -> set[str]:
-    """Return those of the actions `going` that have another one of them inside, and so run only
+    """Return those of the actions `going` that have another one of `going` inside, and so run only
     because the inner one does."""
     found = places_of(run)
     levels = {found[name].levels for name in going}
@@ -530,8 +535,8 @@ def _around(run: Run, going: set[str]) -> set[str]:
 
 
 def _given_up(run: Run) -> int | None:
-    """Return the time (microseconds UTC) from which on states of actions prove nothing: a Stop, the
-    beginning of a silence, or the end of the run; None without any."""
+    """Return the time (µs UTC) from which on states of actions prove nothing: a Stop, the beginning
+    of a silence, or the end of the run; None without any."""
     if run.stop_requested_at is not None:
         return run.stop_requested_at
     return run.unknown_since if run.unknown_since is not None else run.ended_at
@@ -540,14 +545,11 @@ def _given_up(run: Run) -> int | None:
 def _waiting(
     run: Run, names: dict[str, str], child: str, arrows: list[Relation], moment: int
 ) -> Iterator[Waiting]:
-    """Yield the parents that kept the action `child` from running at `moment` (microseconds UTC).
-    `arrows` are the required arrows to `child`; `names` gives full names of actions by key.
-
-    Yield nothing unless `child` has several parents and at least one of them had ended by then. A
-    parent that had ended counts only if all had, and if it was the last one: any end of a required
-    parent is a report, and the response to the last report decides (docs/umrf-and-the-engine.md
-    2.3).
-    """
+    """Yield the actions (parents) for which the action `child` was still waiting at `moment` (µs
+    UTC). `arrows`: the required arrows to `child`; `names`: full names of actions by key. Yield
+    nothing unless `child` has several parents and at least one of them had ended by then. A parent
+    that had ended counts only if all had, and if it was the last one: any end of a required parent
+    is a report, and the response to the last report decides (docs/umrf-and-the-engine.md 2.3)."""
     parents = [(names[arrow.parent], arrow) for arrow in arrows if arrow.parent in names]
     seen = [(name, arrow, run.actions.get(name, ActionRun())) for name, arrow in parents]
     ended = [
@@ -611,7 +613,8 @@ def _silence(run: Run) -> Iterator[Cause]:
 
 
 def _alarms(run: Run, named: set[str]) -> Iterator[Cause]:
-    """Yield the remaining alarms as causes, except those that later events contradict."""
+    """Yield the alarms of a run as causes; none whose code is in `named`, that is a cause of its
+    own kind, or that later events contradict."""
     for alarm in run.alarms:
         if alarm.code in named or alarm.code in {RESTARTED, stall.STALLED}:
             continue
@@ -620,7 +623,8 @@ def _alarms(run: Run, named: set[str]) -> Iterator[Cause]:
 
 
 def _was_settled(run: Run, alarm: Alarm) -> bool:
-    """Return whether rest was proven, or seen, after an alarm that a Stop is unconfirmed."""
+    """Return whether an alarm that a Stop is unconfirmed is settled: the run was proven, or seen,
+    to be at rest later. False for other alarms."""
     if alarm.code != UNCONFIRMED:
         return False
     rested = [run.proof_at, run.at_rest.at if run.at_rest is not None else None]
@@ -632,7 +636,7 @@ def _failed(action: ActionRun) -> Visit | None:
 
 
 def _said(action: ActionRun, visit: Visit) -> str:
-    """Return the last message that an action sent during a visit."""
+    """Return the last message that an action sent during a visit; "" without one."""
     until = visit.not_after
     said = [
         each.text

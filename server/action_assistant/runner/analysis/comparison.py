@@ -110,7 +110,8 @@ class SentTree(msgspec.Struct, frozen=True):
 
 
 def compare(a: Run, b: Run, sent_a: SentTree, sent_b: SentTree) -> RunComparison:
-    """Compare two runs, which may be of different graphs."""
+    """Compare two runs, which may be of different graphs. `sent_a`, `sent_b`: the graphs that were
+    sent for them."""
     graph_b = _graph(sent_b.umrf)
     graph_a, identities = aligned(_graph(sent_a.umrf), graph_b)
     graph = difference((0, graph_a), (0, graph_b))
@@ -187,7 +188,8 @@ def _described(action: Action) -> tuple[object, ...]:
 def _alone_by(
     says: Callable[[Action], tuple[object, ...]], actions: Iterable[Action]
 ) -> dict[tuple[object, ...], Key]:
-    """Return the keys of actions by a description, for descriptions that exactly one action has."""
+    """Return the keys of actions by the description that `says` gives each of them; only
+    descriptions that exactly one action has."""
     found: dict[tuple[object, ...], list[Key]] = {}
     for each in actions:
         found.setdefault(says(each), []).append(each.key)
@@ -195,22 +197,23 @@ def _alone_by(
 
 
 def _changed_inside(a: Mapping[str, str], b: Mapping[str, str]) -> list[str]:
-    """Return the names of graphs inside that differ, or that one run lacks; empty if a run was
-    stored without its graphs inside, as older versions did."""
+    """Return the names of sub-graphs whose digests (by name, in `a` and `b`) differ, or that one
+    run lacks; empty if one run was stored without its sub-graphs, as older versions did."""
     if not a or not b:
         return []
     return sorted(name for name in a.keys() | b.keys() if a.get(name) != b.get(name))
 
 
 class MissedVisits:
-    """Knows for which actions of either run visits may have been missed. For these it is unknown
+    """Knows for which actions of two runs visits may have been missed. For these it is unknown
     which visits correspond, and a missing visit may have happened."""
 
     def __init__(self, a: Run, b: Run) -> None:
         self._a, self._b = _MissedVisitsOfRun(a), _MissedVisitsOfRun(b)
 
     def relation(self, pair: "_ActionPair", seen: Relation) -> Relation:
-        """Return the relation of two visits, or "unknown" where missed visits may explain it."""
+        """Return `seen`, the relation of two visits of a pair of actions, or "unknown" if missed
+        visits may explain it."""
         in_a = self._a.may_miss(pair.a, pair.place)
         in_b = self._b.may_miss(pair.b, pair.place)
         unsure = (
@@ -227,8 +230,9 @@ class _MissedVisitsOfRun:
         self._by_looks = any(each.by for each in run.actions.values())
 
     def may_miss(self, name: str | None, place: LevelPlace) -> bool:
-        """Return whether visits of this action may have been missed; without a name, whether the
-        whole graph around it may have been."""
+        """Return whether visits of this action may have been missed. `name`: None if the run lacks
+        the action; then return whether all of the sub-graph around its `place` may have been
+        missed."""
         return name in self._names if name is not None else bool(place.levels) and self._by_looks
 
 
@@ -295,7 +299,9 @@ def _pairs(a: Run, b: Run, identities: Mapping[Key, Key]) -> list[_ActionPair]:
 def _identity(
     run: Run, name: str, place: LevelPlace, identities: Mapping[Key, Key]
 ) -> tuple[str, ...]:
-    """Return the key of the outermost action and the names below it; it is equal in all runs."""
+    """Return what makes the action `name` the same in all runs: the key of the outermost action
+    around it, or its own, and the names below. `identities`: keys to use instead of others, as
+    `aligned` returns."""
     first, *below = place.way
     outermost = run.actions.get(first if below else name)
     aid = outermost.aid if outermost is not None else None
@@ -336,8 +342,8 @@ def _longer(one: Visit, other: Visit) -> bool:
 
 
 def _begun(step: ComparedVisit, a: Run, b: Run) -> tuple[float, str, int]:
-    """Return the sort key of a visit: seconds from the start of its run until it began, the earlier
-    of the two."""
+    """Return the sort key of a visit: the seconds from the start of its run until it began (the
+    smaller number of both runs `a` and `b`), its action and number."""
     moments = [
         (shown.start - views.time(run.started_at or run.requested_at)).total_seconds()
         for shown, run in ((step.a, a), (step.b, b))
@@ -351,7 +357,8 @@ def _parts(step: ComparedVisit) -> bool:
 
 
 def _inner_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
-    """Put a visit with a different result after the visit inside of it that explains the result."""
+    """Return the steps in an order in which a visit with a different result comes after the visit
+    inside of it that explains this result."""
     within: dict[tuple[str, ...], list[ComparedVisit]] = {}
     for step in filter(_parts, steps):
         for depth in range(len(step.levels)):
@@ -385,8 +392,9 @@ def _is_inside(step: ComparedVisit, other: ComparedVisit) -> bool:
 
 
 def _own_first(steps: list[ComparedVisit]) -> list[ComparedVisit]:
-    """If each run continued with an action that the other lacks, put the first visit of run `b`
-    before that of run `a`: their order is chance, and the page shows the graph of `b`."""
+    """Return the steps, in their order except in one case: if each run continued with an action
+    that the other lacks, the first visit of run `b` comes before that of run `a`. Their order is
+    chance, and the page shows the graph of `b`."""
     first = next((at for at, step in enumerate(steps) if _parts(step)), None)
     if first is None or steps[first].relation != "only_a":
         return steps
@@ -420,12 +428,11 @@ def _because(
     *,
     led_otherwise: bool,
 ) -> PartingCause | None:
-    """Return the event that explains why the runs differ, or None: commands of people first, then
-    alarms, then scripts of the simulator. If only the ends differ, the event explains the end.
-
-    For a visit of only one run, the event must be of the other run; there is none if the graphs
-    lead to the action in different ways (`led_otherwise`).
-    """
+    """Return the event that explains the first difference of two runs, or None: commands of people
+    first, then alarms, then scripts of the simulator. `a`, `b`: each run with the graph that was
+    sent. Without such a visit (`parting` is None) the event explains the different ends. For a
+    visit of only one run, the event must be of the other run; no event does if the graphs lead to
+    the action in different ways (`led_otherwise`)."""
     step = parting.step if parting is not None else None
     if step is None and a[0].end == b[0].end:
         return None
@@ -458,8 +465,8 @@ def _changes_graph(cause: Cause) -> bool:
 
 
 def _led_otherwise(step: ComparedVisit, a: Graph, b: Graph, inside: Sequence[str]) -> bool:
-    """Return whether graph `a` leads to the action of a visit by other arrows than graph `b`, or
-    one graph lacks it. `inside`: names of graphs inside that differ."""
+    """Return whether graph `a` leads to the action of the visit `step` by other arrows than graph
+    `b`, or one graph lacks it. `inside`: names of sub-graphs that differ."""
     if step.levels:
         return any(level.rpartition("_")[0] in inside for level in step.levels)
     return _arrows_to(step, a) != _arrows_to(step, b)
@@ -480,8 +487,8 @@ def _operators(run: Run) -> Iterator[Cause]:
 
 
 def _troubles(run: Run) -> Iterator[Cause]:
-    """Yield the causes of a run that are alarms or silence, except those that later events
-    contradict."""
+    """Yield the causes of a run that are alarms or silence; alarms that later events contradict are
+    not among them."""
     moments = {each.at for each in run.alarms if each.code in _ALARMS}
     for cause in causes(run, None):
         if isinstance(cause, Silence) or (not isinstance(cause, OPERATOR) and cause.at in moments):
@@ -506,8 +513,8 @@ def _happened(kind: str, run: Run, text: str) -> PartingCause:
 
 
 def _scripted(sent: SentTree, name: str | None) -> object:
-    """Return the behaviour of an action in the script of a simulated run; None if the script has
-    none."""
+    """Return what the script of a simulated run says about the action `name`, as JSON data; None if
+    it says nothing."""
     script = parse_small(sent.script) if sent.script else None
     says = script.get("behaviours") if isinstance(script, dict) else None
     if not isinstance(says, dict) or name is None:
@@ -542,7 +549,8 @@ def _outcome_text(shown: views.VisitShown | None, run: Run) -> str:
 
 
 def _said(action: ActionRun | None, shown: views.VisitShown | None) -> list[str]:
-    """Return the messages of an action during a visit, or right after it."""
+    """Return the messages of an action during the visit `shown`, or right after it; none if either
+    is None."""
     if action is None or shown is None:
         return []
     until = shown.not_after

@@ -98,8 +98,9 @@ def check_courses(
     budget_s: float = BUDGET_S,
     subgraphs: Sequence[SentSubgraph] = (),
 ) -> CheckedCourses:
-    """Simulate the expected courses with this graph, for at most `budget_s` seconds of processor
-    time. Raise BadInput, NotUmrf or TooLarge if the graph cannot be read."""
+    """Simulate the saved expected courses with this graph (`umrf`: its text) and its sub-graphs,
+    for at most `budget_s` seconds of processor time, and return where they differ. Raise BadInput,
+    NotUmrf or TooLarge if the graph cannot be read."""
     _, reading = read_sent(umrf)
     _, inside = read_inside(subgraphs, "", None, approved=False)
     until = time.thread_time() + budget_s
@@ -116,8 +117,9 @@ def check_courses(
 def _checked(
     saved: Expected, now: Graph, inside: Inner, *, looks: bool
 ) -> tuple[CheckedCourse, TakenArrows | None]:
-    """Check one course; without `looks` (no time is left) return it unchecked. Also return the
-    arrows that it took, if it is as expected."""
+    """Check one saved course with the graph `now` and its sub-graphs (`inside`); if `looks` is
+    false (no time is left), return it unchecked. Also return the arrows that it took; None unless
+    it is as expected."""
     unchecked = CheckedCourse(
         name=saved.name,
         run=saved.run,
@@ -140,8 +142,9 @@ def _checked(
 def propose(
     umrf: bytes, arrow: OutcomeArrow, subgraphs: Sequence[SentSubgraph] = ()
 ) -> ArrowProposal:
-    """Search for a script under which the arrow is taken. Raise BadInput, NotUmrf or TooLarge if
-    the graph cannot be read."""
+    """Search for a script under which the arrow is taken in this graph (`umrf`: its text). Raise
+    BadInput if the graph has no such arrow, or BadInput, NotUmrf or TooLarge if it cannot be read.
+    """
     _, reading = read_sent(umrf)
     _, inside = read_inside(subgraphs, "", None, approved=False)
     graph = reading.graph

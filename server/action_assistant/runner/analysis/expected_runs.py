@@ -135,8 +135,8 @@ def recorded(run: Run, fault: tuple[str, Fault] | None = None) -> Recorded:
 
 
 def fitted(found: Recorded, run: Run, graph: Graph) -> Recorded:
-    """Return the script for another version of the graph: renamed actions keep their behaviour. An
-    action that never ran gets the simulator's default."""
+    """Return a run as a script (`found`) for another version of its graph: renamed actions keep
+    their behaviour. An action that never ran gets the simulator's default, and a doubt."""
     by_aid = {action.aid: name for name, action in run.actions.items() if action.aid is not None}
     behaviours: dict[str, list[dict[str, Any]]] = {}
     used: set[str] = set()
@@ -224,8 +224,8 @@ def fold(event: Event) -> Sequence[Executable]:
 
 
 def name_of(given: str) -> str:
-    """Return the name of an expectation with single spaces. Raise BadInput unless it has 1 to 100
-    characters."""
+    """Return the given name of an expectation with single spaces. Raise BadInput unless it has 1 to
+    100 characters."""
     name = " ".join(given.split())
     if not 1 <= len(name) <= 100:
         raise BadInput("A name has 1 to 100 characters.", where={"path": "/name"})
@@ -240,8 +240,9 @@ def of_run(
     now: int,
     subgraphs: tuple[RunSubgraph, ...] = (),
 ) -> Expected:
-    """Return an expectation of the course of a run that is over. Raises Conflict where the
-    simulator does not repeat it."""
+    """Return the event that expects the course of a run that is over. `umrf`, `subgraphs`: as they
+    were sent; `author`: who expects it; `now`: µs UTC. Raise Conflict if the simulator does not
+    take the same course."""
     script = {"behaviours": recorded(found).behaviours}
     graph, inside = codec.read(umrf.encode()).graph, graphs_in(subgraphs)
     course = steps.course(graph, script_from(script), inside=inside)
@@ -261,8 +262,9 @@ def of_run(
 
 
 def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
-    """Return an expectation of the course that a graph takes in the simulator. Raise BadInput,
-    NotUmrf or TooLarge if the graph or script cannot be used."""
+    """Return the event that expects the course that a graph takes in the simulator. `wanted`: the
+    graph and the script; `author`: who expects it; `now`: µs UTC. Raise BadInput, NotUmrf or
+    TooLarge if the graph or script cannot be used, or no action runs."""
     if wanted.graph == "":
         raise BadInput("Of which graph?", where={"path": "/graph"})
     text, reading = read_sent(bytes(wanted.umrf))
@@ -289,7 +291,7 @@ def of_dry_run(wanted: Expect, name: str, author: Author, now: int) -> Expected:
 
 
 def expectation_view(saved: Expected) -> Expectation:
-    """Return an expectation as programs see it."""
+    """Return a saved expectation as the API shows it."""
     return Expectation(
         name=saved.name,
         run=saved.run,
@@ -303,8 +305,8 @@ def expectation_view(saved: Expected) -> Expectation:
 
 
 def check_alike(found: Run, course: tuple[ExpectedStep, ...]) -> None:
-    """Refuse a run that the simulator does not repeat, since its expectation would fail without any
-    change. Raise Conflict then. `course`: the simulated steps."""
+    """Raise Conflict if the simulated `course` does not repeat the run `found`: an expectation of
+    it would fail without any change."""
     simulated: dict[str, list[str]] = {}
     for step in course:
         if step.what == "result":

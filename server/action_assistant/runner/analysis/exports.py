@@ -66,7 +66,7 @@ class EventLine(msgspec.Struct, frozen=True):
 
 
 def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
-    """Yield each stored event as a line of JSON."""
+    """Yield each stored event of the run (`run`: its id) as a line of JSON."""
     for each in events:
         at = views.time(each.at).isoformat().replace("+00:00", "Z")
         line = EventLine(run, each.seq, each.kind, each.author, at, msgspec.Raw(each.body))
@@ -75,10 +75,10 @@ def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
 
 def intervals(run: Run) -> bytes:
     """Return CSV with a line per visit of an action, sorted by its begin. A cell is empty if its
-    value is unknown. If only bounds of a duration are known, `seconds` is empty, and
+    value is unknown. If only bounds of a duration can be given, `seconds` is empty, and
     `seconds_least` and `seconds_most` have the bounds. `missed`: how many visits of the action have
     no line, "none" or "N or more". A conducted run has two columns more: `robot`, the engine that
-    played the visit, and `said_by`, the person who gave its result by word."""
+    played the visit, and `said_by`, the person who stated its result."""
     text = io.StringIO()
     sheet = csv.writer(text)
     sheet.writerow(_COLUMNS if run.led is None else (*_COLUMNS, *_LED_COLUMNS))
@@ -119,10 +119,11 @@ def _cell(text: str) -> str:
 
 
 def mcap(events: Iterable[Event], pieces: Iterable[Iterable[Event]] = ()) -> bytes:
-    """Return MCAP with JSON messages: `/run` (state), `/actions/NAME` (state and result, at the
-    time they were shown), `/visits/NAME` (an ended visit, at the time its end was known; with
-    `at_least`, visits may have been missed and `visit` is a lower bound), `/log`. `pieces`: the events
-    of each piece of a conducted run, whose robots showed them under the names of their own graphs."""
+    """Return an MCAP file (for robotics viewers) with JSON messages: `/run` (state),
+    `/actions/NAME` (state and result, at the time they were shown), `/visits/NAME` (an ended visit,
+    at the time its end was seen; with `at_least`, visits may have been missed and `visit` is a
+    lower bound), `/log`. `pieces`: the events of each piece of a conducted run, whose robots showed
+    them under the names of their own graphs."""
     out = io.BytesIO()
     writer = Writer(out, compression=CompressionType.NONE)
     writer.start(profile="", library=f"temoto-action-assistant {VERSION}")
@@ -150,7 +151,8 @@ class _Track:
         self._count = 0
 
     def see(self, event: Event, decoded: Any, before: Run | None, after: Run) -> None:
-        """Write the messages of one event; `decoded` is its decoded body."""
+        """Write the messages of one event. `decoded`: its decoded body; `before`, `after`: the run
+        before and after it."""
         at = getattr(decoded, "at", event.at)
         if before is None or before.state != after.state or before.desired != after.desired:
             body = {"state": after.state, "desired": after.desired, "result": after.result}
@@ -166,7 +168,8 @@ class _Track:
         self._said(before, after)
 
     def see_piece(self, event: Event, decoded: Any, before: Run | None, after: Run) -> None:
-        """Write what one event of a piece showed; its run tells the rest."""
+        """Write what one event of a piece showed of its robot; all else is in the conducted run's
+        own events. The parameters are those of `see`."""
         if isinstance(decoded, Observed):
             for item in decoded.seen:
                 self._seen(item)

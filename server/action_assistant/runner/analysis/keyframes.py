@@ -79,12 +79,13 @@ class RunKeyframes(msgspec.Struct, frozen=True):
     marks: tuple[ReplayMark, ...] = ()
 
     def before(self, seq: int) -> Keyframe | None:
-        """Return the last keyframe at or before `seq`."""
+        """Return the last keyframe at or before event number `seq`; None without one."""
         place = bisect.bisect_right(self.keys, seq, key=lambda key: key.seq)
         return self.keys[place - 1] if place else None
 
     def until(self, at: int) -> Keyframe | None:
-        """Return the last keyframe whose events had all happened by `at` (microseconds UTC)."""
+        """Return the last keyframe whose events had all happened by `at` (µs UTC); None without
+        one."""
         place = bisect.bisect_right(self.keys, at, key=lambda key: key.at)
         return self.keys[place - 1] if place else None
 
@@ -93,12 +94,13 @@ class SnapshotJournal(RunnerJournal, Protocol):
     """A journal that also stores snapshots of streams."""
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
-        """Return events with `after < seq <= upto`, in order and as (body, kind, at). The kind is
-        None for events of the kind `usual`. The list is shorter if events are missing."""
+        """Return the events of a stream with `after < seq <= upto`, in order and as (body, kind,
+        at). The kind is None for events of the kind `usual`. The list is shorter if events are
+        missing."""
         ...
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
-        """Return the stored snapshot of a stream; None if there is none that is still valid."""
+        """Return the stored snapshot of a stream; None if no valid one is stored."""
         ...
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
@@ -108,7 +110,8 @@ class SnapshotJournal(RunnerJournal, Protocol):
 
 
 class KeyframeStore:
-    """Makes, caches and stores the keyframes of runs. For workers."""
+    """Makes, caches and stores the keyframes of runs (the run as it was after certain events). For
+    use in a worker process, since folding is slow."""
 
     def __init__(self, journal: SnapshotJournal) -> None:
         self._journal = journal
@@ -147,7 +150,7 @@ class KeyframeStore:
         return events[-1].seq if events else key.seq if key else 1
 
     async def page(self, run: str, after: int) -> Sequence[Event]:
-        """Return the first `APART` events with `seq > after`."""
+        """Return the first `APART` stored events of a run with `seq > after`."""
         return await self._journal.read(stream_of(run), after=after, limit=APART)
 
     async def _up_to_date(self, run: str) -> RunKeyframes:
@@ -203,8 +206,8 @@ class KeyframeStore:
 
 
 def _worth_keeping(newest: Keyframe, had: int) -> bool:
-    """Return whether to store new keyframes, given that those up to `had` are stored: at the end of
-    a run, and at each multiple of `APART` while it runs."""
+    """Return whether to store the keyframes up to `newest`, if those up to event number `had` are
+    stored: at the end of a run that is not tiny, and at each multiple of `APART` while it runs."""
     if newest.run.end is None:
         return newest.seq // APART > had // APART
     return newest.seq > max(had, _WORTH)
@@ -215,10 +218,10 @@ def fold(
     events: Sequence[Event],
     see: "Callable[[Event, RunEvent, Run | None, Run], None]",
 ) -> Run | None:
-    """Fold events, going on from `run`, and return the run after the last one. If `run` is None,
-    the first `Requested` begins it; events before that are skipped, and the result is None without
-    one. Call `see` after each event with the event, its decoded body, and the run before and after
-    it."""
+    """Fold events, going on from `run`, and return the run after the last one. Without a run
+    (None), the first `Requested` begins it; events before that are skipped, and the result is None
+    without one. Call `see` after each event with the event, its decoded body, and the run before
+    and after it."""
     for event in events:
         decoded = decode(event.kind, event.body)
         before = run
@@ -257,7 +260,8 @@ def _marks_of(part: _Part) -> list[ReplayMark]:
 
 
 def author_and_text(decoded: RunEvent) -> tuple[str, str]:
-    """Return the name of the person behind an event, and its text, "" where there is none."""
+    """Return the name of the person behind an event, and the event's text (a reason, an alarm …);
+    "" for either that the event does not have."""
     match decoded:
         case Requested():
             return decoded.author.name, decoded.override.reason if decoded.override else ""

@@ -18,9 +18,9 @@ INTO: Final = " › "
 
 
 class LevelPlace(msgspec.Struct, frozen=True):
-    """The place of an action in a run. `levels`: the full names of the actions around it, outermost
-    first; `name`: its own. `known`: false if its name fits no level; it then counts as top
-    level."""
+    """The place of an action in the hierarchy of a run. `levels`: the full names of the actions
+    around it, outermost first; `name`: its own. `known`: false if its name fits no level; it then
+    counts as top level."""
 
     levels: tuple[str, ...]
     name: str
@@ -28,7 +28,7 @@ class LevelPlace(msgspec.Struct, frozen=True):
 
     @property
     def way(self) -> tuple[str, ...]:
-        """The names from the outermost action down to this one."""
+        """The full names from the outermost action down to this one."""
         return (*self.levels, self.name)
 
 
@@ -39,9 +39,9 @@ def part_of(graph: str, action: str) -> str:
 
 
 def places(graph: str, own: Collection[str], names: Iterable[str]) -> dict[str, LevelPlace]:
-    """Return the place of each of these names in a run of `graph`, whose own actions are `own`.
-    Names are matched level by level from the top, so that marks inside of names do not mislead;
-    every name gets a place."""
+    """Return the place in the hierarchy of each of the action names `names`, in a run of `graph`,
+    whose own actions are `own`. Names are matched level by level from the top, so that marks inside
+    of names do not mislead; every name gets a place."""
     found = {name: LevelPlace((), name, name in own or "/" not in name) for name in names}
     parts = _by_part(graph, (name for name, place in found.items() if not place.known))
     held = [place for place in found.values() if place.known]

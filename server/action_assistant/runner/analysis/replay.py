@@ -36,7 +36,7 @@ class ActionFrame(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True)
 
 
 class ReplayHead(msgspec.Struct, frozen=True, kw_only=True):
-    """The fields of a run that one event changed; the others are left out."""
+    """The fields of a run that one event changed; unchanged fields are absent."""
 
     state: State | msgspec.UnsetType = msgspec.UNSET
     desired: Desired | msgspec.UnsetType = msgspec.UNSET
@@ -142,7 +142,8 @@ def _frames(run: Run | None, events: Sequence[Event]) -> list[ReplayFrame]:
 
 
 def frame(event: Event, decoded: RunEvent, before: Run | None, after: Run, at: int) -> ReplayFrame:
-    """Return the changes by one event. `decoded` is its decoded body."""
+    """Return the changes by one event. `decoded`: its decoded body; `before`, `after`: the run
+    before and after it; `at`: its time (µs UTC)."""
     by, text = author_and_text(decoded)
     old = before.alarms if before is not None else ()
     return ReplayFrame(
@@ -182,8 +183,8 @@ def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
 
 
 def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
-    """Return whether people would see a difference between two states of an action. A new time at
-    which it was last seen is no difference."""
+    """Return whether people would see a difference between two states of an action. That it was
+    seen again later, unchanged, is no difference."""
     if before is None:
         return True
     return before is not after and (
@@ -197,8 +198,9 @@ def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
 def _changed(
     before: ActionRun | None, after: ActionRun, words: Mapping[int, views.SaidShown]
 ) -> ActionFrame:
-    """Return the change of an action. `words`: who gave results by word, by visit. Only its last
-    visits can have changed, so the first different one is searched from the end."""
+    """Return the change of an action between two states of it; None as `before` if it was not
+    there. `words`: the results that persons stated, by number of the visit. Only its last visits
+    can have changed, so the first different one is searched from the end."""
     total = after.older + len(after.visits)
     known = before.older + len(before.visits) if before is not None else 0
     first = total

@@ -88,7 +88,8 @@ class Statistics(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
-    """Select the newest runs of a graph (id or name) that are over, at most `last`."""
+    """Select the newest runs of a graph (id or name) that are over, at most `last`. `engine`: only
+    runs on it, None for any."""
     newest = [
         select(run.c.id)
         .where(column == graph, run.c.ended_at.is_not(None), on)
@@ -107,7 +108,7 @@ def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
 
 
 def sums_of(runs: Sequence[str]) -> Select[Any]:
-    """Select the sums of the actions of these runs."""
+    """Select the stored totals of the actions of the runs with these ids."""
     return select(action_sum).where(action_sum.c.run.in_(runs))
 
 
@@ -142,8 +143,9 @@ def _point(row: Row[Any]) -> RunPoint:
 def _by_place(
     runs: Sequence[Row[Any]], sums: Iterable[Row[Any]]
 ) -> dict[LevelPlace, list[Row[Any]]]:
-    """Return the sums of each action by its place, the newest run first. Places and not names,
-    since the name of the graph is a part of the names of actions inside."""
+    """Return the totals of each action by its place in the hierarchy, the newest run first. Places
+    are used because the name of the graph, which may differ, is a part of the names of inner
+    actions."""
     by_run: dict[str, list[Row[Any]]] = {}
     for row in sums:
         by_run.setdefault(row.run, []).append(row)
@@ -212,8 +214,9 @@ def _exact(span: DurationBounds | None) -> float | None:
 def _never_taken(
     graph: Graph | None, actions: Mapping[str, ActionStatistics]
 ) -> tuple[list[NeverTaken], int]:
-    """Return the arrows that were certainly never taken, and the number of arrows for which that is
-    unknown."""
+    """Return the arrows of the graph that were certainly never taken, and the number of arrows for
+    which that is unknown. `actions`: the statistics by full name; `graph`: None for an unknown
+    graph, which has none of either."""
     if graph is None:
         return [], 0
     names = {each.key: each.full_name for each in graph.actions} | {EXIT: EXIT}
@@ -241,7 +244,7 @@ def _outcomes(arrow: Relation) -> list[str]:
 
 
 def _must_have_been(arrow: Relation, graph: Graph, child: ActionStatistics | None) -> bool:
-    """Return whether an arrow must have been taken: its child has run, and no other arrow leads to
-    the child."""
+    """Return whether an arrow must have been taken: its child has run (`child`: its statistics,
+    None without any), and no other arrow of the graph leads there."""
     ways = [each for each in graph.relations if each.child == arrow.child and _outcomes(each)]
     return child is not None and child.visits > 0 and len(ways) == 1

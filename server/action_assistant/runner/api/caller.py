@@ -27,8 +27,8 @@ _BODY_S: Final = 60.0
 
 
 def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
-    """Return the person who sent a request or opened a socket. A caller with a session counts as a
-    browser, a caller that sends the token instead counts as a program."""
+    """Return the person who sent a request or opened a socket (`connection`). A caller with a
+    session counts as a browser, a caller that sends the token instead counts as a program."""
     person = person_of(connection)
     return Author(
         person.id,
@@ -42,8 +42,10 @@ def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
 async def body_of(
     request: Request[Any, Any, Any], body_limit: ConcurrencyLimit
 ) -> AsyncIterator[bytes]:
-    """Read a body that carries a graph, which has to arrive in time; of each person few are in
-    memory at once. Raises TooLarge, Unavailable, Litestar's RequestEntityTooLarge."""
+    """Return a context with the body of a request that carries a graph. It waits for its turn,
+    since only few bodies of each person are in memory at once. Raise TooLarge if too many wait,
+    Unavailable if the body does not arrive in time, Litestar's RequestEntityTooLarge if it is too
+    large."""
     async with body_limit.turn(person_of(request).id):
         try:
             with anyio.fail_after(_BODY_S):
@@ -56,9 +58,9 @@ async def body_of(
 
 
 async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -> bytes:
-    """Return the first `most` bytes of a body, or the part of them that arrives within so many
-    seconds. Raise Litestar's HTTPException if the client disconnects before, or the body is too
-    large."""
+    """Return the first `most` bytes of the body of a request, or the part of them that arrives
+    within so many seconds. Raise Litestar's HTTPException if the client disconnects before, or the
+    body is too large."""
     found = b""
     with anyio.move_on_after(seconds):
         async for part in request.stream():
@@ -69,7 +71,7 @@ async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -
 
 
 def _address(host: str) -> str:
-    """Return an address on the network; "" for this computer itself, and for text that is no
+    """Return the IP address of a client; "" for this computer itself, and for a `host` that is no
     address."""
     try:
         address = ipaddress.ip_address(host)

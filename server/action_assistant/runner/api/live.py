@@ -46,16 +46,17 @@ _LONGEST: Final = 10_000  # characters of a message from the page
 
 
 class StopMessage(msgspec.Struct, frozen=True, tag="stop", tag_field="type"):
-    """A Stop, the only message that a page may send. `run`: the id of a run or a group, or
-    "all"."""
+    """A press of Stop, the only message that a page may send. `run`: the id of a run or a group, or
+    "all"; `stop_id`: the id of the press."""
 
     run: str
     stop_id: str = ""
 
 
 class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
-    """The runs that a Stop concerns and, if everything is stopped, the `graphs` of others by robot.
-    `unknown`: by robot, why it is unknown which graphs it runs."""
+    """The answer to a Stop: the ids of the runs that are being stopped and, if everything is
+    stopped, the `graphs` of other programs by robot. `unknown`: by robot, why it is unknown which
+    graphs it runs."""
 
     stop_id: str
     runs: list[str]
@@ -64,7 +65,7 @@ class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
 
     @classmethod
     def everything(cls, stop_id: str, stopped: StoppedAll) -> "Stopping":
-        """Return the answer to a Stop of everything."""
+        """Return the message that answers a Stop of everything."""
         return cls(stop_id, stopped.runs, stopped.graphs, stopped.unknown)
 
 
@@ -124,7 +125,7 @@ class EncodedRun(msgspec.Struct, frozen=True):
 
 
 class Hub:
-    """Keeps the outbox of each page and encodes runs and engines once for all of them."""
+    """Has the outboxes of all pages, and encodes runs and engines once for all of them."""
 
     def __init__(self, control: ExecutionService, clock_us: ClockUs) -> None:
         self.control = control
@@ -149,7 +150,7 @@ class Hub:
         return self._engines
 
     def heartbeat(self) -> str:
-        """Return a heartbeat as a message."""
+        """Return the text of a heartbeat message, with the present times."""
         seen = {
             run: views.time(opened.watch.seen_at)
             for run, opened in self.control.shown.items()
@@ -163,7 +164,8 @@ class Hub:
             box.mark(opened)
 
     def frame(self, opened: OpenRun) -> EncodedRun:
-        """Return a run as a message; each revision is encoded once."""
+        """Return the message about an open run, as text with its costs; each revision is encoded
+        once."""
         frame = self._frames.get(opened)
         if frame is None or frame.revision != opened.revision:
             began = anyio.current_time()
@@ -174,8 +176,8 @@ class Hub:
         return frame
 
     def due(self, opened: OpenRun) -> float:
-        """Return when a run may be encoded again: encoding takes a bounded share of the time,
-        however many pages watch."""
+        """Return the time, in seconds of the event loop, from which a run may be encoded again:
+        encoding takes a bounded share of the time, however many pages follow it."""
         frame = self._frames.get(opened)
         return 0.0 if frame is None or frame.revision == opened.revision else frame.next
 
@@ -188,20 +190,23 @@ class Hub:
         return msgspec.json.encode(Hello(self.control.robot_views(), runs)).decode()
 
     async def prepare_view(self, opened: OpenRun) -> None:
-        """Fill the cache of a run's view, so that encoding it takes little time."""
+        """Fill the cache of an open run's view, with pauses for other tasks, so that encoding it
+        takes little time afterwards."""
         await prepare_view(opened.run, self.view_cache(opened))
 
     def view_cache(self, opened: OpenRun) -> views.ActionViewCache:
-        """Return the cache of the view of a run."""
+        """Return the cache of the view of an open run; the first call makes it."""
         return self._view_caches.setdefault(opened, views.ActionViewCache())
 
     def run_view(self, opened: OpenRun) -> views.RunShown:
-        """Return the view of an open run."""
+        """Return the view of an open run, by its cache."""
         recorded = opened.recorder.recorded
         return views.run_view(opened.run, recorded=recorded, cache=self.view_cache(opened))
 
     async def follow(self, text: str, author: Author) -> str:
-        """Carry out a message of a page and return the answer."""
+        """Carry out a message of a page in the name of `author`, and return the text of the answer.
+        A message that cannot be understood or carried out is answered with the reason, not raised.
+        """
         stop_id = ""
         try:
             if len(text) > _LONGEST:
@@ -219,7 +224,7 @@ class Hub:
 
 
 async def prepare_view(run: Run, cache: views.ActionViewCache) -> None:
-    """Fill the cache of a run's view, with turns of the event loop in between."""
+    """Fill the cache of a run's view, with pauses for other tasks."""
     for _ in cache.prepare(run, _AT_ONCE):
         await anyio.lowlevel.checkpoint()
 
@@ -238,19 +243,20 @@ class Outbox:
         self._news = anyio.Event()
 
     def mark(self, opened: OpenRun) -> None:
-        """Note that a run has changed."""
+        """Have the newest state of this open run sent to the page."""
         if self._changed.get(opened.run.id) is not opened:
             self._changed[opened.run.id] = opened
             self._news.set()
 
     def mark_engines(self) -> None:
-        """Note that a robot has changed."""
+        """Have the list of engines sent to the page, since a robot has changed."""
         if self._engines_at == math.inf:
             self._engines_at = self._engines_next
             self._news.set()
 
     def post(self, text: str) -> bool:
-        """Queue an answer; return False when the page has left too many unread."""
+        """Queue the text of an answer without waiting; return False when too many answers wait,
+        since the page does not read."""
         self._answers.append(text)
         self._news.set()
         return len(self._answers) <= _MOST_ANSWERS
@@ -274,8 +280,9 @@ class Outbox:
         return max(self._next.get(run, 0.0), self._hub.due(opened))
 
     def _pick(self, beat: float) -> str | None:
-        """Return the next message: answers first, then a heartbeat, engines, and runs that may be
-        sent again."""
+        """Return the text of the next message: answers first, then a heartbeat if the time `beat`
+        (seconds of the event loop) has come, engines, and runs that may be sent again. None if
+        nothing may be sent now."""
         now = anyio.current_time()
         if self._answers:
             return self._answers.popleft()
@@ -301,8 +308,8 @@ class Outbox:
 
 
 async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
-    """Serve one page until it disconnects. An expired session may still stop, but is sent no more
-    states."""
+    """Serve the socket of one page until it disconnects. A page with an expired session may still
+    stop runs, but gets no more states."""
     session = session_of(socket)
     author = author_of(socket)
     box = Outbox(hub, lambda: session is None or not session.expired)

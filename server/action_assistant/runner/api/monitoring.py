@@ -38,7 +38,8 @@ class StopTimes:
 
 
 class RunMetrics(Collector):
-    """Counts ends of runs, times Stops, and gives the gauges of runs and robots."""
+    """Counts ends of runs, times Stops, and computes the gauges (present values) of runs and
+    robots."""
 
     def __init__(self, control: ExecutionService) -> None:
         self._control = control
@@ -81,7 +82,7 @@ class RunMetrics(Collector):
         yield from self._proven.collect()
 
     def families(self) -> Iterator[Family]:
-        """Yield the gauges, computed now."""
+        """Yield the gauges of runs and robots with their present values."""
         yield from self._run_families()
         yield from self._stop_families()
         yield from self._robot_families()
@@ -114,7 +115,7 @@ class RunMetrics(Collector):
     @property
     def unconfirmed(self) -> Counter[str]:
         """The number of unconfirmed Stops by engine: of open runs, counting lost ones, and of
-        graphs that others have started, once it is known why the proof is missing."""
+        graphs that other programs have started and whose Stop has a reason for being unproven."""
         open_runs = (each.run for each in self._control.open.values() if each.run.end is None)
         found = Counter(
             run.engine

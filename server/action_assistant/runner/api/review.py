@@ -42,7 +42,8 @@ _TYPES: Final[dict[str, str]] = {
 
 
 def json_of(text: bytes, _: type[T]) -> Response[T]:
-    """Return encoded JSON as a response. The type is for OpenAPI only."""
+    """Return a response with text that is JSON already. The second parameter, its type, is for
+    OpenAPI only."""
     return cast("Response[T]", Response(text, media_type=MediaType.JSON))
 
 
@@ -55,15 +56,15 @@ class ScriptRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class ArchiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A request to archive runs and raw messages that are older than so many days; null archives
-    none."""
+    """A request to archive runs and raw messages that ended more than so many days ago; null
+    archives none."""
 
     runs: Annotated[float, msgspec.Meta(ge=0)] | None = None
     raw: Annotated[float, msgspec.Meta(ge=0)] | None = None
 
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
-    """Return the routes of review."""
+    """Return the routes about stored runs: one run, many runs, and archives."""
     return [*_one_run(services), *_many_runs(services), _archiving(services)]
 
 
@@ -187,7 +188,8 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 async def _lines(queries: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
-    """Yield the lines of a run from its first page on, then those of its pieces, if it was led."""
+    """Yield the stored events of a run as lines of JSON in pages, then those of its pieces, if it
+    was conducted. `page`: its first page, which ends with event number `seq`."""
     for each in (run, *await queries.value(StoredRuns.pieces, run)):
         if each != run:
             seq, page = await queries.value(StoredRuns.lines, each, 0)

@@ -130,7 +130,8 @@ class GroupShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
-    """Return the routes of robots."""
+    """Return the routes about robots: the registry, one robot, starts on several, and index
+    folders."""
     return [
         *_registry(services),
         *_one_robot(services),
@@ -265,8 +266,8 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         responses={200: answer(UmrfGraph)},
     )
     async def held(name: str, graph: str) -> Response[bytes]:
-        """Return the held graph without its run state, since a graph with a state must not be sent
-        again."""
+        """Return the graph that a robot holds, without its run state, since a graph with a state
+        must not be sent again."""
         return await _umrf(services, services.control.robots.held_graph(name, graph))
 
     @get(
@@ -403,8 +404,9 @@ def _line(seq: int, event: RobotEvent) -> RobotLogLine:
 
 
 async def _behaviours(services: RunnerServices) -> BehaviourList | None:
-    """Return the list of behaviours; a folder that cannot be read is a problem in it, since a
-    refusal would look like a runner that cannot be reached."""
+    """Return the list of Python behaviours, or None if this runner has no folder of them. A folder
+    that cannot be read is reported in the list and not raised, so that the page does not take it
+    for a runner that cannot be reached."""
     if services.behaviours is None:
         return None
     try:

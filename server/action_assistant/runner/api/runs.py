@@ -326,14 +326,16 @@ def _live(services: RunnerServices) -> ControllerRouterHandler:
 
 
 async def _require_command_role(services: RunnerServices, run: str, request: _Asking) -> None:
-    """Check the role for a command to this run: a run on a robot needs more than a simulated one.
-    Raise Forbidden if it is too low, NotFound if there is no such run."""
+    """Check the role of the caller for a command to the run with the id `run`: a run on a robot
+    needs more than a simulated one. Raise Forbidden if it is too low, NotFound if there is no such
+    run."""
     if not await services.control.simulates(run):
         require(request, "operate")
 
 
 async def _stop_id(request: _Asking) -> str:
-    """Return the stop_id of a body, "" for any other body: a Stop is never refused for its form."""
+    """Return the `stop_id` in the body of a Stop request, at most 100 characters; "" for any other
+    body: a Stop is never refused for its form. Wait for the body only a short time."""
     try:
         body = await start_of(request, _STOP_BYTES, _STOP_S)
         return msgspec.json.decode(body, type=StopBody).stop_id[:100]
@@ -342,7 +344,7 @@ async def _stop_id(request: _Asking) -> str:
 
 
 async def _run_view(services: RunnerServices, run: Run) -> views.RunShown:
-    """Return the present view of a run, with turns of the event loop in between."""
+    """Return the present view of a run, with pauses for other tasks while it is made."""
     opened = services.control.open.get(run.id)
     if opened is not None:
         await services.hub.prepare_view(opened)
@@ -353,7 +355,8 @@ async def _run_view(services: RunnerServices, run: Run) -> views.RunShown:
 
 
 def _states(asked: str | None) -> tuple[str, ...]:
-    """Split states at commas. Raise BadInput for an unknown state."""
+    """Split a list of states of runs at its commas; () for None. Raise BadInput for an unknown
+    state."""
     states = tuple(each.strip() for each in (asked or "").split(",") if each.strip())
     if unknown := [each for each in states if each not in get_args(State)]:
         raise BadInput(f"No run is ever {unknown[0]!r}.", where={"path": "/state"})
@@ -375,8 +378,9 @@ def _last_event_id(request: _Asking) -> int:
 
 
 async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator[bytes]:
-    """Yield stored events as an event stream, then later ones as they are stored, until the run is
-    over."""
+    """Yield the stored events of a run after number `after` in the format of an HTTP event stream,
+    then later ones as they are stored, until the run is over. While nothing comes, yield a comment
+    now and then to keep the connection."""
     while True:
         opened = services.control.open.get(run)
         revision = opened.revision if opened is not None else 0

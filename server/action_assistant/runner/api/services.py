@@ -22,7 +22,7 @@ _BODIES: Final = 4  # large bodies of one person in memory at once
 
 
 class RunnerServices:
-    """The services of the routes; filled while the process starts, before the first request."""
+    """The services that the routes use; set while the process starts, before the first request."""
 
     control: ExecutionService
     hub: Hub

@@ -34,8 +34,8 @@ class Damaged(Refused):
 
 
 class Title(msgspec.Struct, frozen=True, kw_only=True):
-    """The first line. `place` is the path of the file in the folder of archives; the stream ends at
-    `events` with the hash `chain` (hex)."""
+    """The first line of an archive file. `place` is the path of the file in the folder of archives;
+    the stream ends at `events`, the number of its last event, with the hash `chain` (hex)."""
 
     format: int
     version: str
@@ -46,7 +46,7 @@ class Title(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def end(self) -> Head:
-        """The end of the stream: seq and chain."""
+        """The end of the archived stream: the number of its last event, and its chain of hashes."""
         return Head(self.events, bytes.fromhex(self.chain))
 
 
@@ -87,7 +87,7 @@ class ArchiveFile:
         self._write(title)
 
     def add(self, events: list[Event]) -> None:
-        """Write the events that follow those written so far."""
+        """Write the next events of the stream."""
         for event in events:
             self._end_so_far = Head(event.seq, link(self._end_so_far.chain, event))
             self._write(_line(event))
@@ -114,7 +114,7 @@ class ArchiveFile:
         return digest
 
     def abandon(self) -> None:
-        """Remove the file unless it is complete."""
+        """Remove the file unless it was completed by `close`."""
         self._raw.close()
         self._part.unlink(missing_ok=True)
 
@@ -125,8 +125,9 @@ class ArchiveFile:
 
 
 def read(path: Path) -> Iterator[Event]:
-    """Yield the events of an archive file, from the first. Raises Damaged at the first difference,
-    at the latest after the last event; OSError."""
+    """Yield the events of the archive file `path`, from the first. Raise Damaged at the first
+    difference from its checksums, at the latest after the last event; OSError if it cannot be read.
+    """
     title = title_of(path)
     seen, digest = NOTHING, hashlib.sha256()
     try:
@@ -150,8 +151,8 @@ def read(path: Path) -> Iterator[Event]:
 
 
 def title_of(path: Path) -> Title:
-    """Return the title of an archive file. Raise Damaged if the file is no archive, OSError if it
-    cannot be read."""
+    """Return the title (first line) of the archive file `path`. Raise Damaged if it is no archive,
+    OSError if it cannot be read."""
     try:
         with gzip.open(path) as file:
             title = msgspec.json.decode(file.readline(_LONGEST), type=Title)
@@ -166,8 +167,8 @@ def title_of(path: Path) -> Title:
 
 
 def put(source: Path, target: Path) -> str:
-    """Copy a file as a whole or not at all, and return its SHA-256. Raise Damaged if the copy
-    differs, OSError if a file cannot be read or written."""
+    """Copy the file `source` to `target`, completely or not at all, and return its SHA-256 in hex.
+    Raise Damaged if the copy differs, OSError if a file cannot be read or written."""
     make_folder(target.parent)
     part = target.with_name(f".{target.name}.part")
     try:
@@ -187,7 +188,7 @@ def put(source: Path, target: Path) -> str:
 
 
 def sha256_of(path: Path) -> str:
-    """Return the SHA-256 of a file, in hex. Raise OSError if the file cannot be read."""
+    """Return the SHA-256 of the file `path`, in hex. Raise OSError if it cannot be read."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -34,7 +34,7 @@ _RUNS: Final = 1_000  # archived runs in memory
 
 
 class Archived(Refused):
-    """The run was archived, and its archive is not in the folder of archives."""
+    """The run was archived, and its archive file is not in the folder of archives."""
 
     title = "The run is in an archive that is not here"
     status = 410
@@ -54,19 +54,21 @@ class Journaled(SnapshotJournal, Protocol):
         *,
         parts: Sequence[StreamRemoved] = (),
     ) -> int:
-        """Record that a stream is kept elsewhere from now on, and return the number of that record.
-        `parts`: streams that go with it, whose numbers follow. `also` makes events to store with
-        it, given that number. Raise Conflict if a stream has another end, Unavailable if the
-        journal cannot be written."""
+        """Record that the events of a stream are in an archive from now on, and return the number
+        of that record. `parts`: streams that go with it, whose numbers follow. `also` makes events
+        to store with it from that number. Raise Conflict if a stream has another end than stated,
+        Unavailable if the journal cannot be written."""
         ...
 
     async def delete_some(self, stream: str, by: int) -> bool:
-        """Delete some events of a stream that was taken out; return whether any events are left."""
+        """Delete some events of a stream that was taken out; return whether any events are left.
+        `by`: the number of the record of that."""
         ...
 
 
 class ArchiveStore:
-    """Reads archived runs from their files in `folder`. All other calls go to the journal."""
+    """Reads archived runs from their files in `folder`. All other calls go to the journal, and have
+    its parameters and errors."""
 
     def __init__(self, journal: SnapshotJournal, folder: Path, run_in_worker: RunInWorker) -> None:
         self.folder = folder
@@ -77,7 +79,7 @@ class ArchiveStore:
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Append to the journal, as `Journal.append` does."""
+        """Append events to a stream of the journal, as `Journal.append` does."""
         return await self._journal.append(stream, drafts, expected=expected)
 
     async def newest(self, stream: str) -> int:
@@ -86,8 +88,8 @@ class ArchiveStore:
         return await self._journal.newest(stream)
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
-        cannot be read."""
+        """Return the rows of a SELECT on the tables. Raise Unavailable if the journal cannot be
+        read."""
         return await self._journal.query(statement)
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:
@@ -96,15 +98,17 @@ class ArchiveStore:
         return None if await self.place(stream) else await self._journal.snapshot(stream)
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
-        """Store keyframes of a stream, unless it is an archived run."""
+        """Store keyframes of a stream (`state`) as of event number `seq`; does nothing for an
+        archived run."""
         if await self.place(stream) is None:
             await self._journal.keep_snapshot(stream, seq, state)
 
     async def read(
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
-        """Return events of a stream, `after` < seq ≤ `upto`, in order. Raise Archived if its
-        archive file is missing, Damaged if it is damaged."""
+        """Return the events of a stream with `after` < seq ≤ `upto`, in order, at most `limit`;
+        None for `upto` or `limit` sets no bound. Raise Archived if its archive file is missing,
+        Damaged if it is damaged."""
         place = await self.place(stream)
         if place is None:
             return await self._journal.read(stream, after=after, upto=upto, limit=limit)
@@ -113,14 +117,15 @@ class ArchiveStore:
         return list(islice(events, after, last if limit is None else min(last, after + limit)))
 
     async def bare(self, stream: str, usual: str, *, after: int, upto: int) -> list[BareEvent]:
-        """Return the events of `read` as bodies; the kind is None where it is `usual`."""
+        """Return the events of a stream as `read` does, but as (body, kind, at); the kind is None
+        for events of the kind `usual`."""
         if await self.place(stream) is None:
             return await self._journal.bare(stream, usual, after=after, upto=upto)
         return bare(await self.read(stream, after=after, upto=upto), usual)
 
     async def place(self, stream: str) -> views.ArchivePlace | None:
-        """Return the archive of an archived run, or of a piece of one; None if its events are in the
-        journal."""
+        """Return the archive of a stream, if that is of an archived run or of a piece of one; None
+        if its events are in the journal."""
         if not stream.startswith(_PREFIX):
             return None
         id_ = stream.removeprefix(_PREFIX)

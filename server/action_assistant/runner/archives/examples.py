@@ -28,14 +28,14 @@ class _Line(msgspec.Struct, frozen=True):
 
 
 def written(events: Iterable[Event]) -> bytes:
-    """Return the events of a stream as the contents of a file."""
+    """Return the events of a stream as the contents of a file: lines of JSON, as `read` reads them."""
     lines = (_Line(each.kind, each.author, each.at, msgspec.Raw(each.body)) for each in events)
     return b"".join(msgspec.json.encode(line) + b"\n" for line in lines)
 
 
 def read(text: bytes) -> tuple[Requested, tuple[Draft, ...]]:
-    """Return the first event of a file of recorded events, and the events that follow. Raise
-    BadInput if it is no recorded run."""
+    """Return the first event of a recorded run, and the events that follow. `text`: lines of JSON.
+    Raise BadInput if it is no recorded run."""
     try:
         lines = [msgspec.json.decode(each, type=_Line) for each in text.splitlines() if each]
         first = decode(lines[0].kind, bytes(lines[0].body)) if lines else None
@@ -57,6 +57,7 @@ def numbered(first: Requested, number: int) -> Draft:
 
 
 def shipped(folder: Path) -> Sequence[bytes]:
-    """Return the contents of the example files, in the order of their first events."""
+    """Return the contents of the example files in the folder, in the order of the times of their
+    first events."""
     texts = [path.read_bytes() for path in folder.glob(f"*{ENDING}")]
     return sorted(texts, key=lambda text: read(text)[0].at)

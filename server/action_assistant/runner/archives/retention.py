@@ -53,7 +53,7 @@ class SweepResult(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Retention:
-    """Archives old runs and raw messages. It never blocks a run."""
+    """Archives old runs and raw messages. No run ever waits for it."""
 
     def __init__(
         self,
@@ -116,8 +116,9 @@ class Retention:
             return SweepResult(runs=done, raw=found.raw, more=more, problems=problems)
 
     async def _archive_run(self, row: Row[Any]) -> None:
-        """Archive one run, with its pieces if it was conducted. Raise Refused or OSError if that
-        fails; its events then stay in the journal."""
+        """Archive the ended run of this table row, with its pieces if it was conducted. Raise
+        Conflict if a piece moves again, or Refused or OSError if archiving fails; its events then
+        stay in the journal."""
         pieces = [
             each.stream.removeprefix("run/")
             for each in await self._journal.query(queries.streams_of_pieces(row.id))
@@ -155,7 +156,8 @@ class Retention:
         self._may_be_unfinished = False
 
     async def _written(self, run_id: str, place: str) -> StreamRemoved:
-        """Write the archive of a stream, and return what is to be recorded of it."""
+        """Write the archive file of a run or piece, with pauses so that others can work, and return
+        the record of it that removes the stream. `place`: the path in the folder of archives."""
         stream = stream_of(run_id)
         end = await self._journal.end(stream)
         path = self.keep.folder / place
@@ -224,8 +226,8 @@ class Retention:
 
 
 def _due(before: int, most: int) -> Select[Any]:
-    """Return the query for runs that ended before this time, are summed up and not pinned; oldest
-    first."""
+    """Return the query for at most `most` runs that ended before the time `before` (µs UTC), are
+    summed up and not pinned; oldest first."""
     return (
         select(run)
         .join(review, review.c.run == run.c.id)
@@ -251,7 +253,8 @@ def _unfinished() -> Select[Any]:
 
 
 def _place(row: Row[Any], run_id: str) -> str:
-    """Return the file for the events of a run, or of a piece of it."""
+    """Return the path, in the folder of archives, of the file for the events of a run, or of a
+    piece of it (`run_id`). `row`: of the run."""
     ended: datetime = views.time(row.ended_at)
     return f"runs/{ended:%Y-%m}/run-{row.number:06d}-{run_id}.jsonl.gz"
 

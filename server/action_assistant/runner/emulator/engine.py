@@ -63,7 +63,7 @@ _MESSAGES: Final = 10  # of one action
 
 
 class _Held:
-    """One graph that the engine holds."""
+    """One graph that the emulated engine holds, running or ended."""
 
     def __init__(self, running: Running, sheet: GraphPrinter) -> None:
         self.running = running
@@ -73,15 +73,13 @@ class _Held:
         self.messages: dict[str, tuple[tuple[int, str], ...]] = {}
 
     def text(self) -> str:
-        """Return the graph as the engine prints it."""
+        """Return the graph as JSON, printed as the real engine prints it."""
         return self.sheet.text(self.state, self.states, self.messages)
 
 
 class PublishedGraphs:
-    """The graphs of an engine as feedback and answers show them, and the ring of snapshots.
-
-    `taken`: the map of graphs is locked, so that no snapshot can be added.
-    """
+    """The graphs of an emulated engine as feedback and answers show them, and its ring buffer of
+    snapshots. `taken`: the map of graphs is locked, so that no snapshot can be added."""
 
     def __init__(
         self,
@@ -103,7 +101,7 @@ class PublishedGraphs:
         self._ring: deque[str] = deque(maxlen=quirks.ring)
 
     def reindex(self, index: EmulatedIndex) -> None:
-        """Replace the index of actions and graphs."""
+        """Replace the index, that is, the known actions and graphs."""
         self.index = index
         self._engine.library = library_of(index)
         self._engine.signatures = signatures_of(index, self._quirks)
@@ -111,8 +109,8 @@ class PublishedGraphs:
         self.plans |= index.graphs
 
     def take(self, traces: Sequence[Trace], now_ms: float) -> list[str]:
-        """Process traces of the engine; return the names of the graphs that ended, without
-        sub-graphs."""
+        """Process traces (events) of the engine at `now_ms`; return the names of the graphs that
+        ended, without sub-graphs."""
         ended: list[str] = []
         seen = _as_threads_do(traces)
         at_once = sum(isinstance(each, NodeStateEvent) and each.state in _SHOWN for each in seen)
@@ -132,14 +130,15 @@ class PublishedGraphs:
         return ended
 
     def running(self) -> tuple[str, ...]:
-        """Return every graph that a get lists as running, printed."""
+        """Return the printed text of every graph that a get lists as running."""
         keeps = self._quirks.keeps_ended
         shown = [held for _, held in sorted(self._held.items())]
         return tuple(each.text() for each in shown if keeps or each.state not in ENDED)
 
     def snapshot(self, name: str, at_once: int = 1) -> None:
-        """Add a snapshot to the ring, unless the map of graphs is locked or chance drops it: of
-        `at_once` simultaneous snapshots about one is kept."""
+        """Add a snapshot of the graph `name` to the ring buffer. It is not added if the map of
+        graphs is locked or chance drops it: of `at_once` simultaneous snapshots about one remains.
+        """
         held = self._held.get(name)
         if held is None or self.taken or self._engine.locked:
             return
@@ -149,17 +148,17 @@ class PublishedGraphs:
 
     @property
     def waiting(self) -> bool:
-        """True while the ring has a snapshot."""
+        """True while the ring buffer has a snapshot."""
         return bool(self._ring)
 
     def drained(self) -> tuple[str, ...]:
-        """Empty the ring; return its snapshots, the newest first."""
+        """Empty the ring buffer; return its snapshots, the newest first."""
         history = tuple(self._ring)
         self._ring.clear()
         return history if self._quirks.newest_first else history[::-1]
 
     def modified(self, name: str, plan: GraphPlan) -> None:
-        """Note the new structure of a graph."""
+        """Use the new structure (`plan`) of the graph `name` from now on."""
         held, known = self._held.get(name), self.plans.get(name)
         if held is not None:
             before = known.attributes if known is not None else {}
@@ -185,8 +184,9 @@ class PublishedGraphs:
         return held
 
     def _sheet(self, running: Running, *, again: bool = False) -> GraphPrinter:
-        """Return the printer of a graph. Matching its actions with the index, which is not repeated
-        for a graph that is held already (`again`), loses its description."""
+        """Return the printer of a running graph. A graph loses its description when its actions are
+        first matched with the index; `again`: the graph was held already and is not matched again.
+        """
         plan = self.plans.get(running.own if running.home else running.name)
         whole = not self._quirks.drops_fields
         return GraphPrinter(
@@ -197,7 +197,8 @@ class PublishedGraphs:
         )
 
     def _remember(self, graph: str, node: str, at: int) -> None:
-        """Store the message of an action that has ended."""
+        """Store the message of an action (`node`) that has ended at `at` (ms since 1970), if it
+        gave one."""
         held = self._held.get(graph)
         found = held.running.nodes.get(node) if held is not None else None
         if held is not None and found is not None and found.call.message:
@@ -221,7 +222,7 @@ def _as_threads_do(traces: Sequence[Trace]) -> list[Trace]:
 
 
 def _printed(plan: GraphPlan) -> str:
-    """Return an indexed graph as the engine prints it; it keeps its description."""
+    """Return an indexed graph as the engine prints it, with its description."""
     running = Running(plan.graph.name, plan.graph, None, None)
     build(running, {action.key: (DEFAULT,) for action in plan.graph.actions})
     return GraphPrinter(running, plan.attributes, described=True).text("UNINITIALIZED", {}, {})
@@ -231,10 +232,9 @@ _GETS: Final = 10  # requests that wait, by the depth of a service
 
 
 class Inbox:
-    """Gives messages in the order of their topics, then gets. A full queue drops its oldest.
-
-    `depth`: how many messages of one topic wait; 0 for any number.
-    """
+    """The messages that wait for the engine. It returns them in the order of their topics, then
+    gets. A full queue drops its oldest message. `depth`: how many messages of one topic wait; 0 for
+    any number."""
 
     def __init__(self, depth: int) -> None:
         self._depth = depth
@@ -242,18 +242,19 @@ class Inbox:
         self._gets: deque[int] = deque(maxlen=_GETS)
 
     def put(self, message: Message) -> None:
-        """Add a command; of one topic only the newest ones stay, as many as its depth."""
+        """Add a command. If too many of its topic wait, the oldest is dropped."""
         waiting = self._messages[message.topic]
         if self._depth and len(waiting) >= self._depth:
             waiting.popleft()
         waiting.append(message)
 
     def put_get(self, ticket: int) -> None:
-        """Add a get, by the ticket that its answer carries."""
+        """Add a get. `ticket`: the number that its answer carries."""
         self._gets.append(ticket)
 
     def taken(self) -> Message | int | None:
-        """Remove and return the next message: a command, or the ticket of a get; None when nothing waits."""
+        """Remove and return the next message: a command, or the ticket (number) of a get; None when
+        no message waits."""
         waiting = next((each for each in self._messages.values() if each), None)
         if waiting is not None:
             return waiting.popleft()
@@ -275,11 +276,10 @@ _Command: TypeAlias = Callable[[str, float], list[Trace]]
 
 
 class EmulatedEngine:
-    """One life of one engine. `hear` and `ask` pass messages to it, `advance` returns its own.
-
-    `born_ms`: the time of its start, from which the period of its feedback counts; `epoch_ms`: its
-    0 ms in milliseconds since 1970. `performer`: runs its behaviours in real time.
-    """
+    """One process of one emulated engine, from its start to its end. `hear` and `ask` pass messages
+    to it, `advance` returns its own. `born_ms`: the time of its start, from which the period of its
+    feedback counts; `epoch_ms`: its 0 ms in milliseconds since 1970. `performer`: runs its
+    behaviours in real time. Times `at_ms` are on its clock."""
 
     def __init__(
         self,
@@ -337,11 +337,13 @@ class EmulatedEngine:
 
     @property
     def executing(self) -> tuple[Execution, ...]:
-        """The calls of actions' code that have not returned. Those of a frozen engine go on when it thaws."""
+        """The calls of actions' code that have not returned. Calls in a frozen engine go on when it
+        thaws."""
         return () if self.gone else tuple(self._engine.executing(self._awake_ms))
 
     def hear(self, message: Message, at_ms: float) -> None:
-        """Receive a command. It may have to wait; a newer command of its topic then replaces it."""
+        """Receive a command at `at_ms`. It may have to wait, and is dropped if too many newer
+        commands of its topic come."""
         self._pass(at_ms)
         if isinstance(message, Start) and self.quirks.late_ms:
             self._later(self.quirks.late_ms, partial(self._arrive, message))
@@ -355,7 +357,7 @@ class EmulatedEngine:
         self._plan_work(self.quirks.reaction_ms)
 
     def ask(self, ticket: int, at_ms: float) -> None:
-        """Receive a get; the answer, if any, carries the ticket."""
+        """Receive a get at `at_ms`; the answer, if any, carries the number `ticket`."""
         self._pass(at_ms)
         if not self._deaf and not self.gone:
             self._inbox.put_get(ticket)
@@ -372,20 +374,21 @@ class EmulatedEngine:
         self._view.reindex(index)
 
     def freeze(self, at_ms: float) -> None:
-        """Stop the process (SIGSTOP): the engine does nothing, and messages wait."""
+        """Suspend the process at `at_ms` (SIGSTOP): the engine does nothing, and messages wait."""
         self._pass(at_ms)
         self._frozen, self._frozen_ms = True, self._now
 
     def thaw(self, at_ms: float) -> None:
-        """Let the process continue (SIGCONT); what was due during the freeze happens now."""
+        """Let the process continue at `at_ms` (SIGCONT); what was due during the freeze happens
+        now."""
         self._frozen = False
         self._now = self._engine.now = self._tick = at_ms
         self._take(self._engine.advance(at_ms))  # threads of actions wake before the one that hears
         self._pass(at_ms)
 
     def quit(self, at_ms: float) -> None:
-        """Tell the process to end (SIGINT): it neither hears nor sends any more, and runs its graphs to their
-        end."""
+        """Ask the process to end at `at_ms` (SIGINT): it neither receives nor sends any more, and
+        runs its graphs to their end."""
         self._pass(at_ms)
         self._deaf = True
         self._inbox.clear()
@@ -393,7 +396,8 @@ class EmulatedEngine:
         self._leave_if_idle()
 
     def kill(self, why: str = "killed") -> None:
-        """End the process at once (SIGKILL), and the code of all actions with it."""
+        """End the process at once (SIGKILL), and the code of all actions with it. `why`: the reason
+        that is reported."""
         self.gone = self.gone or why
 
     # --- time ---------------------------------------------------------------------------------
@@ -415,7 +419,8 @@ class EmulatedEngine:
                 self._take(self._engine.returned(returned, self._now))
 
     def _next(self) -> tuple[float, float]:
-        """Return when the node and when the engine inside are due next, in ms; infinity for never."""
+        """Return when the node, and when the engine inside it, have something to do next, in ms;
+        infinity for never."""
         engine = self._engine.due
         return self._tasks[0][0] if self._tasks else inf, inf if engine is None else engine
 

@@ -112,7 +112,8 @@ class FeedbackMessage(msgspec.Struct, frozen=True):
 
 
 class GetResponse(msgspec.Struct, frozen=True):
-    """The answer to the get with this ticket: what it has indexed, and every graph it holds."""
+    """The answer to the get with this ticket (number): the texts of what the engine has indexed,
+    and of every graph it holds."""
 
     at_ms: float
     ticket: int
@@ -155,8 +156,8 @@ class Refusal(Exception):
 
 
 def graph_plan_of(text: str) -> GraphPlan:
-    """Read a graph as the engine's parser does. Raise Refusal, with the engine's own message, if
-    that parser would refuse it."""
+    """Read a graph text as the engine's parser does. Raise Refusal, with the engine's own message,
+    if that parser would refuse it."""
     try:
         tree = json.loads(text)
     except ValueError as wrong:
@@ -201,7 +202,8 @@ class EmulatedIndex(msgspec.Struct, frozen=True):
 
 
 def index_of(actions: Iterable[str], graphs: Iterable[str]) -> EmulatedIndex:
-    """Return the index of files with these texts, without those that cannot be read, as engines do."""
+    """Return the index of files with these texts, of actions and of graphs. Unreadable ones are
+    ignored, as by engines."""
     texts: list[str] = []
     found: dict[str, Signature] = {}
     for text in actions:
@@ -222,12 +224,13 @@ def index_of(actions: Iterable[str], graphs: Iterable[str]) -> EmulatedIndex:
 
 
 def library_of(index: EmulatedIndex) -> dict[str, Graph]:
-    """Return the graphs that can be sub-graphs, by name."""
+    """Return the graphs of an index, which can be sub-graphs, by name."""
     return {name: plan.graph for name, plan in index.graphs.items()}
 
 
 def signatures_of(index: EmulatedIndex, quirks: EngineTraits) -> dict[str, Signature] | None:
-    """Return the signatures of the actions that the engine has, by name; None where it has every action."""
+    """Return the signatures of the actions in an index, by name; None if the engine accepts every
+    action (an empty index, or a quirk)."""
     return index.actions if index.actions and quirks.checks_actions else None
 
 
@@ -239,7 +242,9 @@ def engine_inside(
     actor: str,
     performer: Performer | None,
 ) -> Engine:
-    """Return the engine that runs the graphs, without the node around it."""
+    """Return the engine that runs graphs, without the ROS node around it. `quirks`: the traits of
+    real engines that it has; `facts`: of the engine build; `script`: how actions act; `actor`: its
+    name; `performer`: runs behaviours, None without any."""
     return Engine(
         facts=facts,
         script=script,
@@ -271,17 +276,18 @@ def asked_for(message: Start, index: EmulatedIndex, held: Container[str]) -> Gra
 
 
 def unknown(verb: str, name: str) -> str:
-    """Return the log line for a command about a graph that the engine does not hold."""
+    """Return the log line for a command (`verb`) about a graph that the engine does not hold."""
     return f"origin [in {verb}Graph]: Cannot {verb} UMRF graph '{name}' because it doesn't exist.\n"
 
 
 def active(name: str, state: str) -> str:
-    """Return the engine's reason for not starting a graph that is running."""
+    """Return the engine's reason for not starting the graph `name`, which is running in `state`."""
     return f"Cannot execute UMRF graph '{name}' because it's already active ({state})"
 
 
 def refusal(why: str, message: Start) -> str:
-    """Return the log line for a start that the engine refuses."""
+    """Return the log line, in the real engine's words, for a start message that it refuses for the
+    reason `why`."""
     by_name = not message.graph_json
     if why == "map::at":  # an exception of C++ without a text of the engine
         return why

@@ -49,12 +49,10 @@ _WAITING: Final = 100  # messages of one topic that wait, without the trait of a
 
 
 class EmulatorNode:
-    """A ROS 2 node for one life of an emulated engine. `make(epoch_ms)` returns that engine, at 0
-    ms of the node's clock.
-
-    `told` is called with every message of the engine; `indexes`: a period in seconds and a function
-    that reads the engine's folder. Raise RuntimeError if the domain cannot be joined.
-    """
+    """A ROS 2 node with one emulated engine, from its start to its end. `make(epoch_ms)` returns
+    that engine, at 0 ms of the node's clock. `told` is called with every message of the engine;
+    `indexes`: a period in seconds and a function that reads the engine's folder. Raise RuntimeError
+    if the domain cannot be joined."""
 
     def __init__(
         self,
@@ -128,7 +126,8 @@ class EmulatorNode:
         subscribe(UmrfGraphModify, facts.modify_topic, modify, depth)
 
     def spin(self) -> str:
-        """Run the node until `end` is called or the engine ends by itself; return why it did, "" for `end`."""
+        """Run the node, and block, until `end` is called or the engine ends by itself; return why
+        it did, "" for `end`."""
         try:
             while not self._ending and not self.robot.gone:
                 due = self.robot.due
@@ -177,7 +176,7 @@ class EmulatorNode:
     async def _ask(
         self, _: UmrfGraphGet.Request, response: UmrfGraphGet.Response
     ) -> UmrfGraphGet.Response:
-        """Pass a get to the engine, and answer when the engine has."""
+        """Pass a get to the engine, wait for its answer, and return `response` filled with that."""
         self._asked += 1
         ticket, answered = self._asked, Future(executor=self._executor)
         self._tickets[ticket] = answered

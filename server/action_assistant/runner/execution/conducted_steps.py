@@ -49,9 +49,11 @@ _STALL_S: Final = 3.0  # for which nothing may have stood still before a piece l
 
 
 class Leading(msgspec.Struct, frozen=True, kw_only=True):
-    """The run that a conductor leads, as far as it needs it: `tell` shows and records an event,
-    `stored` waits until all told events are in the journal, `stop` begins a Stop of the whole run,
-    `rests` ends it as a piece has ended that no answer has proven at rest."""
+    """The callbacks by which a conductor reaches the run that it leads (a run whose actions are
+    carried out by several robots, step by step). `tell` shows an event to people and records it,
+    `stored` waits until all events so far are in the journal, `stop` begins a Stop of the whole
+    run, `rests` ends the whole run for the reason for which the given piece ended, where a person's
+    statement or the end of its code showed that at rest and no answer did."""
 
     tell: Callable[[RunEvent], None]
     stored: Callable[[], Awaitable[None]]
@@ -60,8 +62,9 @@ class Leading(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Word(msgspec.Struct, frozen=True, kw_only=True):
-    """The outcome of an action by the word of a person, where no answer tells it. `piece`: the run of
-    the piece that it is about; "" for the newest one."""
+    """The outcome of an action as a person has stated it, because the states of the robot do not
+    show it. `by`: the person; `piece`: the id of the run that carried the action out, "" for the
+    newest one."""
 
     outcome: Precondition
     by: Author
@@ -70,10 +73,11 @@ class Word(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
-    """A conducted run that an earlier process left: its start, how far it got, the highest number of
-    its pieces, those of calls without an outcome, by number of the call, and those that have moved
-    again since their outcome, each with the seq of its last event, the states of the actions that
-    robots play, and the last piece whose rest no answer has proven."""
+    """A conducted run that an earlier process left unfinished. `order`: its start; `course`: the
+    outcomes so far; `sent`: the highest number of a piece; `pieces`: by number of a call without an
+    outcome, its piece and the seq of the last event of that; `again`: pieces that moved again after
+    their outcome, each with its seq; `states`: of the actions that robots carry out; `unproven`:
+    the last piece that ended without a proof of rest by an answer, None without one."""
 
     order: Order
     course: LedCourse
@@ -85,7 +89,8 @@ class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Step:
-    """One call of an action that a robot carries out, until the engine has its outcome."""
+    """One call of an action that a robot carries out, until the engine of the whole graph has been
+    given its outcome. The run on the robot that carries it out is its piece."""
 
     def __init__(self, call: Call, engine: str) -> None:
         self.call = call
@@ -108,7 +113,7 @@ class Step:
 
     @property
     def node(self) -> str:
-        """The full name of its action."""
+        """The full name of the action that this step calls."""
         return self.call.node
 
     @property
@@ -126,7 +131,8 @@ class Step:
 
     @property
     def is_going(self) -> bool:
-        """True while its piece may move, or has ended and its outcome is not told yet."""
+        """True while the piece of the step may move, or has ended and its outcome has not been
+        passed on yet."""
         return self.is_open or (self.run is not None and self.is_led)
 
     def waiting(self) -> anyio.CancelScope:
@@ -141,14 +147,15 @@ class Step:
         self._waiting.cancel()
 
     def renew(self) -> None:
-        """Forget a piece that has not left, so that another one can be sent."""
+        """Forget a piece that was not sent, so that another one can be sent for the same step."""
         self.piece, self.run, self.shown, self.has_not_left = None, None, None, False
         self.shown_inside = {}
         self.over, self.rested = anyio.Event(), anyio.Event()
 
 
 class Gate:
-    """Decides whether a further piece may begin. `held`: why none may; `is_final`: none ever will."""
+    """Decides whether a further piece of a conducted run may be sent to a robot. `held`: the event
+    that says why none may for now, None if it is open; `is_final`: none ever will."""
 
     def __init__(self, held: Held | None = None) -> None:
         self.held = held
@@ -157,15 +164,16 @@ class Gate:
 
     @property
     def is_open(self) -> bool:
-        """True if a piece may begin now."""
+        """True if a piece may be sent now: the gate is neither held nor closed."""
         return self.held is None and not self.is_final
 
     def close(self) -> None:
-        """Close the gate for good."""
+        """Close the gate for good: no piece is sent any more."""
         self.is_final = True
 
     def hold(self, held: Held) -> None:
-        """Hold all pieces that have not begun."""
+        """Keep back all pieces that were not sent yet. `held`: the event that gives the time, the
+        reason and the person."""
         self.held = held
 
     def release(self) -> None:
@@ -175,14 +183,14 @@ class Gate:
         self._opened = anyio.Event()
 
     async def wait(self) -> None:
-        """Wait until the gate is open."""
+        """Wait until the gate is open; for ever if it was closed for good."""
         while not self.is_open:
             await self._opened.wait()
 
 
 class StallWatch:
-    """Notices that this computer, this process or its clock has jumped: whatever was looked at before
-    is old then."""
+    """Notices that this process or computer stood still, or that its clock jumped. Observations
+    from before such a jump are out of date."""
 
     def __init__(self, clock_us: ClockUs) -> None:
         self._clock_us = clock_us
@@ -200,7 +208,7 @@ class StallWatch:
         return moment <= (anyio.current_time() if self.stands_still else self._stood_still_at)
 
     async def run(self, hold: Callable[[str], None]) -> None:
-        """Call `hold` with the reason at each jump, until cancelled."""
+        """Call `hold` with the reason, in words, at each jump of time, until cancelled."""
         offset = self._clock_us() / 1e6 - anyio.current_time()
         while True:
             await anyio.sleep(_TICK_S)
@@ -216,7 +224,8 @@ class StallWatch:
 
 
 def seen_of(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:
-    """Return the event that shows an action of a conducted run in this state."""
+    """Return the event that shows an action of a conducted run in a state. `step`: the call that
+    the action belongs to; `action`: its visits and messages; `at`: µs UTC."""
     visit = action.visits[-1] if action.visits else None
     return PieceSeen(
         at=at,
@@ -229,8 +238,9 @@ def seen_of(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:
 
 
 def rest_of(piece: Run, at: int, *, asks: bool = False) -> PieceRest:
-    """Return the event that says how far the rest of a piece is proven. `asks`: it has ended without
-    an outcome, and a person has to give one."""
+    """Return the event that says how far it is proven that a piece is at rest (that nothing of it
+    moves). `at`: µs UTC; `asks`: the piece has ended without an outcome, and a person has to state
+    one."""
     assert piece.piece is not None
     stops = piece.desired == "stopped" and piece.end is None
     since = piece.stop_requested_at or piece.requested_at
@@ -263,13 +273,11 @@ def rest_of(piece: Run, at: int, *, asks: bool = False) -> PieceRest:
 
 
 def seen_inside(step: Step, whole: str, at: int) -> list[PieceSeen]:
-    """Return the events that show what has changed of the actions inside of a step's sub-graph, and
-    note that they were passed on. `whole`: the name of the graph of the conducted run, under which
-    they have the names that they would have in a run on one robot.
-
-    An action inside may be visited several times by one call; the number of its visit stands in the
-    low bits of the number of the call.
-    """
+    """Return an event for each action inside the sub-graph of a step that has changed since the
+    last call, and remember that it was returned. `whole`: the name of the graph of the conducted
+    run, used in the names of these actions as in a run on one robot; `at`: µs UTC. One call may
+    visit an inner action several times: the number of its visit is in the low bits of the number of
+    the call."""
     run = step.run
     if run is None:
         return []
@@ -294,8 +302,8 @@ def seen_inside(step: Step, whole: str, at: int) -> list[PieceSeen]:
 
 
 def outcome_shown(run: Run, text: PieceText) -> Precondition | None:
-    """Return the outcome that the last states of a piece tell; None if they tell none. `text`: what
-    was sent."""
+    """Return the outcome of a piece by the last states of its run; None if they do not show it.
+    `text`: the graph that was sent as the piece."""
     states = run.graph_state, run.actions[text.action.full_name].state
     if not text.inside:
         return outcome_of(*states)
@@ -305,7 +313,8 @@ def outcome_shown(run: Run, text: PieceText) -> Precondition | None:
 
 
 def order_of(first: Requested) -> Order:
-    """Return the order that starts the whole graph of a conducted run."""
+    """Return the order that starts the whole graph of a conducted run. `first`: the first event of
+    that run."""
     graph = GraphOutline(first.graph_name, first.actions)
     inside = tuple(each.umrf for each in first.subgraphs)
     return Order(run=first.run, graph=graph, umrf=first.umrf, inside=inside)
@@ -314,8 +323,9 @@ def order_of(first: Requested) -> Order:
 def piece_to_send(
     first: Requested, step: Step, piece: str, text: PieceText, umrf: str, at: int
 ) -> tuple[Requested, Order]:
-    """Return the event that stores the piece of a step, and the order that its robot is sent.
-    `piece`: its id; `text`: what it sends, as `umrf` with its values."""
+    """Return the event that stores the piece of a step as a run, and the order that is sent to its
+    robot. `first`: the first event of the whole run; `piece`: the id of the new run; `text`: the
+    piece as prepared; `umrf`: its UMRF text with the values of inputs filled in; `at`: µs UTC."""
     name = text.name(first.graph_name, piece)
     actions = {step.node: first.actions[step.node]}
     requested = Requested(
@@ -345,7 +355,7 @@ def piece_to_send(
 
 
 class RestNews:
-    """Tells how far the rest of each piece of a run is proven, whenever that has changed."""
+    """Reports how far each piece of a run is proven to be at rest, whenever that has changed."""
 
     def __init__(self, tell: Callable[[PieceRest], None], clock_us: ClockUs) -> None:
         self._tell = tell
@@ -353,9 +363,9 @@ class RestNews:
         self._told: dict[str, PieceRest] = {}  # by piece
 
     def show(self, piece: Run, *, asks: bool = False) -> None:
-        """Tell how far it is proven that a piece is at rest, if that has changed since the last
-        time. `asks`: the piece has ended without an outcome, and a person is asked for the outcome
-        until the piece moves again."""
+        """Report how far it is proven that a piece is at rest, if that has changed since the last
+        report. `asks`: the piece has ended without an outcome, and a person is asked for it until
+        the piece moves again."""
         known = self._told.get(piece.id)
         asks = asks or (piece.end is not None and known is not None and known.asks)
         now = rest_of(piece, self._clock_us(), asks=asks)

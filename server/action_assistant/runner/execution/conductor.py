@@ -100,9 +100,10 @@ _FOREIGN: Final = frozenset(
 
 
 class Conductor:
-    """The link of a conducted run. `first`: its first event; `texts`: the pieces by full name of
-    their action; `engine`: plays the whole graph, and `make_engine` makes another one if it fails;
-    `left`: how far an earlier process led the run."""
+    """Leads a conducted run. To that run it is the link to one engine.
+    `first`: the first event of the run; `texts`: the pieces by full name of their action; `engine`
+    plays the whole graph, and `make_engine` makes another one if it fails; `left`: how far an
+    earlier process led the run."""
 
     simulated: Final = False
     pauses: Final = False
@@ -165,7 +166,7 @@ class Conductor:
         self._rests = RestNews(lambda event: self._run.tell(event), clock_us)
 
     def leads(self, leading: Leading) -> None:
-        """Name the run that is led. Call this before the run is driven."""
+        """Set the callbacks that record events. Call this once, before the run is driven."""
         self._leading = leading
         self._listening.enter_context(self._engine.listen(self._hear))
 
@@ -173,16 +174,15 @@ class Conductor:
 
     @property
     def standing(self) -> Standing:
-        """The standing of the engine that plays the whole graph. Its life is that of the run: another
-        engine may take over."""
+        """The condition of the engine. Its incarnation is the id of the run, as engines change."""
         life = self._first.run
         if self._is_past_help:
             return Standing(state="answering", incarnation=life, generation="current", servers=1)
         return msgspec.structs.replace(self._engine.standing, incarnation=life)
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Start the whole graph. Raise EngineRefused if its engine refuses it, NotSent or NoAnswer
-        if it cannot be started."""
+        """Start the whole graph. `leaves` is called right before that. Raise EngineRefused if the
+        engine that plays it refuses it, NotSent or NoAnswer if it cannot be started."""
         self._began = self._clock_us()
         await self._engine.start(order, leaves)
 
@@ -196,14 +196,13 @@ class Conductor:
         await self._engine.stop(graph_name)
 
     def close(self, author: Author) -> None:
-        """Let nothing begin any more, and begin to stop every piece. The call never waits. `author`
-        has pressed Stop."""
+        """Let nothing begin any more, and begin to stop every piece; never wait."""
         self._stopped_by = author
         self._stop_pieces(author, is_press=True)
 
     def _stop_pieces(self, author: Author, *, is_press: bool) -> None:
-        """Let nothing begin any more, and stop every piece; one that is being stopped already only
-        at a press, for which it gets one message more if its robot does not hold it any more."""
+        """Let no piece begin any more, and begin to stop the open ones. One that is being stopped
+        already is stopped again only if a person pressed Stop (`is_press`)."""
         self._gate.close()
         for step in self._steps.values():
             step.end()
@@ -212,14 +211,13 @@ class Conductor:
                 piece.stop(author, "")
 
     async def _refuse(self, *_: object, **__: object) -> NoReturn:
-        """Raise NotSent: a conducted run is held, not paused, and its graph stays as it is."""
         raise NotSent("a conducted run is held, not paused, and its graph cannot be changed")
 
     pause = resume = modify = _refuse
 
     async def get(self) -> Answer:
-        """Return the whole graph, with the states of actions as their robots showed them. Raise
-        NoAnswer while the engine of the whole graph has ended and no other one has its place."""
+        """Return the whole graph with the states that the robots showed for its actions. Raise
+        NoAnswer while its engine has ended and no other one has taken its place."""
         if self._is_past_help:
             return self._answer_without_engine()
         if not self._has_engine:
@@ -232,8 +230,7 @@ class Conductor:
         )
 
     def _answer_without_engine(self) -> Answer:
-        """Return the whole graph where no engine knows it any more: stopped once nothing can begin and
-        no piece is open."""
+        """Return the whole graph without an engine: stopped when no piece is or becomes open."""
         at, is_over = self._clock_us(), self._gate.is_final and not self._is_going
         ended = {name: state for name, state in self._others.items() if state not in ACTIVE}
         nodes = dict.fromkeys(self._first.actions, "UNINITIALIZED") | ended | self._states
@@ -252,7 +249,7 @@ class Conductor:
         return msgspec.structs.replace(graph, state=state, nodes=nodes)
 
     async def run(self) -> None:
-        """Lead the run until cancelled."""
+        """Send the pieces, and pass their outcomes to the engine, until cancelled."""
         async with anyio.create_task_group() as tasks:
             self._tasks = tasks
             tasks.start_soon(self._engine.run)
@@ -270,7 +267,7 @@ class Conductor:
                 await self._replace_engine(tasks)
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Call `hear` with every change of the whole graph until the end of the block."""
+        """Return a context during which `hear` is called with every change of the whole graph."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
@@ -297,7 +294,8 @@ class Conductor:
                 return
 
     async def _replace_engine(self, tasks: TaskGroup) -> None:
-        """Bring another engine to where the one that has ended had been. The gate is closed."""
+        """Make another engine in place of one that has failed, and bring it to the same point of
+        the run. After too many failures, make none: only Stop is left."""
         if self._is_past_help:
             return
         self._has_engine = False
@@ -314,8 +312,7 @@ class Conductor:
         await old.aclose()
 
     async def _bring_back(self) -> None:
-        """Bring a new engine to where the run is, with the ends that become known meanwhile. Have it
-        replaced if that fails."""
+        """Give a new engine the outcomes so far. If that fails, hold the run and replace it."""
         known = len(self._course)
         try:
             course = LedCourse(began=self._began, steps=tuple(self._course))
@@ -335,7 +332,8 @@ class Conductor:
         return (self._clock_us() - self._began) / 1000
 
     def _show(self, run: str, changes: tuple[Exact, ...]) -> None:
-        """Pass on what the engine of the whole graph shows, without the actions that robots play."""
+        """Pass on what the engine of the whole graph reports, except for states of actions that
+        robots carry out. If `changes` end the graph, stop the open pieces."""
         shown: list[Exact] = []
         for each in changes:
             is_robots = isinstance(each, NodeState | NodeResult) and each.node in self._led.players
@@ -354,7 +352,7 @@ class Conductor:
         return any(isinstance(each, GraphState) and each.state in TERMINAL for each in changes)
 
     def _show_what_may_be(self, run: str) -> None:
-        """Report what waits; the end of the graph, and what follows it, only when no piece is open."""
+        """Report the waiting changes. Those from the end of the graph wait for all open pieces."""
         ready: list[Exact] = []
         while self._waiting:
             first = self._waiting[0]
@@ -415,8 +413,8 @@ class Conductor:
             step.renew()  # nothing has left: a person may let it go on
 
     async def _hand_over(self, step: Step) -> None:
-        """Send the piece of a step once the gate is open and its robot may begin it; do what the
-        starter has chosen if it may not."""
+        """Send the piece of a step once the gate is open, if its robot may begin it; otherwise hold
+        or stop the run, as the starter chose."""
         await self._gate.wait()
         began = anyio.current_time()
         try:  # nothing begins while its causes are not in the journal
@@ -480,8 +478,7 @@ class Conductor:
         self._runs.drive(step.piece)
 
     def _may_leave(self, step: Step, cleared: Cleared) -> None:
-        """Look at the gate and the robot in the step of the event loop in which the message leaves.
-        Raise NotSent if the piece may not begin any more."""
+        """Raise NotSent if a piece that is about to leave may not begin. The call does not wait."""
         if not self._gate.is_open or step.is_stopped:
             raise NotSent("the run was held or stopped before it left")
         if self._stalls.stands_still:
@@ -489,7 +486,7 @@ class Conductor:
         cleared.require_still()
 
     def _piece_changed(self, step: Step, piece: OpenRun) -> None:
-        """Show what a robot shows of its piece, and act on its end and on its troubles."""
+        """Record what a robot shows of the piece of a step, and act on its end and on faults."""
         if step.piece is not piece:  # it had not left, and another one was sent
             return
         if step.over.is_set() and piece.run.end is None:
@@ -519,8 +516,7 @@ class Conductor:
         self._note_end(run)
 
     def _note_end(self, piece: Run) -> None:
-        """Note that a piece has ended, and whether an answer has proven that; show the end of the
-        graph if it has waited for this."""
+        """Report the end of the whole graph if that waited for the end of this piece."""
         self._unproven = piece if piece.at_rest is not None else self._unproven
         self._show_what_may_be(self._first.run)
 
@@ -542,8 +538,7 @@ class Conductor:
                 self._alarm(alarm.code, f"{where}: {alarm.text}")
 
     async def _end_without_output(self, step: Step) -> None:
-        """Stop a piece whose action has ended while its graph goes on, which it would do for ever: an
-        output is unset, or the keepers of its values wait."""
+        """Wait until the action of a step has ended though its piece goes on, then stop the piece."""
         while True:
             await step.rested.wait()
             if not self._values.tells_false_by_rest(step):
@@ -555,7 +550,8 @@ class Conductor:
             step.rested = anyio.Event()
 
     def _outcome(self, step: Step) -> Precondition | None:
-        """Return the outcome of a piece that has ended; if its states tell none, say so: None."""
+        """Return the outcome of the ended piece of a step. Return None, after raising an alarm or
+        acting as the starter chose, if its states show no outcome or it was refused."""
         assert step.run is not None
         run = step.run
         outcome = outcome_shown(run, self._texts[step.node])
@@ -583,7 +579,8 @@ class Conductor:
     async def _finish(
         self, step: Step, outcome: Precondition, how: Literal["shape", "word", "unsent"]
     ) -> None:
-        """Tell the engine of the whole graph the outcome of a step."""
+        """Record the outcome of a step, and pass it to the engine. `how`: it was told by states of
+        the robot ("shape"), by a person ("word"), or no piece was sent ("unsent")."""
         self._steps.pop(step.call.number, None)
         self._over.add(step.call.number)
         ended = self._values.ended(step, outcome, how, self._clock_us())
@@ -596,7 +593,7 @@ class Conductor:
             await self._engine.returned(returned)
 
     def _end_step(self, step: Step, author: Author) -> None:
-        """Let a step end: its piece is stopped until that is proven, or never begins."""
+        """Begin to stop the piece of a step in the name of `author`, or never send it."""
         if step.is_stopped:
             return
         step.end()
@@ -606,8 +603,8 @@ class Conductor:
     # --- trouble ------------------------------------------------------------------------------
 
     def _trouble(self, step: Step, code: str, why: str, since: float = inf) -> None:
-        """Say once what is wrong with a step, and do what the starter has chosen for that; not after a
-        wait `since` then in which the runner stood still. Steps on one robot share a silence."""
+        """Report a fault of a step once, and act as the starter chose. Do nothing if the runner
+        stood still after `since` (seconds of the event loop). A silence is one of the robot."""
         if code in step.troubles or step.is_stopped or self._stalls.stood_still_since(since):
             return
         step.troubles.add(code)
@@ -633,15 +630,16 @@ class Conductor:
     # --- the gate -----------------------------------------------------------------------------
 
     def hold(self, why: str, by: Author | None = None) -> None:
-        """Begin nothing further until somebody lets the run go on."""
+        """Send no further piece until a person lets the run go on. `by` is None for the runner. Do
+        nothing if the run is held or stopped already."""
         if self._gate.held is None and not self._gate.is_final:
             held = Held(at=self._clock_us(), why=why, by=by)
             self._gate.hold(held)
             self._run.tell(held)
 
     async def go_on(self, author: Author) -> None:
-        """Let a held run go on, once every robot that has a step of it has answered. Raise Conflict if
-        one of them may begin no piece, or nothing leads the run, or its gate has changed meanwhile."""
+        """Wait until every robot that has a step has answered, then let a held run go on. Raise
+        Conflict if one may begin no piece or no engine leads the run, or if it is held no more."""
         if self._is_past_help:
             raise Conflict("What leads this run has failed too often: only Stop is left.")
         if not self._has_engine:
@@ -658,8 +656,8 @@ class Conductor:
         self._gate.release()
 
     def give_word(self, node: str, word: Word) -> None:
-        """Take the outcome of an action from a person. Raise Conflict unless its robot is proven or
-        was seen at rest, its states tell no outcome, and no other word has come before."""
+        """Take the outcome of an action (`node`) that a person states. Raise Conflict unless the
+        robot is at rest, its states show no outcome, and none was stated before."""
         step = next((each for each in self._steps.values() if each.node == node), None)
         if step is None or step.run is None:
             raise Conflict(f"{node} waits for no outcome.", where={"path": "/action"})
@@ -677,7 +675,8 @@ class Conductor:
         step.decided.set()
 
     def moves_again(self, piece: OpenRun) -> None:
-        """Act on a piece that had ended and moves, until it has ended again."""
+        """Follow a piece that had ended and moves again, until it has ended: raise an alarm, and
+        hold or stop the run, as the starter chose."""
         again = piece.run
         for step in self._steps.values():  # it may still wait for the word of a person
             if step.run is not None and step.run.id == again.id:

@@ -48,7 +48,8 @@ _PAGE: Final = 500  # events read at once
 
 
 class Conductors:
-    """Opens conducted runs, and finds the conductor of each that is open."""
+    """Opens conducted runs, whose actions several robots carry out, and finds the conductor of each
+    open one."""
 
     def __init__(
         self,
@@ -79,9 +80,9 @@ class Conductors:
         seq: int = 1,
         left: LeftOpen | None = None,
     ) -> OpenRun:
-        """Open a stored conducted run. `first`: its first event; `seq`: the number of its last one;
-        `texts`: its pieces by full name of their action; `engine` plays the whole graph; `left`: how
-        far an earlier process led it."""
+        """Open a stored conducted run. `first`: its first event; `seq`: the number of its last
+        stored event; `texts`: its pieces by full name of their action; `engine` plays the whole
+        graph; `left`: how far an earlier process led it, None for a new run."""
         conductor = Conductor(
             first,
             texts,
@@ -100,9 +101,10 @@ class Conductors:
         return opened
 
     async def take_up(self, run: Run, seq: int) -> None:
-        """Lead a run further that an earlier process left. Nothing begins until a person lets it go
-        on; what the robots still do is followed. Raise Unavailable if the journal cannot be read,
-        msgspec.DecodeError or another Refused if what it has of the run cannot be."""
+        """Continue a run that an earlier process left; `seq`: the number of its last stored event.
+        Nothing new begins until a person lets the run go on, but what the robots still do is
+        followed. Raise Unavailable if the journal cannot be read, msgspec.DecodeError or another
+        Refused if its content cannot."""
         first = await self._history.requested(run.id)
         left = await _left_open(self._history, first, run)
         texts = await self._runtime.run_in_worker(piece_texts, first.umrf, first.subgraphs)
@@ -148,22 +150,25 @@ class Conductors:
         return self._simulator(CONDUCTED_FACTS, first.script, self._runtime.clock_us, led=led)
 
     async def go_on(self, run: str, author: Author) -> None:
-        """Let a held run go on. Raise Conflict if nothing can lead it any more, or one of its robots
-        may begin no piece."""
+        """Let the held run with the id `run` go on, in the name of `author`; wait for the answers
+        of its robots. Raise Conflict if nothing can lead it any more, or one of its robots may
+        begin no piece."""
         conductor = self._open.get(run)
         if conductor is None:
             raise Conflict(f"{UNREAD}: only Stop is left.")
         await conductor.go_on(author)
 
     def give_word(self, run: str, node: str, word: Word) -> None:
-        """Take the outcome of an action from a person. Raise Conflict if it is not asked for."""
+        """Take the outcome of an action (`node`: its full name) of the run with the id `run`, as a
+        person states it in `word`. Raise Conflict if no outcome is asked for."""
         conductor = self._open.get(run)
         if conductor is None:
             raise Conflict("Only the outcome of an action in a run that is led can be given.")
         conductor.give_word(node, word)
 
     def _see(self, opened: OpenRun) -> None:
-        """Tell a conductor of each change of a piece that was over and closed, and moves again."""
+        """Notify the conductor of a piece that had ended and been closed, and moves again.
+        `opened`: any run that has changed; others are ignored."""
         piece = opened.run.piece
         if piece is not None and not opened.is_led:
             conductor = self._open.get(piece.run)
@@ -181,8 +186,9 @@ def _leading(opened: OpenRun) -> Leading:
 
 
 async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpen:
-    """Return how far an earlier process led a conducted run; `now`: the run as its events show it. Raise
-    Unavailable if the journal cannot be read."""
+    """Return how far an earlier process led a conducted run, from its stored events. `first`: the
+    first of them; `now`: the run as all of them show it. Raise Unavailable if the journal cannot be
+    read."""
     ends: list[tuple[int, Returned | Literal["stop"]]] = []
     began = first.at
     unproven: Run | None = None
@@ -234,7 +240,7 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
 
 
 async def _left_piece(history: RunHistory, id_: str) -> tuple[Run, int]:
-    """Return a stored piece that an earlier process left, and the seq of its last event. Raise
+    """Return the stored piece with the id `id_`, and the number (`seq`) of its last event. Raise
     msgspec.DecodeError if some of its events cannot be read."""
     piece, seq, is_whole = await history.left(id_)
     if piece is None or not is_whole:

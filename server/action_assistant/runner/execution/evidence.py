@@ -16,12 +16,10 @@ from action_assistant.umrf.triggers import NEVER_BEGAN
 
 
 def newer_than_answers(run: Run, snapshots: Sequence[Snapshot]) -> tuple[Snapshot, ...]:
-    """Return those snapshots of feedback, oldest first, that are newer than the last answer.
-
-    Feedback covers the last half second, and an answer may have shown an end already; older states
-    would then look like further visits. In a loop, a state that looks older may be a new lap, and
-    is left to the next answer.
-    """
+    """Return those snapshots of feedback, oldest first, that add to what the last answer showed.
+    Feedback covers the last half second, so it may repeat states from before that answer, which
+    would look like further visits. Where a loop makes that undecidable, the snapshot is left to the
+    next answer."""
     known: dict[str, int] = {}
     for i, shown in enumerate(snapshots):
         if not is_news(run, shown):
@@ -34,8 +32,8 @@ def newer_than_answers(run: Run, snapshots: Sequence[Snapshot]) -> tuple[Snapsho
 
 
 def _is_overtaken(run: Run, shown: Snapshot) -> bool:
-    """Return whether a snapshot shows at least one action less far than it is known to be, and none
-    further."""
+    """Return whether a snapshot shows at least one action of a run less far along than already
+    known, and none further along: then it is older than what is known."""
     less = False
     for node, state in shown.nodes.items():
         action = run.actions.get(key_of(run, shown.graph, node))
@@ -47,8 +45,8 @@ def _is_overtaken(run: Run, shown: Snapshot) -> bool:
 
 
 class LastLook(NamedTuple):
-    """The times of one answer: when it came, and when it was requested (µs UTC); None without an
-    answer."""
+    """The times of one answer of an engine: when it came, and when it was requested (µs UTC); None
+    without an answer."""
 
     at: int | None = None
     asked: int | None = None
@@ -90,8 +88,9 @@ class SubGraphs:
         return list(held.values())[1:]
 
     def last_look(self, part: str, usual: LastLook) -> LastLook:
-        """Return the newest answer before this one that proves anything about the sub-graph `part`;
-        by default `usual`, the newest for the whole run."""
+        """Return the times of the newest earlier answer that proves anything about the sub-graph
+        named `part`. That is `usual`, the newest one for the whole run, unless the sub-graph was
+        not counted as the run's then."""
         return self._passed_over.pop(part, usual)
 
     def _whose(
@@ -117,13 +116,14 @@ class SubGraphs:
 
 def differs(sent: str, text: str) -> str:
     """Return the `difference` between the graph text that was sent and the text that an engine
-    wrote. For workers."""
+    wrote. Both are parsed, which is slow: call it in a worker process."""
     return difference(codec.read(sent).graph, text)
 
 
 def difference(sent: Graph, text: str) -> str:
-    """Return in words how the graph that an engine wrote differs from the one that was sent; "" if
-    they are equal. See docs/umrf-and-the-engine.md 1.4."""
+    """Return in words how the graph text that an engine wrote differs from the graph that was sent;
+    "" if they mean the same. A text that cannot be read is a difference, too. See
+    docs/umrf-and-the-engine.md 1.4."""
     try:
         seen = codec.read(text).graph
     except codec.Unreadable as wrong:

@@ -38,8 +38,8 @@ class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
 
 
 async def pause(opened: OpenRun, author: Author) -> Run:
-    """Pause a run. Raise Conflict if the run is not running or pausing is not safe on its engine,
-    Unavailable if the message could not be sent."""
+    """Pause a run in the name of `author`, and return it. Raise Conflict if the run is not running
+    or pausing is not safe on its engine, Unavailable if the message could not be sent."""
     run = opened.run
     if run.state != "running" or run.desired != "running":
         raise Conflict(f"Only a running run can be paused; this one is {_condition(run)}.")
@@ -53,8 +53,8 @@ async def pause(opened: OpenRun, author: Author) -> Run:
 
 
 async def resume(opened: OpenRun, author: Author) -> Run:
-    """Let a paused run go on. Raise Conflict if the run is not paused, Unavailable if the message
-    could not be sent."""
+    """Let a paused run go on in the name of `author`, and return it. Raise Conflict if the run is
+    not paused, Unavailable if the message could not be sent."""
     if opened.run.desired != "paused":
         raise Conflict(f"Only a paused run can go on; this one is {_condition(opened.run)}.")
     try:
@@ -73,13 +73,11 @@ async def modify(
     approvals: Approvals,
     run_in_worker: RunInWorker,
 ) -> Run:
-    """Give a running graph another structure. `body` is an encoded ModifyRequest; `engine` is None
-    for a simulated run.
-
-    Raise BadInput if the body is wrong, Conflict if the run or its engine does not allow the
-    change, Unavailable if the message could not be sent, and OutcomeUnknown if nobody knows whether
-    the engine has made the change.
-    """
+    """Give a running graph another structure, in the name of `author`, and return the run. `body`
+    is an encoded ModifyRequest; `engine` is None for a simulated run; `approvals` checks the yes of
+    a second person, where the robot demands it. Raise BadInput if the body is wrong, Conflict if
+    the run or its engine does not allow the change, Unavailable if the message could not be sent,
+    and OutcomeUnknown if it cannot be known whether the engine has made the change."""
     run = opened.run
     _require_moving(run)
     if not opened.pauses:
@@ -112,7 +110,8 @@ async def modify(
 
 
 def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
-    """Return a change as a request to start the other version, so that the same checks apply to it."""
+    """Return the change `asked` of a run as a request to start the other version, so that the
+    checks of a start can be made on it."""
     return StartRequest(
         version=asked.version,
         digest=asked.digest,
@@ -125,8 +124,9 @@ def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
 
 
 async def _require_matched(engine: KnownEngine, umrf: str, run_in_worker: RunInWorker) -> None:
-    """Raise Conflict if a changed graph has sub-graphs or actions that the engine cannot build. For
-    a change the engine does not look actions up in its index, and it would abort."""
+    """Raise Conflict if the changed graph (`umrf`: its text) has sub-graphs or actions that the
+    engine cannot build. On a change the engine does not search its index for actions, and would
+    abort. The engine's index is read, not the engine asked."""
     held = {each.graph for each in engine.answer.graphs} if engine.answer is not None else set()
     index = await engine.index(run_in_worker)
     lost = await run_in_worker(not_matched_in, umrf, engine.facts, index, held)
@@ -145,9 +145,9 @@ class RestRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def confirm_rest(opened: OpenRun, asked: RestRequest, author: Author) -> Run:
-    """End a run because a person has seen it at rest, where no answer of its engine can prove that.
-    Raise BadInput if the person does not say how, Conflict if the run is simulated or its
-    engine's answers still count."""
+    """End a run because `author` has seen it at rest (nothing moves), where no answer of its engine
+    can prove that. `asked`: how it was seen. Raise BadInput if it does not say how; Conflict if the
+    run is simulated, if its engine still answers for it, or if actions were seen moving."""
     run, how = opened.run, asked.how.strip()
     if len(how) < 3:
         raise BadInput("Say how it was seen that nothing moves.", where={"path": "/how"})

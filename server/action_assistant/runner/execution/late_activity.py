@@ -38,8 +38,8 @@ _LOG_ENTRIES: Final = 500  # newest entries of a robot's log
 
 
 class LateActivity:
-    """Watches for runs that are over and that an engine shows moving, and opens them again. It also
-    knows which runs ended without a proof of their engine."""
+    """Watches for runs that had ended but that an engine shows moving, and opens them again. It
+    also knows which runs ended without a proof by their engine."""
 
     def __init__(
         self,
@@ -69,26 +69,28 @@ class LateActivity:
             self._settled[run.id] = Settled(run.engine, run.id, life, opened.failed)
 
     def settled_on(self, engine: str) -> tuple[Settled, ...]:
-        """Return the runs on an engine that ended since this process began because they were at
-        rest, by a person's word or the end of their code. Runs whose start message somebody else
-        has sent again are left out."""
+        """Return the runs on an engine that ended, since this process began, by a person's
+        statement or the end of their code instead of a proof by the engine. Runs whose start
+        message another program has published again are not among them."""
         found = (each for each in self._settled.values() if each.engine == engine)
         return tuple(each for each in found if not self._is_of_others(engine, each.run))
 
     def sent_by_others(self, command: ForeignCommand) -> None:
-        """Note that somebody else has published a start message of this runner again; its graph
-        then belongs to them."""
+        """Remember that another program has published a start message of this runner again, so that
+        the graph it starts is not taken for our run. `command`: the message as it was observed;
+        other commands are ignored."""
         run = run_in(command.umrf) if command.umrf else None
         if run is not None:
             self._others.put(run, True)
 
     def _is_of_others(self, robot: str, run: str) -> bool:
-        """Return whether somebody else has started the graph that a robot shows under this run's id."""
+        """Return whether another program has started the graph that a robot shows under this run's
+        id."""
         return bool(self._others.get(run) or self._elsewhere.get((robot, run)))
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Process graphs that an engine shows, in an answer or by feedback. Return at once: what
-        takes longer is queued for `run`."""
+        """Process the graphs (`snapshots`) that an engine shows in an answer or by feedback: those
+        of ended runs that move are queued for `run`. Return at once."""
         robot = engine.registration.name
         for each in snapshots:
             if each.run is None or not each.active or (robot, each.run) in self._looking:
@@ -143,9 +145,10 @@ class LateActivity:
             self._runs.reopen(*found, self._moves_again(found[0], shown))
 
     async def _known(self, run: str, robot: str) -> tuple[Run, int] | None:
-        """Return a run that is not open in this process, and its last seq. Return None if there is
-        no such run, if it cannot be decoded, or if the log of the robot says that somebody else
-        published its start again. Wait while the journal cannot be read."""
+        """Return a run that is not open in this process, and the number (`seq`) of its last event.
+        Return None if there is no such run, if it cannot be decoded, or if the log of the robot
+        says that another program published its start again. While the journal cannot be read, wait
+        and retry."""
         if (closed := self._runs.closed.get(run)) is not None:
             return closed
         while True:
@@ -174,8 +177,9 @@ class LateActivity:
 
 
 async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | None:
-    """Return the snapshot of the run in an answer that shows it moving, else None. Feedback may be
-    late or forged, so an answer decides; if none comes within 3 s, the feedback counts."""
+    """Ask an engine whether a run still moves. Return the run's snapshot in the answer if it shows
+    it moving, else None. If no answer comes within 3 s, return `shown`, the feedback that gave rise
+    to the question: feedback alone may be late or forged."""
     with anyio.move_on_after(_PATIENCE_S):
         while True:
             try:
@@ -191,15 +195,16 @@ async def _asked(engine: KnownEngine, shown: Snapshot, run: str) -> Snapshot | N
 
 
 def _is_older(shown: Snapshot, run: Run) -> bool:
-    """Return whether a snapshot is of an answer that was asked for just before the end of a run: the
-    answer that proved the end may have overtaken it. A clock that was set back hides nothing for
-    long."""
+    """Return whether the answer in which a snapshot came was requested shortly before the end of
+    the run, so that it says nothing about the time after. A snapshot requested long before the end
+    counts: the clock may have been set back."""
     if shown.asked_at is None or run.ended_at is None:
         return False
     return 0 < run.ended_at - shown.asked_at < _OVERTAKEN_US
 
 
 def _is_of(run: Run, engine: KnownEngine) -> bool:
-    """Return whether a run was sent to the present life of this engine."""
+    """Return whether a run was sent to the engine process that answers now, and not to one before
+    its restart. True if either is unknown."""
     lives = {run.incarnation, engine.standing.incarnation} - {None, ""}
     return run.engine == engine.registration.name and len(lives) <= 1

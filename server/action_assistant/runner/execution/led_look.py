@@ -27,16 +27,17 @@ _FRESH_S: Final = 3.0  # for which a look at a robot counts
 
 
 class Cleared(msgspec.Struct, frozen=True):
-    """A robot on which a piece may begin. `life`: of its engine; `at`: when it gave the answer on
-    which this rests, in seconds of the event loop."""
+    """A robot on which a piece may begin, as an answer has shown. `life`: the id of the engine's
+    process (another one after a restart); `at`: when the answer came, in seconds of the event loop.
+    """
 
     robot: KnownEngine
     life: str
     at: float
 
     def require_still(self) -> None:
-        """Look again, without waiting, in the step in which a piece leaves. Raise NotSent if the
-        robot has changed, or was looked at too long ago."""
+        """Check again, without waiting, right before a piece leaves. Raise NotSent if the engine
+        was restarted or became doubtful, or if the answer is too old."""
         standing = self.robot.standing
         if standing.incarnation not in {"", self.life} or standing.doubt:
             raise NotSent("its robot has changed before it left")
@@ -45,7 +46,7 @@ class Cleared(msgspec.Struct, frozen=True):
 
 
 class LedLook:
-    """Looks at a robot before something of a led run begins there."""
+    """Checks a robot before a start, or a piece, of a conducted run begins there."""
 
     def __init__(
         self, runs: OpenRuns, foreign_stops: ForeignStopLoop, indexing: IndexingWords
@@ -55,9 +56,9 @@ class LedLook:
         self._indexing = indexing
 
     async def items(self, robot: KnownEngine, answer: Answer, cleared: str = "") -> list[Item]:
-        """Return an item of each rule for a robot that has just given this answer. `cleared`: the life
-        of its engine that was looked at before the start, "" before that. Raise Unavailable if the
-        journal cannot be read."""
+        """Return the results of the checks that only conducted runs need, for a robot that has just
+        given this answer. `cleared`: the id of the engine's process as it was at the start of the
+        run, "" before that. Raise Unavailable if the journal cannot be read."""
         return [
             led_item(robot.registration),
             await self._indexing_item(robot, answer.incarnation, cleared),
@@ -71,8 +72,8 @@ class LedLook:
         return indexing_item(name, robot.facts, standing, word)
 
     async def before_piece(self, robot: KnownEngine, run: Requested) -> Cleared:
-        """Ask a robot, and return that a piece of a led run may begin on it. Raise NoAnswer with the
-        reason if none may."""
+        """Ask a robot, and return the proof that a piece of a conducted run may begin on it. Wait
+        for its answer. Raise NoAnswer with the reason if no piece may."""
         assert run.led is not None
         name = robot.registration.name
         await robot.indexed()
@@ -105,8 +106,9 @@ class LedLook:
         return Cleared(robot, answer.incarnation, at)
 
     def _require_known(self, name: str, run: str) -> None:
-        """Raise NoAnswer with the reason if a piece of this run on this robot is unknown, lost or
-        unconfirmed, or moves again: the robot gets no further one."""
+        """Raise NoAnswer with the reason if the robot `name` has a piece of this run that is
+        unknown, lost, unconfirmed or moving again: it gets no further one. `run`: the id of the
+        conducted run."""
         for opened in self._runs.on(name).values():
             piece = opened.run
             if piece.piece is None or piece.piece.run != run:
@@ -120,8 +122,9 @@ class LedLook:
                 raise NoAnswer(f"nobody knows whether {node} has ended there: {why}")
 
     async def before_going_on(self, robots: Robots, names: Iterable[str], run: Requested) -> None:
-        """Look at the robots of these names, side by side, before a held run goes on. Raise Conflict,
-        with the reason of each on which no piece may begin."""
+        """Check the robots with these names at the same time, before a held run goes on, and wait
+        for their answers. `run`: its first event. Raise Conflict with the reasons of all robots on
+        which no piece may begin."""
         found: dict[str, str] = {}
 
         async def look(name: str) -> None:
@@ -141,15 +144,16 @@ class LedLook:
             raise Conflict(f"Nothing has gone on. {reasons}", where=where)
 
     async def give_words(self, lives: dict[str, str], author: Author, reason: str) -> None:
-        """Store what a starter answers for at these robots, for these lives of their engines. Raise
+        """Store that the person `author` vouches that these engines index their files only once.
+        `lives`: the id of each engine's process, by robot; `reason`: given by the person. Raise
         Unavailable if the journal cannot store it."""
         for robot, life in lives.items():
             await self._indexing.give(robot, life, author, reason)
 
 
 async def _asked(robot: KnownEngine) -> Answer:
-    """Ask a robot; once more if this process stood still meanwhile. Raise NoAnswer or TimeoutError if it
-    does not answer."""
+    """Ask a robot, and return its answer; ask once more if this process stood still meanwhile.
+    Raise NoAnswer or TimeoutError if it does not answer."""
     began = anyio.current_time()
     try:
         with anyio.fail_after(_GET_S):

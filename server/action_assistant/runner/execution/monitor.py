@@ -53,8 +53,9 @@ _NO_PROOF: Final = "{doubt}, so that no answer proves anything"
 
 
 class Finding(NamedTuple):
-    """The result of a background job: an alarm, "" for none. `only_open`: it does not concern a run
-    that is over. `asks`: the engine should be asked again, since more is known now."""
+    """The result of a background job: an alarm (`code` and `text`, "" for none). `only_open`: the
+    alarm does not concern a run that is over. `asks`: the engine should be asked again, since more
+    is known now."""
 
     code: str = ""
     text: str = ""
@@ -67,8 +68,8 @@ Job: TypeAlias = Callable[[RunInWorker], Awaitable[Finding]]
 
 
 class EngineQuery(NamedTuple):
-    """One get: its number in the order of everything that is sent, and its time in seconds of the
-    event loop's clock."""
+    """One question (get) to an engine. `order`: its number in the order of everything that is sent;
+    `began`: its time in seconds of the event loop's clock."""
 
     order: int
     began: float
@@ -130,18 +131,17 @@ class Monitor:
     # --- what is sent -------------------------------------------------------------------------
 
     def starts(self, umrf: str, process: EngineProcess | None) -> None:
-        """Note that the runner sends the start of this graph (UMRF text) now, to this process. From
-        now on a refusal in the engine's log may belong to it."""
+        """Record that the runner sends the start of this graph (UMRF text) now. `process`: the
+        engine's process, None if unknown. From now on a refusal in the engine's log may belong to
+        this start."""
         self._start.begins()
         self._threads.starts(process)
         self.sends(umrf)
 
     def sends(self, umrf: str, *, beside: bool = False) -> None:
-        """Note that the runner sends this graph (UMRF text) now, so that the engine's next answer
-        is compared with it.
-
-        `beside`: the graph runs already, and one of its actions is started while others run.
-        """
+        """Record that the runner sends this graph (UMRF text) now, so that the engine's next answer
+        is compared with it. `beside`: the graph runs already, and one of its actions is started
+        while others run."""
         self._loading.sends(umrf, beside=beside)
         if beside:  # what begins when that arrives has no thread yet
             self._threads = EngineThreads()
@@ -149,22 +149,26 @@ class Monitor:
         self._sent_order = next(self._order)
 
     def recalls(self, umrf: str) -> None:
-        """Note that this graph was handed over before this monitor began."""
+        """Record that this graph (`umrf`: its text) was sent by an earlier process, before this
+        monitor began."""
         self.umrf = umrf
         self._loading.recalls(umrf)
 
     def stop_left(self) -> None:
-        """Note that a stop message has left: an answer that is asked for from now on may prove it."""
+        """Record that a stop message was sent: an answer that is asked for from now on may prove
+        that the run has stopped."""
         if self._stop_sent is None:
             self._stop_sent = next(self._order)
 
     def started_by_others(self) -> None:
-        """Note that the engine's log lines about a start may concern a start of somebody else."""
+        """Record that another program has started something, so that the engine's log lines about a
+        start may not be about ours."""
         self._start.doubt()
 
     def disturbed(self, *, meddles: bool) -> None:
-        """Note that somebody else may just have started the graph: an answer requested before this
-        proves nothing. `meddles`: the graph may go on with other arrows, or from another action."""
+        """Record that another program may just have started the graph: an answer requested before
+        this proves nothing. `meddles`: the graph may go on with other arrows, or from another
+        action."""
         self._disturbed = next(self._order)
         self._rest.forget()
         if meddles:
@@ -174,7 +178,7 @@ class Monitor:
     # --- what is heard ------------------------------------------------------------------------
 
     def hear(self, changes: RunChanges, line: str) -> None:
-        """Take in a line of the engine's log."""
+        """Process a line of the engine's log. If it refuses the start, add an alarm to `changes`."""
         if self._start.hear(line):
             words = refusals.in_words(changes.run.engine, self._start.words)
             changes.alarm(refusals.REFUSED, words)
@@ -186,8 +190,9 @@ class Monitor:
         ours: tuple[Snapshot, ...],
         parts: tuple[Snapshot, ...] = (),
     ) -> None:
-        """Process feedback, oldest first: `ours` are snapshots of this run, `parts` those of graphs
-        with the names of its sub-graphs."""
+        """Process feedback, and add the news to `changes`. `standing`: the condition of the engine;
+        `ours`: snapshots of this run, oldest first; `parts`: snapshots of graphs that have names of
+        its sub-graphs."""
         run = changes.run
         if self._is_alone(run, standing):
             self._loading.see((*ours, *parts))
@@ -202,9 +207,9 @@ class Monitor:
             changes.observe(tuple(replace(each, since_asked=asked) for each in news))
 
     def _is_alone(self, run: Run, standing: Standing) -> bool:
-        """Return whether only one engine can have received starts, in the life that the run was
-        sent to. If not, the sender of earlier feedback is unknown, so observations of loading
-        are forgotten."""
+        """Return whether there is one engine only, and still the process that the run was sent to.
+        If not, the sender of earlier feedback is unknown, and observations of loading are
+        forgotten. `standing`: the condition of the engine."""
         lives = {run.incarnation, standing.incarnation} - {None, ""}
         if not standing.doubt and len(lives) <= 1:
             return True
@@ -214,11 +219,13 @@ class Monitor:
     # --- what is asked ------------------------------------------------------------------------
 
     def begin_query(self) -> EngineQuery:
-        """Note that the engine is being asked now."""
+        """Return a mark of the get that is sent to the engine now; give it to `answered` with the
+        answer."""
         return EngineQuery(next(self._order), anyio.current_time())
 
     def pace(self, run: Run) -> float:
-        """Return after how many seconds the engine is to be asked again, at the least."""
+        """Return the longest time in seconds until the engine is to be asked again; it is shorter
+        during a Stop."""
         hurry = run.desired == "stopped" or self._rest.pending
         hurry = hurry and not run.loading  # feedback tells when a loading action begins
         return _STOP_POLL_S if hurry else _POLL_S
@@ -229,21 +236,24 @@ class Monitor:
         return jobs
 
     def stood_still(self, seconds: float) -> None:
-        """Leave out a time in which this process stood still: it is no silence of the engine."""
+        """Do not count `seconds` in which this process stood still as silence of the engine."""
         self._heard_at += seconds
         self._began_at += seconds
         if self._absent is not None:
             self._absent += seconds
 
     def unanswered(self, changes: RunChanges, standing: Standing, why: str) -> None:
-        """Note that the engine has not answered, and why, if known."""
+        """Process that the engine has not answered a get, and add the conclusions to `changes`.
+        `standing`: its condition; `why`: the reason, "" if unknown."""
         self._is_alone(changes.run, standing)
         self._hear_nothing(changes, why)
 
     def answered(
         self, changes: RunChanges, standing: Standing, answer: Answer, look: EngineQuery
     ) -> None:
-        """Process the answer to one get; `standing`: the engine's standing after it."""
+        """Process the answer to one get, and add the conclusions to `changes`. `standing`: the
+        engine's condition after it; `look`: the mark that `begin_query` returned when it was sent.
+        """
         self._take(changes, standing, answer, look)
         self._compare(changes.run, answer, look.order)
 
@@ -257,7 +267,8 @@ class Monitor:
     def _take(
         self, changes: RunChanges, standing: Standing, answer: Answer, look: EngineQuery
     ) -> None:
-        """Draw all conclusions that one answer allows."""
+        """Add all conclusions that one answer allows to `changes`: observations of the run, its
+        loss after a restart of the engine, or its end. The parameters are those of `answered`."""
         run = changes.run
         name = run.graph_name
         if len({run.incarnation, answer.incarnation} - {None, ""}) > 1:
@@ -292,8 +303,9 @@ class Monitor:
             self._conclude(changes, shown, ours, answer, look)
 
     def _compare(self, run: Run, answer: Answer, order: int) -> None:
-        """Start one comparison of the engine's graph with the sent one. A difference alone never
-        stops the engine."""
+        """Queue one comparison of the engine's graph text in an answer with the text that was sent,
+        if that was not compared yet. `order`: the number of the get. A difference raises an alarm
+        and never stops the engine."""
         sent, text = self._sent, answer.texts.get(run.graph_name)
         if sent is None or text is None or run.graph_state is None:
             return
@@ -309,7 +321,7 @@ class Monitor:
         self._jobs.append(compare)
 
     def _note(self, changes: RunChanges, shown: list[Snapshot]) -> None:
-        """Add what an answer shows and was not known."""
+        """Add the snapshots of an answer that show anything new to `changes`."""
         usual = LastLook(self._seen_wall, self._seen_asked)
         self._seen_wall, self._seen_asked = shown[0].at, shown[0].asked_at
         looks = {each.graph: self._parts.last_look(each.graph, usual) for each in shown}
@@ -324,8 +336,9 @@ class Monitor:
     def _missing(
         self, changes: RunChanges, standing: Standing, other: Snapshot | None, answer: Answer
     ) -> None:
-        """Draw the conclusions from an answer that does not show this run; `other`: a graph of the
-        same name in the answer."""
+        """Add to `changes` what follows from an answer that does not show this run: it is lost,
+        refused or not begun yet. `other`: a graph of the same name in the answer, None if there is
+        none."""
         self._rest.forget()
         run = changes.run
         if run.graph_state is not None:
@@ -350,8 +363,9 @@ class Monitor:
             changes.tell(Silent(answer.at, since, "The engine answers but does not show this run."))
 
     def _refused_and_absent(self, standing: Standing) -> bool:
-        """Return whether the engine has received the start, has refused it, and has not held it for
-        a while since: then no part of it has begun or can begin."""
+        """Return whether the engine has received the start, has refused it, and has not shown the
+        run for a while since. Then no part of the run has begun or can begin. `standing`: the
+        condition of the engine."""
         if not self._start.words or standing.doubt:
             self._absent = None
             return False
@@ -366,8 +380,9 @@ class Monitor:
         answer: Answer,
         look: EngineQuery,
     ) -> None:
-        """Decide whether the run is over, or why that is not proven. `shown`: the graph and its
-        possible sub-graphs; `ours`: the graph and the sub-graphs that it has begun."""
+        """Decide by one answer whether the run is over, or why that is not proven, and add that to
+        `changes`. `shown`: the snapshots of the graph and its possible sub-graphs; `ours`: those of
+        the graph and of the sub-graphs that it has begun; `look`: the mark of the get."""
         if look.order < self._disturbed:
             return
         own, at_rest = shown[0], self._rest.seen(shown, look.began)
@@ -420,27 +435,27 @@ class Monitor:
             self.trouble = f"{', '.join(run.active) or own.graph} has not stopped yet"
 
     def _is_told_by_shape(self, run: Run, shown: Sequence[Snapshot]) -> bool:
-        """Return whether the states of a piece tell its outcome. It has one action, which nothing
-        can begin again, so one answer is enough; after a Stop its usual proof is asked for."""
+        """Return whether the states of a piece show its outcome, so that this one answer proves its
+        end: it has one action, which nothing can begin again. After a Stop the usual proof is
+        needed instead."""
         if run.piece is None or run.desired == "stopped" or len(shown) > 1 or run.inner:
             return False
         return outcome_of(shown[0].state, shown[0].nodes.get(run.piece.node, "")) is not None
 
     def _threads_explain(self, ours: Sequence[Snapshot], process: EngineProcess | None) -> bool:
-        """Return whether the threads of the engine prove that the code of all doubtful actions has
-        ended.
-
-        That holds only for graphs that this run has begun: a hanging thread of an earlier run's
-        graph began before this start.
-        """
+        """Return whether the threads of the engine's process prove that the code of all doubtful
+        actions has ended. That holds only if all of them are in graphs of this run (`ours`): a
+        hanging thread of an earlier run began before this start. `process`: None if it cannot be
+        observed, then the result is false."""
         begun = {each.graph for each in ours}
         return self._doubts.open_graphs <= begun and self._threads.have_ended(process)
 
     def _still_loading(
         self, changes: RunChanges, ours: list[Snapshot], answer: Answer
     ) -> tuple[LoadingAction, ...]:
-        """Return the actions that may still be loading in a graph at rest, and report them if that
-        lasts."""
+        """Return the actions that may still be loading in a graph that looks at rest; raise an
+        alarm in `changes` if that lasts. `ours`: the snapshots of this run. Arrows that are not
+        known yet are read in the background."""
         if self._exact:
             return ()
         if not self._rest.pending:
@@ -466,8 +481,9 @@ class Monitor:
     def _report_loading(
         self, changes: RunChanges, actions: Sequence[LoadingAction], waited_s: float
     ) -> None:
-        """Report that these actions may be loading since `waited_s` seconds or, if there are none,
-        that loading is over. The time is reported again each time it has doubled."""
+        """Report in `changes` that these actions may be loading for `waited_s` seconds or, if there
+        are no actions, that loading is over. The time is reported again each time it has doubled.
+        """
         run = changes.run
         why, known = in_words(actions), run.loading
         if not why and not known:
@@ -518,7 +534,9 @@ class Monitor:
         return Finding(stall.STALLED, text, only_open=True)
 
     def _look_for_trouble(self, changes: RunChanges, shown: list[Snapshot], asked: float) -> None:
-        """Check an open run for faults that the answer shows, and report them."""
+        """Check an open run for faults that the answer shows: a start refused and begun all the
+        same, and a standstill. `shown`: the snapshots of its graph and sub-graphs; `asked`: when
+        the get was sent, in seconds of the event loop."""
         run, own = changes.run, shown[0]
         if self._start.words and not _never_began(own):
             text = (
@@ -533,12 +551,12 @@ class Monitor:
 
 
 def _has_begun(run: Run) -> bool:
-    """Return whether an action of the run was ever seen to begin, perhaps by a start that somebody
-    else repeated."""
+    """Return whether an action of the run was ever seen to begin, perhaps by a start that another
+    program repeated."""
     return any(action.visits for action in run.actions.values())
 
 
 def _never_began(own: Snapshot) -> bool:
-    """Return whether an engine holds a graph of which nothing has begun. All its states show that,
-    unlike those of a graph that has ended."""
+    """Return whether all states of a graph that an engine shows prove that no part of it has begun;
+    the states of a graph that has ended do not."""
     return NEVER_BEGAN.issuperset({own.state, *own.nodes.values()})

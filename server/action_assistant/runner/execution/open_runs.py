@@ -37,7 +37,7 @@ class OpenRuns:
         self._news = anyio.Event()
 
     def next_number(self) -> int:
-        """Return the number for a new run. Each number is given once."""
+        """Return the number for a new run; no two calls return the same number."""
         self.last_number += 1
         return self.last_number
 
@@ -53,10 +53,10 @@ class OpenRuns:
         piece: PieceHooks | None = None,
         pressed: Callable[[Author], None] | None = None,
     ) -> OpenRun:
-        """Open a stored run on a link, and announce it. `seq` is the number of the run's last
-        stored event; `owns_link` says that the link is closed with the run. A run without a
-        link, whose robot is not registered any more, gets a link that never answers. `piece`: ties
-        a piece to its conducted run; `pressed`: called first when somebody stops a conducted run."""
+        """Open a stored run on a link, and announce it. `seq`: the number of the run's last stored
+        event; `owns_link`: the link is closed with the run; `link`: None if the robot is not
+        registered any more: such a run gets a link that never answers. `piece`: ties a piece to its
+        conducted run; `pressed`: called first when a person stops a conducted run."""
         opened = OpenRun(
             run,
             link=link
@@ -77,8 +77,9 @@ class OpenRuns:
         return opened
 
     def drive(self, opened: OpenRun, order: Order | None = None, incarnation: str = "") -> None:
-        """Drive an open run in a task of its own. With an order, first start it, exactly once, in
-        the life `incarnation` of the engine; without one, continue from its present state."""
+        """Drive an open run in a task of its own; the call does not wait. With an order, the start
+        message is sent first, exactly once, and recorded with `incarnation`, the id of the engine
+        process that was checked for it; without one, the run continues from its present state."""
         self._runtime.tasks.start_soon(self._drive, opened, order, incarnation)
 
     async def _drive(self, opened: OpenRun, order: Order | None, incarnation: str) -> None:
@@ -90,7 +91,8 @@ class OpenRuns:
         self._news = anyio.Event()
 
     def reopen(self, run: Run, seq: int, event: MovesAgain) -> None:
-        """Open a run that was over and stored, since it moves again."""
+        """Open a run that had ended and was stored, since it moves again, and drive it. `seq`: the
+        number of its last stored event; `event`: says that it moves."""
         opened = self.open(run, self._robots.link(run.engine), owns_link=False, seq=seq)
         opened.tell(event)
         self.drive(opened)
@@ -102,7 +104,8 @@ class OpenRuns:
         self._watchers.append(watcher)
 
     async def change(self, run: str, revision: int) -> None:
-        """Wait until an open run has another revision than `revision`, or is over and stored."""
+        """Wait until an open run has another revision number than `revision`, or is over and
+        stored. Return at once if it is not open."""
         while run in self.by_id and self.by_id[run].revision == revision:
             await self._news.wait()
 
@@ -116,8 +119,9 @@ class OpenRuns:
             watcher(opened)
 
     def hear_of(self, robot: str, command: ForeignCommand) -> Run | None:
-        """Pass a command that somebody else has sent to a robot on to the runs there. Return the run
-        that it concerns, if any: one of its graph before others."""
+        """Pass a command that another program has sent to a robot on to the runs there. Return the
+        run that it most likely concerns, one of the same graph before others; None if no run is
+        open there."""
         opened = [each for each in self.on(robot).values() if each.run.led is None]
         for each in opened:
             each.hear_of(command)
@@ -132,8 +136,8 @@ class OpenRuns:
         return opened.run if opened is not None else await self._history.run(run)
 
     def on(self, engine: str) -> dict[str, OpenRun]:
-        """Return the runs on an engine without an end, by id. A graph with the id of any other run
-        was sent by somebody else."""
+        """Return the runs on an engine that have not ended, by id. A graph that the engine shows
+        under any other id was started by another program."""
         found = self.by_id.items()
         return {
             run: each for run, each in found if engine in each.run.robots and each.run.end is None

@@ -18,16 +18,17 @@ from action_assistant.umrf.semantics import Returned
 
 
 class GivenOutputs(msgspec.Struct, frozen=True):
-    """The outputs of a piece that has ended, as `PieceEnded` has them: JSON texts by flat name, and the
-    names of those that the action has not set."""
+    """The output values of a piece that has ended, as `PieceEnded` stores them. `values`: JSON
+    texts by flat name; `unset`: the names of outputs that the action has not set."""
 
     values: dict[str, str] = {}
     unset: tuple[str, ...] = ()
 
 
 class PieceValues:
-    """Fills inputs into the texts of pieces, and reads their outputs. `texts`: by full name of the
-    action; `keeping`: the engines that have the helper package."""
+    """Fills the values of inputs into the texts of pieces, and reads the outputs of pieces.
+    `texts`: the pieces by full name of their action; `keeping`: the robots that have the helper
+    package, by which outputs can be read."""
 
     def __init__(self, texts: Mapping[str, PieceText], keeping: Collection[str]) -> None:
         self._texts = texts
@@ -37,7 +38,8 @@ class PieceValues:
         self._said: set[tuple[str, tuple[str, ...]]] = set()
 
     def text(self, step: Step, piece: str) -> str:
-        """Return the text of a piece of this step. `piece`: its id."""
+        """Return the UMRF text of the piece of this step, with the values of its inputs filled in.
+        `piece`: the id of its run."""
         text = self._texts[step.node]
         parts = text.parts
         if self._kept(step):
@@ -61,7 +63,8 @@ class PieceValues:
     def ended(
         self, step: Step, outcome: Precondition, how: Literal["shape", "word", "unsent"], at: int
     ) -> PieceEnded:
-        """Return the event that ends the call of a step at `at` (microseconds UTC)."""
+        """Return the event that ends the call of a step, with the output values. `outcome` and
+        `how`: as in `Conductor._finish`; `at`: µs UTC."""
         given = self._given(step, outcome, how)
         return PieceEnded(
             at=at,
@@ -77,8 +80,8 @@ class PieceValues:
         )
 
     def lacking(self, ended: PieceEnded) -> str:
-        """Return what a call that has ended has not given, as the end of a sentence; "" where that is
-        nothing, or was said before."""
+        """Return, as the end of a sentence, which outputs a call that has ended did not set; "" if
+        none is unset, or if that was reported before."""
         if not ended.unset or ended.how == "unsent" or (ended.node, ended.unset) in self._said:
             return ""
         self._said.add((ended.node, ended.unset))
@@ -89,7 +92,8 @@ class PieceValues:
         return f"{known} {names}: nothing is handed on from there."
 
     def _kept(self, step: Step) -> tuple[KeptOutput, ...]:
-        """Return the outputs that keepers of a step take; none on a robot without the package."""
+        """Return the outputs of a step that keepers (helper actions in its piece) hold for reading;
+        () if its robot does not have the helper package."""
         if step.engine not in self._keeping:
             return ()
         if step.node not in self._outputs:
@@ -111,7 +115,7 @@ class PieceValues:
 
 
 def returned_of(ended: PieceEnded) -> Returned:
-    """Return the end of a call as the engine of the whole graph takes it."""
+    """Return the end of a call in the form in which the engine of the whole graph takes it."""
     return Returned(
         number=ended.call,
         result="on_true" if ended.outcome == "on_stopped" else ended.outcome,

@@ -52,14 +52,15 @@ class RunChanges:
         return iter(self._changes)
 
     def tell(self, event: RunEvent, author: str = "") -> None:
-        """Add an event; `author` is the id of a person, or "" for the engine."""
+        """Add an event, and fold it into `run`. `author`: the id of a person, "" for the engine."""
         if self.run.end is not None and not isinstance(event, AlarmRaised | MovesAgain):
             return
         self.run = follow(self.run, event)
         self._changes.append(RunChange(event, author, self.run))
 
     def observe(self, seen: tuple[Seen, ...]) -> None:
-        """Add observations of the engine, and an alarm for each hazard that people must know."""
+        """Add what was seen of the engine (`seen`) as one event, and an alarm for each hazard in it
+        that people must know."""
         self.tell(Observed(self._clock_us(), thin(self.run, seen)))
         for item in seen:
             if isinstance(item, Hazard) and (item.effect != "goes on" or item.code in _WITHOUT_END):
@@ -72,17 +73,16 @@ class RunChanges:
             self.tell(AlarmRaised(self._clock_us(), code, text))
 
     def end(self, state: End, detail: str) -> None:
-        """End the run in this state, unless it has ended already."""
+        """End the run in this state, unless it has ended already. `detail`: the sentence for
+        people."""
         if self.run.end is None:
             self.tell(Ended(self._clock_us(), state, self._result(), detail))
 
     def lose(self, why: str) -> None:
-        """Note that the engine does not hold the run any more. A simulated run ends as “lost”. On a
-        real robot the code of the actions may go on, so the run does not end: it is marked as lost,
-        with an alarm.
-
-        `why`: the reason, as a sentence. A second call with the same reason adds nothing.
-        """
+        """Record that the engine does not hold the run any more. A simulated run ends as “lost”. On
+        a real robot the code of the actions may go on, so the run does not end: it is marked as
+        lost, with an alarm. `why`: the reason, as a sentence. A second call with the same reason
+        adds nothing."""
         if self.run.simulated:
             self.end("lost", why)
         elif self.run.lost != why:
@@ -90,7 +90,8 @@ class RunChanges:
             self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why} {LOOK_AT_IT}")
 
     def doubt(self, why: str) -> None:
-        """Note that the code of an action may go on, and that the engine will never tell of its end."""
+        """Record, with an alarm, that the code of an action may go on and that the engine will
+        never report its end. `why`: the reason, without a full stop."""
         self.tell(Unconfirmed(self._clock_us(), why))
         self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {LOOK_AT_IT}")
 
@@ -116,7 +117,9 @@ class RunChanges:
         self.rests(AtRest(None, self._clock_us(), how), state, run.doubt or run.lost or how)
 
     def rests(self, seen: AtRest, state: End, why: str, author: str = "") -> None:
-        """End the run by an observation of rest, where no answer of the engine proves any."""
+        """End the run in this state because it was seen at rest, where no answer of the engine
+        proves it. `seen`: who saw it, when and how; `why`: the sentence for people; `author`: the
+        id of that person, "" for a program."""
         self.tell(Ended(seen.at, state, self._result(), why, seen), author)
 
     def _result(self) -> str | None:

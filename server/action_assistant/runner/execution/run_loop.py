@@ -81,15 +81,16 @@ class _HeldBack(NotSent):
 
 class PieceHooks(msgspec.Struct, frozen=True, kw_only=True):
     """The tie of a piece to its conducted run. `changed` is called after each change of the piece;
-    `may_leave` right before its start leaves, and raises NotSent if it may not leave any more."""
+    `may_leave` right before its start message leaves, and raises NotSent if it may not leave any
+    more."""
 
     changed: "Callable[[OpenRun], None]"
     may_leave: Callable[[], None]
 
 
 class OpenRun:
-    """A run that is not over. `changed` is called after every visible change, and must not change a
-    run."""
+    """Drives a run that is not over: sends its start and its stops, asks its engine, and stores its
+    events. `changed` is called after every visible change, and must not change a run."""
 
     def __init__(
         self,
@@ -141,9 +142,10 @@ class OpenRun:
     # --- what people want ---------------------------------------------------------------------
 
     def stop(self, author: Author, stop_id: str) -> None:
-        """Record that a person wants the run stopped, and send stops until the run has ended. The
-        call never waits. If it fails by a fault of the runner, stops are sent all the same, and
-        each of them reaches for the pieces that the call has not reached."""
+        """Record that `author` wants the run stopped, and send stop messages until the run has
+        ended. The call never waits. If it fails by a fault of the runner, stops are sent all the
+        same, and each of them also stops the pieces that this call has not stopped. `stop_id`: the
+        id of the press, by which a repeated press is recognised."""
         pressed = self._stopping.press(author, stop_id)
         self._handing.cancel()
         try:
@@ -162,16 +164,16 @@ class OpenRun:
         return self._doubts.places
 
     async def pause(self, author: Author) -> None:
-        """Record that a person wants the run paused, and tell the engine. Raise NotSent if the
-        message could not be sent."""
+        """Record that `author` wants the run paused, and send that to the engine. Do not wait for
+        its effect. Raise NotSent if the message could not be sent."""
         self._doubts.reach()
         self.tell(PauseRequested(self._clock_us(), author), author.id)
         await self._link.pause(self.run.graph_name)
         self.look()
 
     async def resume(self, author: Author) -> None:
-        """Record that a person wants the run to go on, and tell the engine. Raise NotSent if the
-        message could not be sent."""
+        """Record that `author` wants the run to go on, and send that to the engine. Do not wait for
+        its effect. Raise NotSent if the message could not be sent."""
         self.tell(ResumeRequested(self._clock_us(), author), author.id)
         await self._link.resume(self.run.graph_name)
         self.look()
@@ -179,9 +181,10 @@ class OpenRun:
     async def modify(
         self, author: Author, order: Order, version: str, digest: str, continue_from: str
     ) -> None:
-        """Record that a person gave the run another graph, and send it to the engine. Raise NotSent
-        if it could not be sent, EngineRefused if the engine refuses it, and OutcomeUnknown if
-        nobody knows whether the engine runs it."""
+        """Record that `author` gave the run another graph, and send it (`order`) to the engine.
+        `version` and `digest`: of the new graph; `continue_from`: the full name of an action to
+        start then, "" for none. Raise NotSent if it could not be sent, EngineRefused if the engine
+        refuses it, and OutcomeUnknown if it cannot be known whether the engine runs it."""
         asked = ModifyRequested(
             at=self._clock_us(),
             author=author,
@@ -216,17 +219,19 @@ class OpenRun:
         self._compare_change(order, continue_from)
 
     def _compare_change(self, order: Order, continue_from: str) -> None:
-        """Have the next answer of the engine compared with a change that may have left."""
+        """Have the next answer of the engine compared with a changed graph (`order`) that was or
+        may have been sent. `continue_from`: the action that is started with it, "" for none."""
         self.watch.sends(order.umrf, beside=bool(continue_from))
         self.look()
 
     @property
     def pauses(self) -> bool:
-        """True when pausing is safe on this engine."""
+        """True if pausing is safe on the engine of the run."""
         return self._link.pauses
 
     def hear_of(self, command: ForeignCommand) -> None:
-        """Process a command that somebody else has sent to the robot of this run."""
+        """Process a command that another program has sent to the robot of this run: later proofs
+        allow for it, and people get an alarm if it concerns the run."""
         if self._is_ours(command.graph):
             self._doubts.reach()
         if command.command in SET_GOING and command.graph == self.run.graph_name:
@@ -242,8 +247,8 @@ class OpenRun:
     # --- what happens -------------------------------------------------------------------------
 
     def tell(self, event: RunEvent, author: str = "") -> None:
-        """Show an event to everybody, and store it as soon as the journal can. `author` is the id
-        of a person, or "" for the engine."""
+        """Show an event to people at once, and store it as soon as the journal can. `author`: the
+        id of a person, "" for the engine."""
         with self._changing() as changes:
             changes.tell(event, author)
 
@@ -278,8 +283,9 @@ class OpenRun:
         self._changed(self)
 
     async def drive(self, order: Order | None, incarnation: str = "") -> None:
-        """Drive the run until it is over and stored. With an order, first start it, exactly once;
-        without one, continue from its present state."""
+        """Drive the run until it is over and stored. With an order, the start message is sent
+        first, exactly once, and recorded with `incarnation`, the id of the engine process that was
+        checked for it; without one, continue from the present state of the run."""
         async with anyio.create_task_group() as outer:
             outer.start_soon(self.recorder.run)
             if order is None:
@@ -308,8 +314,8 @@ class OpenRun:
                 self.watch.recalls(umrf)
 
     def moves_again(self, event: MovesAgain) -> bool:
-        """Reopen the run, which had ended and moves. Return False if its end is stored and its task
-        has ended."""
+        """Reopen the run, which had ended and moves, and return True. Return False, without a
+        change, if its end is stored and its task has ended."""
         if self._is_left or self.run.end is None:
             return not self._is_left
         umrf, self.watch = self.watch.umrf, self._watched()
@@ -356,8 +362,8 @@ class OpenRun:
             tasks.cancel_scope.cancel()
 
     async def _send_stops(self) -> None:
-        """Send stop messages from the first press on, until cancelled. A simulated engine that does not
-        obey is given up."""
+        """Send stop messages from the first press on, again and again, until cancelled. A simulated
+        engine that does not obey in time is switched off, and its run ends as lost."""
         async for attempt in self._stopping.attempts():
             failed = await send_stop(self._link, self.run.graph_name)
             if not failed:
@@ -417,8 +423,8 @@ class OpenRun:
                     wait = max(0.0, self.watch.pace(self.run) - cost)
 
     async def _work_on(self, job: Job) -> None:
-        """Carry out work of the monitor. It only helps people, so it is given up where no worker can be
-        had."""
+        """Await a job of the monitor, and raise the alarm that it finds. Such jobs only inform
+        people, so a job is dropped if no worker is free."""
         try:
             found = await job(self._run_in_worker)
         except Refused as why:
@@ -445,7 +451,9 @@ class OpenRun:
                 await anyio.sleep(0.2)
 
     async def _publish(self, order: Order, incarnation: str) -> None:
-        """Send the start message, once; it is never repeated, whatever happens."""
+        """Send the start message once; it is never repeated, whatever happens. `incarnation`: the
+        id of the engine process that was checked for the start, recorded with it. If the message
+        has certainly not left, the run ends as refused or stopped."""
         if self.run.end is not None:  # refused after it was stored
             return
         at = self._clock_us()
@@ -541,30 +549,34 @@ class OpenRun:
     # --- without a proof ----------------------------------------------------------------------
 
     def lose(self, why: str) -> None:
-        """Note that it is unknown whether the code of the run has ended; `why`: the reason."""
+        """Record that it is unknown whether the code of the run has ended; `why`: the reason, as a
+        sentence."""
         with self._changing() as changes:
             changes.lose(why)
 
     def confirm_rest(self, author: Author, how: str) -> None:
-        """End the run by the word of a person who has seen that it rests, where no answer of the engine
-        can prove it."""
+        """End the run because the person `author` has seen it at rest, where no answer of the
+        engine can prove it. `how`: how it was seen."""
         why = self.run.doubt or self.run.lost or self.watch.trouble
         with self._changing() as changes:
             changes.rests(AtRest(author, self._clock_us(), how), "error", why, author.id)
 
     def rests_as(self, piece: Run) -> None:
-        """End the run as a piece of it has ended that somebody or something has seen at rest, where
-        no answer of its robot proves that."""
+        """End the run in the state in which `piece` ended, one of its pieces. Does nothing unless a
+        person's statement or the end of the code, not an answer of its robot, showed that piece at
+        rest."""
         if piece.at_rest is not None and piece.end is not None and self.run.end is None:
             with self._changing() as changes:
                 changes.rests(piece.at_rest, piece.end, f"{piece.engine}: {piece.detail}")
 
     def end(self, state: End, detail: str) -> None:
-        """End the run in this state, unless it has ended already."""
+        """End the run in this state, unless it has ended already. `detail`: the sentence for
+        people."""
         with self._changing() as changes:
             changes.end(state, detail)
 
     def alarm(self, code: str, text: str) -> None:
-        """Raise an alarm for people, unless the run has the same alarm already."""
+        """Raise an alarm for people (its code and its sentence), unless the run has the same one
+        already."""
         with self._changing() as changes:
             changes.alarm(code, text)

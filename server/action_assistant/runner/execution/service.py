@@ -68,8 +68,9 @@ _OUTCOMES: Final[Mapping[str, Precondition]] = {
 
 
 class ExecutionService:
-    """Carries out commands of people on runs and robots. `opened` opens it, with its tasks
-    running."""
+    """Carries out commands of people on runs and robots. Use the context manager `opened` to get
+    one with its tasks running. In its methods, `author` is the person (or program) in whose name
+    the command is recorded."""
 
     def __init__(
         self,
@@ -150,18 +151,19 @@ class ExecutionService:
 
     async def start(self, request: StartRequest, author: Author) -> Started:
         """Carry out a start, at most once per request id. Return after the one start message has
-        left. Raise a subclass of Refused if the start is refused; nothing was sent then."""
+        been sent. Raise a subclass of Refused if the start is refused; nothing was sent then."""
         return await self._starts.start(request, author)
 
     async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
-        """Start one version on several robots. Every start is accepted before the first message
-        leaves. Raise a subclass of Refused if one start is refused; nothing was sent to any
-        robot then."""
+        """Start one version on several robots. All starts are checked and accepted before the first
+        message is sent. Raise a subclass of Refused if one start is refused; nothing was sent to
+        any robot then."""
         return await self._starts.start_group(group, author)
 
     async def look(self, group: GroupRequest, starter: str = "") -> list[Preflight]:
-        """Return the pre-flight of a start on each engine; `starter` is the id of the person who
-        would start. Only a get is sent."""
+        """Return the pre-flight (the checks before a start) for each engine that `group` names.
+        `starter`: the id of the person who would start. Nothing is started: engines are only asked
+        for their graphs."""
         return await self._checks.look(group, starter)
 
     def under_way(self, request_id: str) -> bool:
@@ -170,18 +172,20 @@ class ExecutionService:
         return self._starts.is_under_way(request_id)
 
     def next_number(self) -> int:
-        """Return the number for a new run. Each number is given once."""
+        """Return the number for a new run; no two calls return the same number."""
         return self._runs.next_number()
 
     async def change(self, run: str, revision: int) -> None:
-        """Wait until an open run has another revision than `revision`, or is over and stored."""
+        """Wait until an open run has another revision number than `revision`, or is over and
+        stored."""
         await self._runs.change(run, revision)
 
     # --- stop, pause, resume ------------------------------------------------------------------
 
     def stop_all(self, author: Author, stop_id: str = "") -> StoppedAll:
-        """Begin to stop all runs and all graphs that others have started. Return which runs and
-        graphs are being stopped. The call never waits."""
+        """Begin to stop all runs and all graphs that other programs have started. Return which runs
+        and graphs are being stopped, and the robots that cannot be reached. The call never waits.
+        `stop_id`: the id of the press, by which a repeated press is recognised."""
         self._stops.note("", author, stop_id)
         stopped = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
         runs = [run for run in stopped if not self.open[run].is_led]
@@ -189,9 +193,9 @@ class ExecutionService:
         return StoppedAll(runs, self.foreign_stops.graphs(), self.robots.unheard())
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
-        """Begin to stop all runs on a robot and all graphs that others have started there. Return
-        the ids of the runs and the names of the graphs. Raise NotFound if the robot is not
-        registered."""
+        """Begin to stop all runs on the robot `name` and all graphs that other programs have
+        started there. Return the ids of the runs and the names of the graphs. The call never waits.
+        Raise NotFound if the robot is not registered."""
         graphs = self.foreign_stops.stop(author, self._runs.on, name)
         self._stops.note(name, author)
         stopped = [run for run in self._runs.on(name) if self._stop(run, author, "")]
@@ -199,10 +203,10 @@ class ExecutionService:
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
         """Begin to stop a run, or all runs of a group, and return the ids of the runs that are
-        being stopped. The Stop of a piece is one of its whole run; once that is over, a Stop of
-        either reaches the pieces that move again. The list is empty if all is over already. The
-        call waits only to look up an id that is not open. Raise NotFound if there is no such run
-        or group."""
+        being stopped; none if all is over already. A Stop of a piece stops its whole conducted run;
+        once that is over, a Stop of either reaches the pieces that move again. The call does not
+        wait for an effect, only to read a run that is not open. Raise NotFound if there is no such
+        run or group."""
         for each in (whole_of(run), run):
             if each in self.open and self._stop(each, author, stop_id):
                 return [each]
@@ -246,9 +250,10 @@ class ExecutionService:
         )
 
     async def go_on(self, run: str, asked: GoOnRequest, author: Author) -> Run:
-        """Let a held run go on, which may start actions on its robots. Raise NotFound if there is no
-        such run, Conflict if it is over, not held as the person has seen it, or one of its robots
-        may begin nothing: only those that answer now are given more."""
+        """Let a held conducted run go on, which may start actions on its robots; return the run.
+        `asked`: since when the person saw it held. Raise NotFound if there is no such run, Conflict
+        if it is over, being stopped, not held since that time, or one of its robots does not answer
+        or may begin nothing."""
         opened = await self._movable(run)
         held = opened.run.held
         if held is None:
@@ -264,8 +269,9 @@ class ExecutionService:
         return opened.run
 
     async def give_outcome(self, run: str, asked: WordRequest, author: Author) -> Run:
-        """Take the outcome of an action in a conducted run from a person, where nothing shows it.
-        Raise NotFound if there is no such run, Conflict if it is not asked for."""
+        """Take the outcome of an action in a conducted run from a person, where the robot does not
+        show it; return the run. Raise NotFound if there is no such run, Conflict if no outcome is
+        asked for."""
         opened = await self._movable(run)
         word = Word(
             outcome=_OUTCOMES[asked.outcome], by=author, reason=asked.reason, piece=asked.piece
@@ -274,8 +280,10 @@ class ExecutionService:
         return opened.run
 
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
-        """Record that a person has seen a run at rest, where its engine cannot prove that. Raise
-        NotFound if there is no such run, and what `interventions.confirm_rest` raises."""
+        """Record that a person has seen a run at rest (nothing moves), where its engine cannot
+        prove that; return the run. `asked`: how it was seen. Raise NotFound if there is no such
+        run, Conflict if a piece of it may still move, and what `interventions.confirm_rest` raises.
+        """
         opened = await self._movable(run)
         for each in self.open.values():
             piece = each.run.piece
@@ -334,7 +342,7 @@ class ExecutionService:
         return list(self.robots.all(self.foreign_stops.trouble))
 
     def robot_view(self, name: str) -> Robot:
-        """Return one engine as people see it. Raise NotFound if there is none of this name."""
+        """Return one engine as people see it. Raise NotFound if no robot has this name."""
         if name == SIMULATOR:
             return next(self.robots.all())
         return self.robots.robot(name, self.foreign_stops.trouble)
@@ -369,8 +377,8 @@ class ExecutionService:
     # --- what robots report -------------------------------------------------------------------
 
     def _hear_of(self, engine: KnownEngine, command: ForeignCommand) -> None:
-        """Process a command that somebody else has sent to a robot: runs and Stops there take note
-        of it, and it is recorded with the run that it concerns."""
+        """Process a command that another program has sent to a robot: pass it to the open runs and
+        Stops there, and record it in the robot's log with the run that it concerns."""
         robot = engine.registration.name
         self.foreign_stops.hear_of(robot, command)
         self._late_activity.sent_by_others(command)
@@ -383,15 +391,16 @@ class ExecutionService:
         self.robots.robot_log.note(robot, event, command.sender)
 
     def _show(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Process the graphs that an engine shows, in an answer or by feedback."""
+        """Process the graphs (`snapshots`) that an engine shows in an answer or by feedback: find
+        those that others have started, and runs that move after their end."""
         self.foreign_stops.shows(engine, snapshots)
         self._late_activity.shows(engine, snapshots)
 
     # --- after a restart ----------------------------------------------------------------------
 
     async def _take_up(self) -> None:
-        """Take over the robots, the open runs and the Stops of foreign graphs that an earlier
-        process left. Stops that were wanted go on; no run is started."""
+        """Take over what an earlier process left: the robots, the open runs, and the Stops of
+        graphs that other programs started. Stops that were pressed go on; no run is started."""
         self._runs.last_number = (await self._runtime.journal.query(queries.last_number()))[0][0]
         self._runtime.tasks.start_soon(self._late_activity.run)
         self.robots.open(
@@ -442,7 +451,8 @@ def _wholes_of(run: Run) -> set[str]:
 
 
 def _no_piece(opened: OpenRun) -> OpenRun:
-    """Return the run unless it is a piece: whoever leads that alone gives it orders."""
+    """Return the run unless it is a piece of a conducted run, to which only the conductor gives
+    orders; raise Conflict then."""
     piece = opened.run.piece
     if piece is not None:
         raise Conflict(

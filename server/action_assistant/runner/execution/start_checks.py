@@ -55,8 +55,8 @@ CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[
 
 
 class StartSources(msgspec.Struct, frozen=True):
-    """Further sources that a start needs: the folder of Python `behaviours`, the check of expected
-    `courses`, and the index folders by robot."""
+    """Further sources that a start needs: the folder of Python `behaviours` of simulated actions,
+    the check of expected `courses`, and the index folders by robot."""
 
     behaviours: BehaviourFolder | None = None
     courses: CoursesOf | None = None
@@ -67,9 +67,10 @@ NO_SOURCES: Final = StartSources()
 
 
 class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
-    """A start that nothing prevents. It goes over `link`, which the run owns if simulated, to the
-    life `incarnation` of the engine. `despite`: problems that a person overrides; `keeps`: the engine
-    has the helper package, so that values can be read from it."""
+    """A start that nothing prevents. It is sent over `link`, which the run owns if simulated, to
+    the engine process with the id `incarnation`. `despite`: problems that a person overrides;
+    `led`: the further part of a conducted run, else None; `keeps`: the engine has the helper
+    package, so that values can be read from it."""
 
     request: StartRequest
     prepared: Prepared
@@ -82,15 +83,15 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def overridden(self) -> tuple[str, ...]:
-        """The codes of problems that the starter overrides."""
+        """The codes of the problems that the starter has chosen to override."""
         return self.request.override.codes if self.request.override else ()
 
 
 class LedStart(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of an accepted start that only a conducted run has. `lives`: the life of the engine
-    of each robot, as it was looked at; `by_word`: those of them of which only the starter says that
-    they index once; `keeping`: the robots that have the helper package; `engine`: plays the whole
-    graph."""
+    """The part of an accepted start that only a conducted run has. `lives`: the id of each robot's
+    engine process when it was checked; `by_word`: those of them of which only the starter vouches
+    that they index their files once; `keeping`: the robots that have the helper package; `engine`:
+    plays the whole graph."""
 
     pieces: PreparedPieces
     lives: dict[str, str]
@@ -100,13 +101,14 @@ class LedStart(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def engines_of(request: StartRequest) -> tuple[str, ...]:
-    """Return the robots that a start is for, in the order of their names."""
+    """Return the names of the robots that a start is for, sorted; none for the simulator."""
     named = request.robots.values() if request.robots else (request.engine,)
     return tuple(sorted({*named} - {SIMULATOR}))
 
 
 class StartChecks:
-    """Decides whether a graph may be started on one engine. Nothing is stored or sent but a get."""
+    """Decides whether a graph may be started on one engine. Nothing is stored, and an engine is
+    only asked for its graphs."""
 
     def __init__(
         self,
@@ -134,8 +136,9 @@ class StartChecks:
         self._prefixes = Workspace.of(os.environ).prefixes
 
     async def accept(self, request: StartRequest, starter: str) -> AcceptedStart:
-        """Take a request through all stages that may refuse it. Raise a subclass of Refused if one
-        stage does."""
+        """Take a request through all checks that may refuse it, and wait for the answer of the
+        robot. `starter`: the id of the person who starts. Raise a subclass of Refused if one check
+        does."""
         if self.leads(request.engine, request.robots):
             return await self._accept_conducted(request, starter)
         if request.robots:
@@ -148,16 +151,17 @@ class StartChecks:
         return await self._accept_on(robot, request, ready, starter)
 
     def leads(self, engine: str, robots: Mapping[str, str]) -> bool:
-        """Return whether a start on `engine` is that of a conducted run. `robots`: those that the start
-        names by actor; without any, `conducted` may be a robot that was registered before the name was
-        reserved."""
+        """Return whether a start on `engine` is that of a conducted run. `robots`: the robots that
+        the start names, by actor; if it names none, a robot with the name `conducted` may be meant,
+        registered before that name was reserved."""
         return engine == CONDUCTED and (bool(robots) or CONDUCTED not in self._robots.names)
 
     async def accept_all(
         self, requests: Sequence[StartRequest], starter: str
     ) -> list[AcceptedStart]:
-        """Accept the starts on several engines side by side. Raise Conflict, with the reasons of
-        all engines, if at least one start is refused."""
+        """Accept the starts on several engines, all at the same time, and wait for their answers.
+        `starter`: the id of the person. Raise Conflict, with the reasons of all engines, if at
+        least one start is refused."""
         return await _all_accepted(requests, lambda each: self.accept(each, starter))
 
     async def _accept_on(
@@ -169,8 +173,9 @@ class StartChecks:
         *,
         is_led: bool = False,
     ) -> AcceptedStart:
-        """Take a prepared start through the stages that concern its robot. `is_led`: it is the part
-        of a conducted run on this robot."""
+        """Take a prepared start through the checks that concern its robot, and wait for its answer.
+        `starter`: the id of the person; `is_led`: it is the part of a conducted run on this robot.
+        Raise Unavailable if the robot does not answer, Conflict if a check fails."""
         await self._check(request, ready, robot, starter)
         try:
             view = await self._ask(robot)
@@ -182,8 +187,9 @@ class StartChecks:
         return await self._decide(request, ready, robot, view, is_led=is_led)
 
     async def _accept_conducted(self, request: StartRequest, starter: str) -> AcceptedStart:
-        """Take the start of a conducted run through all stages, with all its robots side by side.
-        Raise Conflict, with the reasons of all robots, if a stage refuses it."""
+        """Take the start of a conducted run through all checks, with all its robots at the same
+        time. `starter`: the id of the person. Raise Conflict, with the reasons of all robots, if a
+        check refuses it."""
         _require_plain(request)
         ready = await self._run_in_worker(prepared_pieces, request, CONDUCTED_FACTS, random_id())
         items = led_items(ready)
@@ -241,7 +247,9 @@ class StartChecks:
     async def _check(
         self, request: StartRequest, ready: Prepared, robot: KnownEngine, starter: str
     ) -> None:
-        """Make all checks that need no answer of the engine. Raise Conflict if one of them fails."""
+        """Make the checks that need no answer of the engine: the yes of a second person, whether a
+        run keeps the robot, and whether anything is being stopped there. `starter`: the id of the
+        person. Raise Conflict if one fails."""
         await self._approvals.require(robot.registration, ready.tree_digest, starter)
         overridden = request.override.codes if request.override else ()
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
@@ -252,9 +260,9 @@ class StartChecks:
             )
 
     async def _ask(self, robot: KnownEngine) -> EngineView:
-        """Send a get to the engine, on the path that would confirm a Stop, after it has read its
-        new index files; return its answer with what is known of it. Raise NoAnswer if none comes
-        in time."""
+        """Send a get to the engine, in the same way that would confirm a Stop, after it has read
+        its new index files. Return its answer together with what the runner knows of it. Raise
+        NoAnswer if none comes in time."""
         await robot.indexed()
         name, began = robot.registration.name, anyio.current_time()
         open_runs = frozenset(self._runs.on(name))  # before the get: a run may move again meanwhile
@@ -286,7 +294,9 @@ class StartChecks:
         *,
         is_led: bool,
     ) -> AcceptedStart:
-        """Accept a start if no item of its pre-flight blocks it. Raise Conflict if one does."""
+        """Accept a start unless an item of its pre-flight blocks it and was not overridden; raise
+        Conflict then. `view`: the answer of the engine; `is_led`: it is the part of a conducted
+        run."""
         items = [
             *await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes),
             *(await self._look_led.items(robot, view.answer) if is_led else ()),
@@ -306,21 +316,23 @@ class StartChecks:
         return accepted
 
     async def give_words(self, accepted: AcceptedStart, author: Author) -> None:
-        """Store what the starter of an accepted conducted run says of the engines of its robots.
-        Raise Unavailable if the journal cannot store it."""
+        """Store what the starter of an accepted conducted run vouches for: that engines index their
+        files only once. Does nothing for other starts. Raise Unavailable if the journal cannot
+        store it."""
         override = accepted.request.override
         if accepted.led is not None and override is not None:
             await self._look_led.give_words(accepted.led.by_word, author, override.reason)
 
     def require_free(self, accepted: AcceptedStart) -> None:
-        """Raise Conflict if a run keeps a robot from an accepted start by now: one that was over
-        may have moved again meanwhile."""
+        """Raise Conflict if by now another run keeps one of the robots from an accepted start; one
+        that was over may have moved again meanwhile."""
         name = accepted.prepared.name
         items = [self._free_item(each, name) for each in engines_of(accepted.request)]
         preflight.require_clear(items, accepted.overridden)
 
     def why_occupied(self, accepted: AcceptedStart) -> str:
-        """Return why a run keeps a robot from an accepted start by now; "" if none does."""
+        """Return the sentence that says which run by now keeps a robot from an accepted start; ""
+        if none does."""
         for engine in engines_of(accepted.request):
             item = self._free_item(engine, accepted.prepared.name)
             if preflight.is_blocking(item, accepted.overridden):
@@ -328,16 +340,17 @@ class StartChecks:
         return ""
 
     def _free_item(self, engine: str, graph_name: str) -> Item:
-        """Return the item that says whether another run keeps a robot from starting a graph of this
-        name."""
+        """Return the pre-flight item that says whether another run keeps the robot `engine` from
+        starting a graph of this name."""
         longest_ms = self._robots.reachable(engine).facts.longest_loading_ms
         other = self._runs.occupying(engine, graph_name)
         return preflight.free_item(engine, other, graph_name, longest_ms, self._clock_us())
 
     async def _behaviours_for(self, ready: Prepared) -> BehaviourFolder:
-        """Return the folder of behaviours, after a check that those in it for actions of the graph
-        and its sub-graphs can be used; an action needs none. Raise Conflict if this runner has no
-        such folder, or the folder or a behaviour cannot be used."""
+        """Return the folder of Python behaviours of simulated actions, after a check that all those
+        it has for actions of the graph and its sub-graphs can be used. Not every action needs one.
+        Raise Conflict if this runner has no such folder, or the folder or a behaviour cannot be
+        used."""
         where: dict[str, object] = {"path": "/behaviours"}
         folder = self._sources.behaviours
         if folder is None:
@@ -353,8 +366,9 @@ class StartChecks:
         return folder
 
     def _simulated_facts(self, request: StartRequest) -> EngineFacts:
-        """Return the facts of the simulator, or of the robot that the simulator plays. Raise
-        NotFound if that robot is not registered."""
+        """Return what is true of the engine to simulate: of the simulator or, if the request says
+        so (`like`), of the build of a registered robot. Raise NotFound if that robot is not
+        registered."""
         if request.like is None:
             return _SIMULATOR_FACTS
         facts = facts_of(self._robots.registration(request.like).profile)
@@ -363,9 +377,9 @@ class StartChecks:
     # --- pre-flight ---------------------------------------------------------------------------
 
     async def look(self, group: GroupRequest, starter: str) -> list[Preflight]:
-        """Return the pre-flight of a start on each engine; `starter` is the id of the person who
-        would start. A refusal becomes an item of the pre-flight. Nothing is stored, and only a
-        get is sent."""
+        """Return the pre-flight of a start on each engine that `group` names. `starter`: the id of
+        the person who would start. A refusal becomes an item of the pre-flight. Nothing is stored,
+        and engines are only asked for their graphs; the call waits for their answers."""
         if any(self.leads(engine, group.robots) for engine in group.engines):
             return await self._look_conducted(group.for_engine(CONDUCTED), starter)
         found: dict[str, Preflight] = {}
@@ -384,8 +398,8 @@ class StartChecks:
         return [preflight.with_items(found[engine], courses) for engine in group.engines]
 
     async def _look_conducted(self, request: StartRequest, starter: str) -> list[Preflight]:
-        """Return the pre-flight of a conducted run: first that of the whole graph, then that of each
-        robot."""
+        """Return the pre-flight of a conducted run: first that of the whole graph, then that of
+        each robot. `starter`: the id of the person who would start."""
         try:
             ready = await self._run_in_worker(
                 partial(prepared_pieces, approved=False), request, CONDUCTED_FACTS, ""
@@ -414,8 +428,8 @@ class StartChecks:
         return found
 
     async def _look(self, request: StartRequest, starter: str) -> Preflight:
-        """Return the pre-flight items of one engine. A refusal of one stage becomes an item, and
-        the next stage runs all the same."""
+        """Return the pre-flight of one engine. `starter`: the id of the person who would start. A
+        refusal by one check becomes an item, and the next check is made all the same."""
         items: list[Item] = []
         robot: KnownEngine | None = None
         ready: Prepared | None = None
@@ -462,8 +476,9 @@ class StartChecks:
         return [] if item is None else [item]
 
     async def _course_items(self, group: GroupRequest) -> Sequence[Item]:
-        """Return the item that says whether the graph takes its expected courses. The item only
-        warns and never blocks a start, even if the courses could not be checked."""
+        """Return the items that say whether the graph takes its expected courses (recorded runs
+        that it has to repeat); () if there is nothing to check. They only warn and never block a
+        start, even if the courses could not be checked."""
         if self._sources.courses is None or group.graph is None:
             return ()
         try:
@@ -478,8 +493,8 @@ class StartChecks:
 
 
 def _code_of(refused: Refused) -> str:
-    """Return the code of the item for a graph that cannot be led: that of a sub-graph of several
-    robots, which has a remedy of its own, or `graph`."""
+    """Return the code of the pre-flight item for a graph that cannot be led: `subgraph-across` if a
+    sub-graph has actions of several robots, which has a remedy of its own; else `graph`."""
     obstacles = (refused.where or {}).get("obstacles")
     is_shared = isinstance(obstacles, list | tuple) and any(
         each["code"] == "subgraph-across" for each in obstacles
@@ -488,7 +503,7 @@ def _code_of(refused: Refused) -> str:
 
 
 def _require_plain(request: StartRequest) -> None:
-    """Raise BadInput if a start has fields that mean something to the simulator only."""
+    """Raise BadInput if a start on a robot has fields that only the simulator understands."""
     if request.like is not None:
         raise BadInput("Only the simulator plays a robot.", where={"path": "/like"})
     if request.behaviours:
@@ -505,8 +520,8 @@ def require_led(robot: KnownEngine) -> None:
 async def _all_accepted(
     requests: Sequence[StartRequest], accept: Callable[[StartRequest], Awaitable[AcceptedStart]]
 ) -> list[AcceptedStart]:
-    """Accept the starts on several engines side by side. Raise Conflict, with the reasons of all
-    engines, if at least one start is refused."""
+    """Call `accept` for each request at the same time, and return the results in the order of the
+    requests. Raise Conflict, with the reasons of all engines, if at least one start is refused."""
     accepted: dict[str, AcceptedStart] = {}
     refused: dict[str, Refused] = {}
 
@@ -535,7 +550,7 @@ def _each_once(*despite: Iterable[Overridden]) -> tuple[Overridden, ...]:
 
 def _overridden(ready: Prepared, items: Sequence[Item]) -> tuple[Overridden, ...]:
     """Return the problems that a person overrides: those of the graph that forbid a start, and
-    those that block it on the robot."""
+    those of `items` that block it on the robot."""
     problems = list(filter(forbids_start, ready.problems))
     found: list[Overridden] = []
     for item in items:

@@ -35,14 +35,16 @@ from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrde
 
 
 class Started(msgspec.Struct, frozen=True):
-    """The answer to a start. `fresh` is false when the request had been carried out before."""
+    """The answer to a start. `fresh` is false if an earlier request with the same id has already
+    started the run."""
 
     run: Run
     fresh: bool
 
 
 class Grouped(msgspec.Struct, frozen=True):
-    """The answer to the start of a group. `failed`: the engines that nothing was sent to, and why."""
+    """The answer to the start of a group. `group`: its id; `failed`: the reasons, by engine, for
+    those that nothing was sent to; `fresh`: as in `Started`."""
 
     group: str
     runs: list[Run]
@@ -51,7 +53,8 @@ class Grouped(msgspec.Struct, frozen=True):
 
 
 class StartPipeline:
-    """Carries out starts. `stops`: knows the Stops pressed since a start was requested."""
+    """Carries out starts. `stops`: the record of Stops, so that one pressed during a start takes
+    effect on it."""
 
     def __init__(
         self,
@@ -70,8 +73,9 @@ class StartPipeline:
         self._turns: dict[str, anyio.Lock] = {}
 
     async def start(self, request: StartRequest, author: Author) -> Started:
-        """Carry out a start, at most once per request id. Return after the one start message has
-        left. Raise a subclass of Refused if the start is refused; nothing was sent then."""
+        """Carry out a start in the name of `author`, at most once per request id. Return after the
+        one start message has been sent. Raise a subclass of Refused if the start is refused;
+        nothing was sent then."""
         stops = self._stops.count
         async with self._claims.once(request.request_id):
             known = await self._known(request)
@@ -83,8 +87,9 @@ class StartPipeline:
             return Started(run, fresh=True)
 
     async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
-        """Start one version on several robots. Every start is accepted before the first message
-        leaves. Raise a subclass of Refused if one start is refused; nothing was sent to any
+        """Start one version on several robots in the name of `author`. All starts are accepted
+        before the first message is sent. Raise BadInput if the group has no request id or names the
+        simulator, another subclass of Refused if one start is refused; nothing was sent to any
         robot then."""
         stops = self._stops.count
         requests = [group.for_engine(engine) for engine in sorted(group.engines)]
@@ -111,9 +116,9 @@ class StartPipeline:
 
     @asynccontextmanager
     async def turns(self, robots: Iterable[str]) -> AsyncIterator[None]:
-        """Keep these robots for one start, or for a change of their registration, until the end of
-        the block. They are locked in the order of their names, so that no two callers wait for each
-        other."""
+        """Return a context that keeps these robots for one start, or for a change of their
+        registration. It waits until they are free. They are locked in the order of their names, so
+        that two callers never wait for each other."""
         async with AsyncExitStack() as held:
             for robot in sorted(robots):
                 await held.enter_async_context(self._turns.setdefault(robot, anyio.Lock()))
@@ -125,8 +130,8 @@ class StartPipeline:
         return self._claims.under_way(request_id)
 
     async def _known(self, request: StartRequest) -> Run | None:
-        """Return the run that an earlier start with this request id has become, or None. Raise
-        Conflict if that was another start."""
+        """Return the run that an earlier start with this request id has created, or None. Raise
+        Conflict if that start was not the same request."""
         run = await self._claims.run_of(request)
         return None if run is None else await self._runs.find(run)
 
@@ -135,10 +140,10 @@ class StartPipeline:
     async def _store_and_hand_over(
         self, accepted: AcceptedStart, author: Author, stops: int, group: str | None = None
     ) -> Run:
-        """Store a start, then let its run send the message, and wait until it has left. A Stop
-        pressed after the first `stops` ones takes effect before anything is sent. Raise Conflict
-        or Unavailable, before anything is sent, if the robot is occupied or the start cannot be
-        stored."""
+        """Store a start, let its run send the message, and wait until it was sent. `stops`: how
+        many Stops had been pressed when the start was requested; a later one takes effect before
+        anything is sent. `group`: the id of its group, or None. Raise Conflict or Unavailable,
+        before anything is sent, if the robot is occupied or the start cannot be stored."""
         number, at = self._runs.next_number(), self._clock_us()
         requested, order = _to_store(accepted, author, at=at, number=number, group=group)
         await self._checks.give_words(accepted, author)
@@ -164,7 +169,7 @@ class StartPipeline:
         self, starts: Sequence[AcceptedStart], author: Author, stops: int
     ) -> Grouped:
         """Store and send accepted starts one after the other; the failure of one does not affect
-        the others."""
+        the others. `stops`: as in `_store_and_hand_over`."""
         group = random_id()
         runs: list[Run] = []
         failed: dict[str, str] = {}
@@ -179,7 +184,8 @@ class StartPipeline:
 def _to_store(
     accepted: AcceptedStart, author: Author, *, at: int, number: int, group: str | None
 ) -> tuple[Requested, Order]:
-    """Return the event that stores a start, and the order that is handed to the link."""
+    """Return the event that stores a start, and the order that is handed to the link. `at`: µs UTC;
+    `number`: of the new run; `group`: the id of its group, or None."""
     request, ready = accepted.request, accepted.prepared
     requested = Requested(
         at=at,

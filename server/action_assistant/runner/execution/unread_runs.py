@@ -40,8 +40,9 @@ UNREAD: Final = "Some of what was recorded of this run cannot be read"
 
 
 class UnreadRun:
-    """The link of such a run: it answers only once a Stop was pressed and no piece may move.
-    `lacking`: pieces of which nothing can be read, so that nobody knows which robot has them."""
+    """The link of a conducted run of which some events cannot be read, so that it can only be
+    stopped. It answers only once a Stop was pressed and no piece may move. `lacking`: the ids of
+    pieces of which nothing can be read, so that their robots are unknown."""
 
     simulated: Final = False
     pauses: Final = False
@@ -64,7 +65,7 @@ class UnreadRun:
 
     @property
     def why(self) -> str:
-        """The reason for which the run is unknown, for people."""
+        """The sentence for people that says why the run is unknown."""
         return (
             f"{UNREAD}, so nothing leads it further: look at its robots. What they are known to do is "
             f"followed, and a Stop reaches it.{self._lacking}"
@@ -81,8 +82,8 @@ class UnreadRun:
         self._leading = leading
 
     def follow(self, piece: Run, seq: int, robots: Robots, *, is_whole: bool) -> None:
-        """Follow a piece, whose last stored event is number `seq`. `is_whole`: all of its events could
-        be read; else no answer can prove its rest."""
+        """Follow a piece of the run until it has ended. `seq`: the number of its last stored event;
+        `is_whole`: all of its events could be read; if not, no answer can prove it at rest."""
         assert piece.piece is not None
         call = Call(
             number=piece.piece.call,
@@ -120,7 +121,7 @@ class UnreadRun:
             self._unproven = piece
 
     def _open(self) -> list[OpenRun]:
-        """Return the pieces that may move, with those that had ended and move again."""
+        """Return the pieces of this run that may move, also those that had ended and move again."""
         found = (each for each in self._runs.by_id.values() if each.run.piece is not None)
         return [
             each
@@ -132,7 +133,8 @@ class UnreadRun:
 
     @property
     def standing(self) -> Standing:
-        """The standing of an engine that answers, so that the run can be proven to be stopped."""
+        """The condition of an engine that answers, with the id of the run as its process, so that
+        the run can be proven to be stopped."""
         life = self._run.incarnation or self._run.id
         return Standing(state="answering", incarnation=life, generation="current", servers=1)
 
@@ -151,8 +153,8 @@ class UnreadRun:
                 piece.stop(self._stopped_by, "")
 
     async def get(self) -> Answer:
-        """Return the whole graph as stopped. Raise NoAnswer before a Stop, while a piece may move, and
-        if nobody knows what all of them are."""
+        """Return the whole graph as stopped. Raise NoAnswer before a Stop, while a piece may move,
+        or if some pieces are unknown."""
         moving = self._open()
         if not self._is_closed or self._lacking:
             raise NoAnswer(self.why)
@@ -170,7 +172,7 @@ class UnreadRun:
         return Answer(asked_at=at, at=at, incarnation=life, graphs=(shown,))
 
     async def _refuse(self, *_: object, **__: object) -> NoReturn:
-        """Raise NotSent: nothing leads the run."""
+        """Raise NotSent: such a run takes no commands but Stop."""
         raise NotSent(self.why)
 
     start = pause = resume = modify = _refuse
@@ -180,7 +182,7 @@ class UnreadRun:
         await anyio.sleep_forever()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Return a context in which nothing is reported."""
+        """Return a context during which `hear` would be called with reports; such a run has none."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:

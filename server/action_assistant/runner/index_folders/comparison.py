@@ -23,11 +23,11 @@ _NAMED: Final = 5  # paths in one sentence
 
 
 class Present(msgspec.Struct, frozen=True):
-    """An engine that indexes the folder has exactly this graph."""
+    """The folder has exactly this graph, in a form that engines read."""
 
 
 class Lacking(msgspec.Struct, frozen=True):
-    """No file defines the graph."""
+    """No file in the folder defines the graph."""
 
 
 class Differing(msgspec.Struct, frozen=True):
@@ -57,9 +57,9 @@ class WritableGraph(msgspec.Struct, frozen=True):
 
 
 class IndexFolderState(msgspec.Struct, frozen=True, kw_only=True):
-    """The folder that the robot's engine indexes, as the runner sees it. `writable`: graphs that
-    can be written there; `waiting`: graphs whose file exists and that the engine has not indexed
-    yet; `hindered`: why other graphs cannot be written, as sentences by graph."""
+    """The folder of files that the robot's engine indexes, as the runner sees it. `writable`:
+    graphs that can be written there; `waiting`: graphs whose file exists and that the engine has
+    not indexed yet; `hindered`: why other graphs cannot be written, as sentences by graph."""
 
     path: str
     writable: tuple[WritableGraph, ...] = ()
@@ -68,7 +68,8 @@ class IndexFolderState(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def same_to_engine(ours: Graph, theirs: Graph, facts: EngineFacts) -> bool:
-    """Return whether an engine makes no difference between two graphs."""
+    """Return whether two graphs are the same to an engine of the build `facts`, which ignores some
+    fields."""
     return digest(echo(ours, facts)) == digest(echo(theirs, facts))
 
 
@@ -80,7 +81,8 @@ def file_state(
     actions: Collection[str],
     graphs: Mapping[str, Graph],
 ) -> FileState:
-    """Return the state of one graph's file. `actions`, `graphs`: those in the engine's own index."""
+    """Return the state of one graph's file in a folder. `files`: those in it that define names;
+    `facts`: the engine build; `actions`, `graphs`: the names in the engine's own index."""
     name = graph.name
     if defining := files.actions.get(name, ()):
         return Hindered(
@@ -112,7 +114,7 @@ def file_state(
 
 
 def _is_same(graph: Graph, file: DefiningFile, facts: EngineFacts) -> bool:
-    """Return whether an engine reads exactly this graph from the file."""
+    """Return whether an engine of the build `facts` would read exactly this graph from the file."""
     try:
         reading = codec.read(file.text)
     except codec.Unreadable:

@@ -22,8 +22,8 @@ _BOM: Final = b"\xef\xbb\xbf"
 
 
 class DefiningFile(msgspec.Struct, frozen=True):
-    """A file that defines a name. `path`: relative to the folder; `linked`: the path leads through
-    a symbolic link."""
+    """A file that defines the name of a graph or action. `path`: relative to the folder; `linked`:
+    the path leads through a symbolic link."""
 
     path: str
     linked: bool
@@ -55,7 +55,8 @@ def shown_path(path: str) -> str:
 
 
 def scanned(folder: Path, names: Collection[str]) -> IndexedFiles:
-    """Return the files in the folder that define one of these names. Never raises."""
+    """Return the files in the folder that define one of `names`. No error is raised: unreadable
+    files are listed in the result."""
     graphs: dict[str, tuple[DefiningFile, ...]] = {}
     actions: dict[str, tuple[DefiningFile, ...]] = {}
     unread: list[str] = []
@@ -78,8 +79,8 @@ def scanned(folder: Path, names: Collection[str]) -> IndexedFiles:
 
 
 def _marked(folder: Path, unread: list[str]) -> Iterator[tuple[str, bool]]:
-    """Yield the paths of files that an engine would read, and whether a symbolic link leads to
-    them."""
+    """Yield the paths of the files that an engine would read, relative to the folder, and whether a
+    symbolic link leads to them. What cannot be read is added to `unread`, with the reason."""
     left, seen = [("", False, 0)], 0
     while left:
         below, linked, depth = left.pop()
@@ -123,8 +124,8 @@ def _is_dangling(entry: "os.DirEntry[str]") -> bool:
 
 
 def _text(path: Path) -> bytes:
-    """Return the contents of a regular file; return b"" for a folder, a pipe or a device. Links are
-    followed. Raise OSError if the file cannot be read or is too large."""
+    """Return the contents of the regular file `path`; b"" for a folder, a pipe or a device. Links
+    are followed. Raise OSError if the file cannot be read or is too large."""
     with os.fdopen(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):
             return b""  # an engine cannot read it either

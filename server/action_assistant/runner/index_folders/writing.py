@@ -64,8 +64,8 @@ class _Changed(Exception):
 
 
 def write(folder: Path, files: Sequence[NewFile]) -> WritingOutcome:
-    """Write all files: all contents are on the disk before the first file gets its name. Never
-    raises."""
+    """Write all files into the folder: all contents are on the disk before the first file gets its
+    name. No error is raised: the result says what was written and what went wrong."""
     written: list[WrittenFile] = []
     place = str(folder)
     try:
@@ -91,7 +91,7 @@ def write(folder: Path, files: Sequence[NewFile]) -> WritingOutcome:
 
 
 def sha(text: bytes) -> str:
-    """Return the SHA-256 of a text, in hex."""
+    """Return the SHA-256 of the bytes `text`, in hex."""
     return hashlib.sha256(text).hexdigest()
 
 
@@ -103,7 +103,7 @@ def _as_folder() -> int:
 
 @contextmanager
 def _opened(folder: Path) -> Iterator[int]:
-    """Open the index folder, which may be a link itself."""
+    """Return a context with the descriptor of the index folder, whose path may be a link."""
     found = os.open(folder, _as_folder())
     try:
         yield found
@@ -113,9 +113,9 @@ def _opened(folder: Path) -> Iterator[int]:
 
 @contextmanager
 def _entered(top: int, path: str) -> Iterator[int]:
-    """Open the folder that holds the file `path`, and yield its descriptor until the end of the
-    block. `path` is relative to the folder with the descriptor `top`. No symbolic link is
-    followed. Raise OSError if a folder cannot be opened or the path leads out of `top`."""
+    """Return a context with the descriptor of the folder that has the file `path`. `path` is
+    relative to the folder with the descriptor `top`. No symbolic link is followed. Raise OSError if
+    a folder cannot be opened or the path leads out of `top`."""
     found = os.dup(top)
     try:
         for name in path.split("/")[:-1]:
@@ -130,9 +130,9 @@ def _entered(top: int, path: str) -> Iterator[int]:
 
 
 def _mode(folder: int, path: str) -> int:
-    """Return the permissions for a new file: those of the file that it replaces, else those of its
-    folder, so that the engine can read it whatever the umask is. Raise OSError if they cannot be
-    read, _Changed if the file to replace is gone."""
+    """Return the permissions for a new file: of the file that it replaces (`path`, in the folder
+    with the descriptor `folder`), or for "" of the folder, so that the engine can read it whatever
+    the umask is. Raise OSError if they cannot be read, _Changed if the file to replace is gone."""
     if not path:
         return os.fstat(folder).st_mode & 0o666
     try:
@@ -144,8 +144,9 @@ def _mode(folder: int, path: str) -> int:
 
 @contextmanager
 def _fresh(folder: int, text: bytes, mode: int) -> Iterator[str]:
-    """Write a file with this text to the disk, and yield its temporary name; the file of that name
-    is removed afterwards. Raise OSError if it cannot be written."""
+    """Return a context with the temporary name of a new file with this text, in the folder with the
+    descriptor `folder` and with the permissions `mode`. That name is removed at the end. Raise
+    OSError if it cannot be written."""
     name = f".action-assistant-{secrets.token_hex(8)}.new"
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
     opened = os.open(name, flags, 0o600, dir_fd=folder)
@@ -161,7 +162,8 @@ def _fresh(folder: int, text: bytes, mode: int) -> Iterator[str]:
 
 
 def _added(each: _Prepared) -> WrittenFile:
-    """Give a new file the first name that is free."""
+    """Give a new file the first free name for its graph, and return what was written. Raise OSError
+    if all names are taken."""
     for number in range(1, _MOST_NAMES):
         name = graph_file_name(each.file.graph, number)
         try:
@@ -173,7 +175,8 @@ def _added(each: _Prepared) -> WrittenFile:
 
 
 def _replaced(each: _Prepared) -> WrittenFile:
-    """Replace a file that still has the old contents by its new one."""
+    """Give a new file the name of the old file, which is moved aside, and return what was written.
+    Raise _Changed if the old file has other contents by now; it then stays."""
     path, folder = each.file.replaces, each.folder
     name, above = _base(path), path[: len(path) - len(_base(path))]
     kept = (
@@ -200,8 +203,8 @@ def _changed(path: str) -> str:
 
 
 def _require_same(folder: int, name: str, old: str, changed: str) -> None:
-    """Raise _Changed unless the file still has the contents with the hash `old`; raise OSError if
-    it cannot be read."""
+    """Raise _Changed with the message `changed` unless the file `name`, in the folder with the
+    descriptor `folder`, has contents with the SHA-256 `old`; raise OSError if it cannot be read."""
     try:
         if _sha_of(folder, name) == old:
             return
@@ -211,8 +214,8 @@ def _require_same(folder: int, name: str, old: str, changed: str) -> None:
 
 
 def _put_back(folder: int, kept: str, name: str) -> bool:
-    """Give a file that was moved away its old name; return False if another file has that name by
-    now."""
+    """Give a file that was moved aside (its name is now `kept`) its old name again; return False if
+    another file has that name by now."""
     try:
         _link(folder, kept, name)
         os.unlink(kept, dir_fd=folder)
@@ -228,8 +231,8 @@ def _link(folder: int, old: str, new: str) -> None:
 
 
 def _sha_of(folder: int, name: str) -> str:
-    """Return the SHA-256 of a regular file, in hex; "" for anything else. Raise OSError if it
-    cannot be opened."""
+    """Return the SHA-256 of a regular file, in hex; "" for anything else. `folder`: the descriptor
+    of its folder. Raise OSError if it cannot be opened."""
     flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
     with os.fdopen(os.open(name, flags, dir_fd=folder), "rb") as opened:
         if not stat.S_ISREG(os.fstat(opened.fileno()).st_mode):

@@ -40,7 +40,8 @@ class EngineProcess(msgspec.Struct, frozen=True):
 
 
 def process(pid: int) -> EngineProcess | None:
-    """Return the process with this id; None if there is none or the kernel does not show it."""
+    """Return the process with the id `pid`; None if it does not exist or the kernel does not show
+    it."""
     try:
         started = _started(pid)
         return None if started is None else EngineProcess(*_here(), pid, started)
@@ -49,8 +50,8 @@ def process(pid: int) -> EngineProcess | None:
 
 
 def has_ended(known: EngineProcess) -> bool:
-    """Return whether a process has certainly ended: this is the same boot and namespace, and the
-    process does not exist."""
+    """Return whether the process `known` has certainly ended: this is the same boot and namespace
+    of process ids, and no process has this id and start time. False if that cannot be seen."""
     try:
         if _here() != (known.boot, known.namespace):
             return False
@@ -60,14 +61,12 @@ def has_ended(known: EngineProcess) -> bool:
 
 
 def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProcess | None:
-    """Return the process behind a DDS participant if it certainly runs on this computer, else None.
-
-    `prefix` and `ours`: GUID prefixes in hex, of the engine and of this process. Fast DDS puts two
-    bytes of the host and the low two bytes of the process id into them. Containers on one network
-    share the host bytes and have process ids of their own, so the process must also hold a port of
-    that domain and have the engine's name in its command line. For every other middleware the
-    result is None.
-    """
+    """Return the process behind a DDS participant (`prefix`: its GUID prefix in hex) if it
+    certainly runs on this computer, else None. `ours`: the GUID prefix of this process; `domain`:
+    of ROS; `name`: of the engine. Fast DDS puts two bytes of the host and the low two bytes of the
+    process id into the prefix. Containers on one network share the host bytes and have process ids
+    of their own, so the process must also hold a port of that domain and have the engine's name in
+    its command line. For every other middleware the result is None."""
     if len(prefix) < 24 or prefix[:8] != ours[:8] or not prefix.startswith(_FAST_DDS):
         return None
     low = int.from_bytes(bytes.fromhex(prefix[8:12]), "little")
@@ -83,8 +82,9 @@ def engine_process(prefix: str, ours: str, domain: int, name: str) -> EngineProc
 
 
 def indexes_again(known: EngineProcess) -> bool | None:
-    """Return whether the process of an engine reads its folders again while it runs; None if that is
-    not known, as on another computer or for another program than the engine's own node."""
+    """Return whether the process of an engine reads its folders of files again while it runs; None
+    if that cannot be known, as on another computer or for another program than the engine's own
+    node."""
     try:
         words = command_line(known.pid)
         is_same = _here() == (known.boot, known.namespace) and _started(known.pid) == known.started
@@ -94,26 +94,29 @@ def indexes_again(known: EngineProcess) -> bool | None:
 
 
 def indexes_by(words: Sequence[str]) -> bool | None:
-    """Return whether an engine with this command line reads its folders again while it runs; None if
-    the program is not known. An emulated engine can be asked at any time."""
+    """Return whether an engine with this command line (split at its arguments) reads its folders of
+    files again while it runs. False for an emulated engine, which can be asked at any time; None
+    for an unknown program."""
     if is_engine_node(words):
         return indexing_rate(words) != "0"
     return False if _is_emulator(words) else None
 
 
 def command_line(pid: int) -> list[str]:
-    """Return the words with which a process was started. Raise OSError if the kernel does not show
-    them."""
+    """Return the arguments with which the process `pid` was started, the program first. Raise
+    OSError if the kernel does not show them."""
     return (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace").split("\0")
 
 
 def is_engine_node(words: Sequence[str]) -> bool:
-    """Return whether a command line starts the engine's own node, also through another program."""
+    """Return whether a command line (split at its arguments) starts the engine's own node, directly
+    or as the argument of another program."""
     return any(Path(word).name == _PROGRAM for word in words[:2])
 
 
 def _is_emulator(words: Sequence[str]) -> bool:
-    """Return whether a command line starts the engine of an emulated robot, which is this program."""
+    """Return whether a command line (split at its arguments) starts the engine of an emulated
+    robot, which is a command of this program."""
     programs = {"action_assistant", "action-assistant"}
     return any(
         command == _EMULATOR and Path(program).name in programs
@@ -122,15 +125,16 @@ def _is_emulator(words: Sequence[str]) -> bool:
 
 
 def indexing_rate(words: Sequence[str]) -> str:
-    """Return the indexing rate in a command line of the engine's node: "0" for an engine that indexes
-    once, "" if none is given, so that it indexes every 2 s."""
+    """Return the indexing rate in a command line of the engine's node: "0" for an engine that
+    indexes once, "" if the option is absent, so that it indexes every 2 s."""
     rate = argument(words, "--indexing-rate")
     return "0" if rate.isdecimal() and int(rate) == 0 else rate
 
 
 def argument(words: Sequence[str], option: str) -> str:
-    """Return the value of an option in a command line of the engine's node; "" without it. The value
-    stands behind the option or `=`; the node also takes an option that is cut short."""
+    """Return the value of an option in a command line of the engine's node (split at its
+    arguments); "" without it. The value is the next argument or follows `=`; as the node does,
+    accept an abbreviated option."""
     for word, following in zip(words, [*words[1:], ""], strict=True):
         name, equals, value = word.partition("=")
         if len(name) > len("--") and name.startswith("--") and option.startswith(name):
@@ -139,12 +143,10 @@ def argument(words: Sequence[str], option: str) -> str:
 
 
 def threads(known: EngineProcess) -> frozenset[Thread] | None:
-    """Return the threads of the process of an engine's own node; None if unknown.
-
-    They are unknown if the process has ended, is on another computer, or runs another program,
-    which may not begin a thread for each action; also if a thread ends during each attempt: the
-    kernel's list is incomplete then.
-    """
+    """Return the threads of the process of an engine's own node; None if they cannot be known. That
+    is so if the process has ended, is on another computer, or runs another program, which may not
+    begin a thread for each action; also if a thread ends during each attempt, since the kernel's
+    list is incomplete then."""
     folder = _PROC / str(known.pid)
     try:
         program = command_line(known.pid)[0]
@@ -171,8 +173,8 @@ def _here() -> tuple[str, str]:
 
 
 def _started(pid: int) -> int | None:
-    """Return when a process began, in clock ticks after boot; None if it has ended, also if its
-    parent has not waited for it yet."""
+    """Return when the process `pid` began, in clock ticks after boot; None if it has ended, even if
+    its parent has not reaped it yet."""
     folder = _PROC / str(pid)
     try:
         fields = _fields(folder)
@@ -183,7 +185,8 @@ def _started(pid: int) -> int | None:
 
 
 def _began(folder: Path) -> int | None:
-    """Return when a thread began, in clock ticks after boot; None when it has ended."""
+    """Return when a thread began, in clock ticks after boot; None when it has ended. `folder`: of
+    the thread in /proc."""
     try:
         return int(_fields(folder)[19])
     except (FileNotFoundError, ProcessLookupError):
@@ -191,7 +194,7 @@ def _began(folder: Path) -> int | None:
 
 
 def _fields(folder: Path) -> list[str]:
-    """Return the fields of a `stat` file of /proc from the state on."""
+    """Return the fields of a `stat` file in a /proc folder, from the third one, the state, on."""
     return (folder / "stat").read_text().rpartition(")")[2].split()
 
 
@@ -200,7 +203,8 @@ def _pids() -> Iterator[int]:
 
 
 def _is_called(pid: int, name: str) -> bool:
-    """Return whether a word of the process's command line is the name."""
+    """Return whether `name` stands in the command line of the process `pid`, as an argument of its
+    own or between `=` or commas."""
     try:
         line = (_PROC / str(pid) / "cmdline").read_bytes().decode(errors="replace")
     except OSError:
@@ -209,8 +213,8 @@ def _is_called(pid: int, name: str) -> bool:
 
 
 def _speaks_dds(pid: int, domain: int) -> bool:
-    """Return whether a process has a UDP socket on a DDS port of this domain; False where that cannot be
-    seen."""
+    """Return whether the process `pid` has a UDP socket on a DDS port of this domain; False if that
+    cannot be seen."""
     folder = _PROC / str(pid)
     try:
         inodes = {_socket(each) for each in (folder / "fd").iterdir()}

@@ -97,8 +97,9 @@ _MESSAGES = msgspec.json.Decoder(tuple[_Said | str, ...])
 def snapshot(
     text: str, *, at: int, source: Literal["get", "feedback"], asked_at: int | None = None
 ) -> Snapshot:
-    """Read one graph as an engine wrote it, seen at `at` (microseconds UTC). Raise NotAGraph if the
-    text is no such JSON."""
+    """Read one graph as an engine wrote it, seen at `at` (µs UTC). `source`: an answer to a get or
+    feedback; `asked_at`: when that get was sent. Keepers (actions that only hold values) are not
+    among the nodes. Raise NotAGraph if the text is no such JSON."""
     try:
         graph = _GRAPH.decode(text)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as error:
@@ -140,7 +141,7 @@ def _keeps(action: _Action) -> bool:
 
 
 def name_of(text: str) -> str:
-    """Return the name inside a graph's text; "" if it has none."""
+    """Return the name of the graph in a UMRF text; "" if it has none."""
     try:
         return _NAMED.decode(text).graph_name
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -148,7 +149,8 @@ def name_of(text: str) -> str:
 
 
 def run_in(text: str) -> str | None:
-    """Return the id of the run in the actions of a sent graph; None if there is none."""
+    """Return the id of the run that the actions of a sent graph text carry; None if they carry none
+    or different ones."""
     try:
         return _run(_SENT.decode(text).actions)
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -178,9 +180,9 @@ def _messages(action: _Action) -> tuple[str, ...]:
 
 
 def _stoppable(text: str, failed: frozenset[str]) -> frozenset[str]:
-    """Return those `failed` nodes that their graph itself may stop or pause: by a response of a
-    relation, or since a spontaneous action leads to them. Return all of them if the text cannot
-    be read."""
+    """Return the `failed` nodes that their graph itself may stop or pause: by a response of a
+    relation, or since a spontaneous action leads to them. `text`: the graph as the engine wrote it;
+    if it cannot be read, return all of them."""
     try:
         actions = _RELATED.decode(text).actions
     except (msgspec.DecodeError, RecursionError, UnicodeError):
@@ -203,8 +205,8 @@ def _stoppable(text: str, failed: frozenset[str]) -> frozenset[str]:
 
 
 def _inputs(nodes: Mapping[str, _Action]) -> dict[str, Values]:
-    """Return the input values of moving actions, by full name; the engine drops the values when an
-    action ends."""
+    """Return the input values of the actions that move, by full name. Ended actions are not
+    included: the engine drops their values."""
     found: dict[str, Values] = {}
     for name, each in nodes.items():
         if each.state in ACTIVE and (values := reported(bytes(each.input_parameters))) is not None:

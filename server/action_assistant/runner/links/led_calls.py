@@ -26,8 +26,9 @@ class LedCourse(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LedCalls:
-    """Collects the calls of one engine until its link reports them. `led`: the full names of the
-    actions that are carried out elsewhere; the script says how the others behave."""
+    """Stands in for behaviours in the engine that plays a conducted run: collects the calls that
+    robots carry out until the link reports them. `led`: the full names of these actions; the script
+    says how the others behave."""
 
     takes_graphs = True
     is_killing = False
@@ -38,16 +39,17 @@ class LedCalls:
         self._news: list[CallBegan | CallStopped] = []
 
     def performs(self, action: Action, *, inside: bool) -> bool:
-        """Return whether this action is carried out elsewhere. Those inside of a sub-graph are not:
-        either the engine plays the sub-graph, or it is carried out elsewhere as a whole."""
+        """Return whether a robot carries out this action. `inside`: it is in a sub-graph; then the
+        result is False: either the engine plays the sub-graph, or a robot carries it out as a
+        whole."""
         return not inside and action.full_name in self._led
 
     def begin(self, call: Call) -> None:
-        """Note that a call has begun."""
+        """Add the begin of a call to the news."""
         self._news.append(CallBegan(call=call))
 
     def stop(self, number: int) -> None:
-        """Note that a call is to end."""
+        """Add to the news that the call `number` is to end."""
         self._news.append(CallStopped(number=number))
 
     def pause(self, number: int) -> None:
@@ -57,7 +59,7 @@ class LedCalls:
         """Do nothing: a conducted run pauses by holding what has not begun."""
 
     def give_up(self, number: int) -> str | None:
-        """Return None: only a proof ends a call that a robot carries out."""
+        """Return None and do nothing: only a proof ends a call that a robot carries out."""
         return None
 
     def news(self) -> list[CallBegan | CallStopped]:
@@ -66,7 +68,7 @@ class LedCalls:
         return news
 
     def taken(self) -> list[Returned]:
-        """Return nothing: the ends of calls come as commands."""
+        """Return an empty list: the ends of calls come as commands of the conductor."""
         return []
 
     def kill_all(self) -> None:

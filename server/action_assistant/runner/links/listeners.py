@@ -8,20 +8,19 @@ _News = TypeVar("_News")
 
 
 class Listeners(Generic[_News]):
-    """Listeners of a link or of a domain. They are called at once and must not wait."""
+    """The listeners of a link or of a domain. They are called synchronously and must not wait."""
 
     def __init__(self) -> None:
         self._all: list[Callable[[_News], None]] = []
 
     def tell(self, news: _News) -> None:
-        """Call every listener that is registered now, also one that another listener removes
-        meanwhile."""
+        """Call every listener with `news`, also one that another listener removes meanwhile."""
         for hear in tuple(self._all):
             hear(news)
 
     @contextmanager
     def listening(self, hear: Callable[[_News], None]) -> Iterator[None]:
-        """Add a listener until the end of the block."""
+        """Return a context during which `hear` is called with all news."""
         self._all.append(hear)
         try:
             yield

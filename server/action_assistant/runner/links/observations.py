@@ -129,12 +129,13 @@ Seen: TypeAlias = Exact | Snapshot
 
 
 def failed_in(shown: Snapshot) -> list[str]:
-    """Return the full names of the actions that an engine calls ERROR."""
+    """Return the full names of the actions of a snapshot that are in the state ERROR."""
     return [node for node, state in shown.nodes.items() if state == "ERROR"]
 
 
 def did_not_obey(names: Sequence[str]) -> str:
-    """Return the sentence for actions that an engine has given up as ERROR."""
+    """Return the clause, for people, about the actions `names` that the engine shows as ERROR
+    because they did not stop in time; the first ones are named, the others counted."""
     more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
     return (
         f"{', '.join(names[:_NAMED])}{more} did not obey within 5 s, or failed while it was told to "

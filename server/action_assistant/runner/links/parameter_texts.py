@@ -24,11 +24,9 @@ Values = dict[str, str]
 
 def values_of(slots: Iterable[Slot]) -> Values:
     """Return the values of parameters as JSON texts by flat name. `slots`: the parameters with
-    their values.
-
-    Parameters without a value, or with an `Opaque` one, are left out, and so are those after the
-    first `MOST`. Names and texts are cut to `LONGEST` characters.
-    """
+    their values. Not included are parameters without a value or with an `Opaque` one (of a type
+    that cannot be read), and all after the first `MOST`. Names and texts are cut to `LONGEST`
+    characters."""
     found: Values = {}
     for slot in slots:
         if slot.has_value() and not isinstance(slot.value, Opaque) and len(found) < MOST:
@@ -37,7 +35,8 @@ def values_of(slots: Iterable[Slot]) -> Values:
 
 
 def reported(text: bytes) -> Values | None:
-    """Return the values in `input_parameters` as an engine wrote them; None when they cannot be read."""
+    """Return the values in `input_parameters`, the JSON text of an engine, as `values_of` does;
+    None if it cannot be read."""
     try:
         group = parse(text)
     except Unreadable:
@@ -46,7 +45,8 @@ def reported(text: bytes) -> Values | None:
 
 
 def sent(umrf: str) -> dict[str, Values]:
-    """Return the values of every action in a graph as it was sent, by full name."""
+    """Return the input values in a graph text as it was sent, by full name of the action, as
+    `values_of` does. Actions without values are not included; {} if the text cannot be read."""
     try:
         graph = codec.read(umrf.encode()).graph
     except codec.Unreadable:

@@ -51,8 +51,8 @@ class GraphOutline(msgspec.Struct, frozen=True):
 
 
 def graph_outline(graph: Graph | GraphOutline) -> GraphOutline:
-    """Return the name of a graph and the keys of its actions, by full name; return an outline
-    unchanged."""
+    """Return the name of a graph and the keys of its actions, by full name, without undrawn
+    (missing) actions. A GraphOutline is returned unchanged."""
     if isinstance(graph, GraphOutline):
         return graph
     named = {each.full_name: each.key for each in graph.actions if not each.missing}
@@ -89,15 +89,13 @@ class Answer(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Standing(msgspec.Struct, frozen=True, kw_only=True):
-    """The present state of an engine, as far as it is known without asking the engine.
-
-    `servers`: how many answer on the path of its get; with exactly one, answers are a proof.
-    `newcomers`: names of nodes that receive starts and may be a second engine, which does not serve
-    its get yet. `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: other
-    publishers of starts. `actor`: the name in its feedback, "" before any. `process`: the engine's,
-    if on this computer. `indexes`: it reads its folders again while it runs, so that asking it then
-    may end it (H15); None if that is not known.
-    """
+    """The present condition of an engine, as far as it is known without asking it. `servers`: how
+    many answer on the path of its get; with exactly one, answers are a proof. `newcomers`: names of
+    nodes that receive starts and may be a second engine, which does not serve its get yet.
+    `listeners`: matched subscriptions by command (`start`, `stop` …). `others`: other publishers of
+    starts. `actor`: the name in its feedback, "" before any. `process`: the engine's, if on this
+    computer. `indexes`: it reads its folders again while it runs, so that asking it then may end it
+    (H15); None if that is not known. `incarnation` changes when it is restarted."""
 
     state: EngineState
     why: str = ""
@@ -135,7 +133,8 @@ class Transitions(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Feedback(msgspec.Struct, frozen=True, kw_only=True):
-    """Snapshots that the engine sent unasked, oldest first. The engine always leaves some out."""
+    """Snapshots that the engine sent unasked, oldest first. It never sends one for each state, so
+    some states are missing."""
 
     actor: str
     snapshots: tuple[Snapshot, ...]
@@ -159,7 +158,8 @@ class EngineChanged(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class ForeignCommand(msgspec.Struct, frozen=True, kw_only=True):
-    """A command to this engine that somebody else has published. `sender` tells publishers apart."""
+    """A command to this engine that another program has published. `umrf`: the graph text in it, ""
+    for none; `sender` distinguishes publishers."""
 
     at: int
     command: Command
@@ -209,33 +209,38 @@ class Link(Protocol):
 
     @property
     def standing(self) -> Standing:
-        """The standing of the engine now; every change of its state is also reported."""
+        """The present condition of the engine; every change of its state is also reported to
+        listeners."""
         ...
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start message. `leaves` is called right before the message leaves, on a robot
-        with no wait in between: a start that is given up before that call has certainly not left,
-        and NotSent from `leaves` holds the message back. Raise NotSent if the message has certainly
-        not left, EngineRefused if the engine refuses the start."""
+        """Publish one start message for the graph in `order`. `leaves` is called right before the
+        message leaves, on a robot with no wait in between: a start that is cancelled before that
+        call has certainly not left, and if `leaves` raises NotSent, the message is not sent. Raise
+        NotSent if the message has certainly not left, EngineRefused if the engine refuses the
+        start."""
         ...
 
     async def stop(self, graph_name: str) -> None:
-        """Publish one stop message. Raise NotSent if it could not be sent."""
+        """Publish one stop message for the graph of this name. Do not wait for its effect. Raise
+        NotSent if it could not be sent."""
         ...
 
     async def pause(self, graph_name: str) -> None:
-        """Publish one pause message. Raise NotSent if it could not be sent."""
+        """Publish one pause message for the graph of this name. Do not wait for its effect. Raise
+        NotSent if it could not be sent."""
         ...
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Publish one resume message. `continue_from` is the full name of an action that is started
-        when the graph goes on, "" for none. Raise NotSent if the message could not be sent."""
+        """Publish one resume message for the graph of this name. `continue_from` is the full name
+        of an action that is started when the graph goes on, "" for none. Raise NotSent if the
+        message could not be sent."""
         ...
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
         """Publish one modify message: the order's graph takes the place of the running graph of the
-        same name. Raise NotSent if the message could not be sent, EngineRefused if the engine
-        refuses the change."""
+        same name. `continue_from`: as for `resume`. Raise NotSent if the message could not be sent,
+        EngineRefused if the engine refuses the change."""
         ...
 
     async def get(self) -> Answer:
@@ -249,8 +254,9 @@ class Link(Protocol):
         ...
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Call `hear` with every report of the engine until the end of the block, on the event loop
-        and in order: a report that came before an answer is passed on before `get` returns."""
+        """Return a context during which `hear` is called with every report of the engine, on the
+        event loop and in order: a report that came before an answer is passed on before `get`
+        returns."""
         ...
 
     async def aclose(self) -> None:
@@ -272,8 +278,8 @@ class Registration(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class Candidate(msgspec.Struct, frozen=True, kw_only=True):
-    """An engine that discovery shows. `actor`: "" until its feedback was heard, since an engine
-    without a running graph does not say its name; a person has to know it then."""
+    """An engine that discovery shows. `actor`: its name, "" until its feedback was received, since
+    an engine without a running graph does not send its name; a person has to know it then."""
 
     domain: int
     rmw: str
@@ -293,7 +299,7 @@ class Sighting(msgspec.Struct, frozen=True):
 
 
 class Reach(Protocol):
-    """Makes links to robots, and owns what they share; one per process."""
+    """Makes links to robots, and owns what the links share; one per process."""
 
     @property
     def rmw(self) -> str:
@@ -301,20 +307,21 @@ class Reach(Protocol):
         ...
 
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
-        """Return a link to a robot. The call never waits and never fails: for a robot that cannot
-        be reached, the link refuses every command and says why. The link hears and answers only
-        while its `run` method runs."""
+        """Return a link to a registered robot, whose engine build is described by `facts`. The call
+        never waits and never fails: for a robot that cannot be reached, the link refuses every
+        command with the reason. The link receives reports and answers only while its `run` method
+        runs."""
         ...
 
     async def sighting(self) -> Sighting:
-        """Return the engines that are in sight now, on the domain of this process's environment and
-        on the domains of all links. The call does not wait for further engines to appear. Raise
-        RuntimeError if the domain cannot be joined."""
+        """Return the engines that discovery shows now, on the domain of this process's environment
+        and on the domains of all links. The call may join the domain, but does not wait for further
+        engines to appear. Raise RuntimeError if the domain cannot be joined."""
         ...
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Return the engines that are in sight once discovery has had its time; at first that takes
-        some seconds. Raise RuntimeError if the domain cannot be joined."""
+        """Return the engines that discovery shows once it has had its time; the call waits for
+        that, at first some seconds. Raise RuntimeError if the domain cannot be joined."""
         ...
 
     async def aclose(self) -> None:

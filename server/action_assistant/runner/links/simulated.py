@@ -87,8 +87,9 @@ class Simulators:
         led: frozenset[str] = frozenset(),
     ) -> "SimulatedLink":
         """Return a link to a new simulated engine, whose process begins with its first start.
-        Actions with a full name in `led` are carried out elsewhere. Raise TooMany if too many
-        simulated engines are alive."""
+        `facts`: the engine build to simulate; `script`: how its actions act (JSON, "" for none);
+        `behaviours`: the folder of Python behaviours of actions, or None; `led`: full names of
+        actions that robots carry out. Raise TooMany if too many simulated engines are alive."""
         going = [each for each in self._links if each.is_alive]
         if len(going) >= MOST:
             raise TooMany(f"{MOST} simulated runs go on already; stop some, or wait.")
@@ -101,7 +102,8 @@ class Simulators:
         return link
 
     async def take(self, report: Callable[[], None]) -> None:
-        """Call `report` while no other run reports, then wait for three times as long as it took."""
+        """Call `report` while no other run reports, then wait for three times as long as it took,
+        so that reports take a quarter of the runner's time at most."""
         async with self._turn:
             began = time.perf_counter()
             report()
@@ -144,7 +146,8 @@ class SimulatedLink:
 
     @property
     def standing(self) -> Standing:
-        """The standing: answering until the engine has crashed or hangs, or its process has ended."""
+        """The condition of the engine: answering until it has crashed or hangs, or its process has
+        ended."""
         if self._why:
             return Standing(state=self._state, why=self._why, incarnation=self._incarnation)
         return Standing(
@@ -157,7 +160,7 @@ class SimulatedLink:
 
     @property
     def is_alive(self) -> bool:
-        """True while the engine has a process."""
+        """True while the simulated engine has a process."""
         return self._process is not None and self._state != "gone"
 
     @property
@@ -166,8 +169,9 @@ class SimulatedLink:
         return self._made.behaviours is not None
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Start a graph now; the first start also starts the process. Raise NotSent if the process
-        cannot take the start, EngineRefused if the engine refuses it."""
+        """Call `leaves` and start the graph in `order` now; the first start also starts the
+        process. Raise NotSent if the process cannot take the start, EngineRefused if the engine
+        refuses it."""
         leaves()
         with anyio.CancelScope(shield=True):  # so that a Stop that comes meanwhile finds an engine
             if self._process is None and not self._why:
@@ -175,33 +179,35 @@ class SimulatedLink:
             await self._request("start", order)
 
     async def take_up(self, order: Order, course: LedCourse) -> None:
-        """Begin the process, and bring a graph to where an earlier engine had left it. Nothing of
-        that is reported except the calls that are still open. Raise NotSent if the process cannot
-        take it, EngineRefused if the engine refuses the graph."""
+        """Begin the process, and bring the graph in `order` to the point that an earlier engine had
+        reached by the events in `course`. Only the calls that are still open are reported. Raise
+        NotSent if the process cannot take it, EngineRefused if the engine refuses the graph."""
         with anyio.CancelScope(shield=True):
             await self._begin()
             await self._request("take_up", order, course)
 
     async def returned(self, returned: Returned) -> None:
-        """Take the end of a call that a robot carried out. Raise NotSent if the process has
-        ended."""
+        """Give the engine the end (outcome and outputs) of a call that a robot carried out. Raise
+        NotSent if the process has ended."""
         await self._request("returned", returned)
 
     async def stop(self, graph_name: str) -> None:
-        """Tell the engine to stop a graph now."""
+        """Send the engine the command to stop a graph. Do not wait for its effect."""
         self._say(next(self._numbers), "stop", graph_name)
 
     async def pause(self, graph_name: str) -> None:
-        """Tell the engine to pause a graph now."""
+        """Send the engine the command to pause a graph. Do not wait for its effect."""
         self._say(next(self._numbers), "pause", graph_name)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Tell the engine to resume a paused graph now."""
+        """Send the engine the command to resume a paused graph. `continue_from`: the full name of
+        an action that is started then, "" for none. Do not wait for its effect."""
         self._say(next(self._numbers), "resume", graph_name, continue_from)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Change a running graph now. Raise NotSent if the process cannot take the change,
-        EngineRefused if the engine refuses it."""
+        """Replace a running graph by the one in `order` now. `continue_from`: the full name of an
+        action that is started then, "" for none. Raise NotSent if the process cannot take the
+        change, EngineRefused if the engine refuses it."""
         await self._request("modify", order, continue_from)
 
     async def get(self) -> Answer:
@@ -222,7 +228,7 @@ class SimulatedLink:
         await anyio.sleep_forever()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Call `hear` with every transition until the end of the block."""
+        """Return a context during which `hear` is called with every report of the engine."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
@@ -271,7 +277,8 @@ class SimulatedLink:
         return True
 
     async def _read(self, reader: asyncio.StreamReader) -> None:
-        """Read answers and reports of the process until it has ended."""
+        """Read answers and reports of the process from its socket until it has ended, and pass them
+        on."""
         try:
             while True:
                 size = int.from_bytes(await reader.readexactly(_HEAD), "big")
@@ -298,7 +305,8 @@ class SimulatedLink:
         self._subscribers.tell(report)
 
     def _end(self, why: str) -> None:
-        """Mark the engine as gone, kill its process, and fail everything that waits for an answer."""
+        """Mark the engine as gone for the reason `why`, kill its process, and fail all calls that
+        wait for an answer. If its process died, report that to listeners."""
         was, self._state = self._state, "gone"
         fresh, self._why = not self._why, self._why or why
         if self._writer is not None:
@@ -326,7 +334,8 @@ def _framed(value: object) -> bytes:
 
 
 def _live(wire: socket.socket, made: _EngineConfig) -> None:
-    """Run one engine until the runner closes its end of the socket."""
+    """Run one simulated engine in this process until the runner closes its end of the socket
+    `wire`. `made`: the configuration of the engine."""
     performer: BehaviourPerformer | LedCalls | None = LedCalls(made.led) if made.led else None
     if made.behaviours is not None:
         bound_address_space()
@@ -374,7 +383,8 @@ async def _serve(
 
 
 def _woken(loop: asyncio.AbstractEventLoop, link: SimulatorLink) -> None:
-    """Wake the engine from the thread of a behaviour whose call has ended."""
+    """Wake the simulated engine of `link` from the thread of a behaviour whose call has ended.
+    `loop`: the event loop of the engine."""
     with suppress(RuntimeError):  # the loop has ended, and the engine with it
         loop.call_soon_threadsafe(link.wake)
 
@@ -388,7 +398,8 @@ async def _obeyed(link: SimulatorLink, command: str, args: tuple[Any, ...]) -> o
 
 
 def _parts(report: Report) -> Iterator[Report]:
-    """Split a report into parts of at most 100 changes, so that none keeps the runner busy for long."""
+    """Split a report into reports of at most 100 changes, so that none keeps the runner busy for
+    long."""
     if not isinstance(report, Transitions):
         yield report
         return

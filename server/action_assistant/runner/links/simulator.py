@@ -60,18 +60,17 @@ _SLICE: Final = 50  # engine steps between two turns of the event loop
 
 
 class LeadableLink(Link, Protocol):
-    """The link to an engine of this process's own, which can play a graph whose actions robots carry
-    out."""
+    """The link to a simulated engine that can play a graph whose actions robots carry out."""
 
     async def returned(self, returned: Returned) -> None:
-        """Take the end of a call that a robot carried out. Raise NotSent if the engine cannot take
-        it."""
+        """Give the engine the end (outcome and outputs) of a call that a robot carried out. Raise
+        NotSent if the engine cannot take it."""
         ...
 
     async def take_up(self, order: Order, course: LedCourse) -> None:
-        """Start a graph and bring it to where an earlier engine had left it. Nothing of that is
-        reported except the calls that are still open. Raise EngineRefused or NotSent if that cannot
-        be done."""
+        """Start the graph in `order` and bring it to the point that an earlier engine had reached
+        by the events in `course`. Only the calls that are still open are reported. Raise
+        EngineRefused or NotSent if that cannot be done."""
         ...
 
 
@@ -86,9 +85,10 @@ class Simulator(Protocol):
         behaviours: BehaviourFolder | None = None,
         led: frozenset[str] = frozenset(),
     ) -> "LeadableLink":
-        """Return a link to an engine with these facts. Its actions follow the script (JSON; "" for
-        none), or their behaviour if they have one. Actions with a full name in `led` are carried
-        out elsewhere."""
+        """Return a link to a new simulated engine. `facts`: the engine build to simulate; `script`:
+        how its actions act (JSON, "" for none); `clock_us`: returns microseconds UTC; `behaviours`:
+        the folder of Python behaviours, which come before the script; `led`: full names of actions
+        that robots carry out."""
 
 
 def in_this_process(
@@ -98,8 +98,9 @@ def in_this_process(
     behaviours: BehaviourFolder | None = None,
     led: frozenset[str] = frozenset(),
 ) -> "SimulatorLink":
-    """Return a simulated engine that shares the event loop, for tests in virtual time. Raises Unavailable for
-    behaviours."""
+    """Return a link to a simulated engine that shares the event loop, for tests in virtual time.
+    The parameters are those of `Simulator`; raise Unavailable for behaviours, which need a process.
+    """
     if behaviours is not None:
         raise Unavailable("Behaviours need a simulated engine in a process of its own.")
     performer = LedCalls(led) if led else None
@@ -115,7 +116,8 @@ def _keeps(node: str, state: str) -> bool:
 def engine_of(
     facts: EngineFacts, script: str, performer: BehaviourPerformer | LedCalls | None = None
 ) -> semantics.Engine:
-    """Return an engine that follows a script (JSON), which has been checked before; "" for none."""
+    """Return an engine of the build `facts` that follows a script (JSON; "" for none), which must
+    have been checked before. `performer`: carries out the actions that do not follow the script."""
     chosen = slowed(semantics.script_from(msgspec.json.decode(script))) if script else None
     return semantics.Engine(facts=facts, script=chosen, performer=performer)
 
@@ -151,7 +153,7 @@ class SimulatorLink:
 
     @property
     def standing(self) -> Standing:
-        """The standing: answering until the engine has crashed or hangs."""
+        """The condition of the engine: answering until it has crashed or hangs."""
         if self._dead is not None:
             return Standing(state="gone", why=self._dead, incarnation=self._incarnation)
         return Standing(
@@ -163,8 +165,8 @@ class SimulatorLink:
         )
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Start a graph now. Raise EngineRefused if the engine refuses it, NoAnswer if the engine
-        has crashed or hangs."""
+        """Call `leaves` and start the graph in `order` now. Raise EngineRefused if the engine
+        refuses it, NoAnswer if the engine has crashed or hangs."""
         self._alive()
         leaves()
         graph = _whole(order)
@@ -180,22 +182,25 @@ class SimulatorLink:
             raise EngineRefused(str(refused)) from refused
 
     async def stop(self, graph_name: str) -> None:
-        """Stop a graph now; the engine lets a second stop wait for the first one."""
+        """Stop a graph now; the engine carries out a second stop after the first one. Does nothing
+        after a crash."""
         if self._dead is None:
             self._tell(self._engine.stop(graph_name, self._now()))
 
     async def pause(self, graph_name: str) -> None:
-        """Tell the engine to pause a graph now."""
+        """Pause a graph now; does nothing if the engine has crashed or hangs."""
         if self._dead is None:
             self._tell(self._engine.pause(graph_name, self._now()))
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Tell the engine to resume a paused graph now."""
+        """Resume a paused graph now; does nothing if the engine has crashed or hangs.
+        `continue_from`: the full name of an action that is started then, "" for none."""
         if self._dead is None:
             self._tell(self._engine.resume(graph_name, self._now(), continue_from=continue_from))
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Change a running graph now. Raise NotSent if the engine has crashed or hangs,
+        """Replace a running graph by the one in `order` now. `continue_from`: the full name of an
+        action that is started then, "" for none. Raise NotSent if the engine has crashed or hangs,
         EngineRefused if it refuses the change."""
         if self._dead is not None:
             raise NotSent(self._dead)
@@ -206,14 +211,15 @@ class SimulatorLink:
             raise EngineRefused(str(refused)) from refused
 
     async def returned(self, returned: Returned) -> None:
-        """Take the end of a call that a robot carried out. Do nothing after a crash."""
+        """Give the engine the end (outcome and outputs) of a call that a robot carried out. Does
+        nothing if the engine has crashed or hangs."""
         if self._dead is None:
             self._tell(self._engine.returned(returned, self._now()))
 
     async def take_up(self, order: Order, course: LedCourse) -> None:
-        """Start a graph and bring it to where an earlier engine had left it. Nothing of that is
-        reported except the calls that are still open. Raise EngineRefused if the engine refuses the
-        graph, or does not survive its course."""
+        """Start the graph in `order` and bring it to the point that an earlier engine had reached
+        by the events in `course`. Only the calls that are still open are reported. Raise
+        EngineRefused if the engine refuses the graph, or crashes in the course."""
         name = order.graph.name
         self._runs[name] = order.run
         self._engine.library = {**self._engine.library, **_inside(order)}
@@ -266,7 +272,8 @@ class SimulatorLink:
         return Answer(asked_at=at, at=at, incarnation=self._incarnation, graphs=graphs)
 
     def _kept(self, graph: str, nodes: Mapping[str, str]) -> KeptValues:
-        """Return the values that the keepers of a graph hold, as a real engine shows them."""
+        """Return the values that the keepers in a graph hold, as a real engine shows them. `nodes`:
+        the states of its actions, by full name."""
         inside = self._engine.graphs[graph].nodes
         held: dict[int, bytes] = {}
         for node in (each for each, state in nodes.items() if _keeps(each, state)):
@@ -280,8 +287,8 @@ class SimulatorLink:
         return kept_in(held)
 
     async def run(self, heard: Callable[[], Awaitable[None]] | None = None) -> None:
-        """Run the engine until cancelled. After each batch of reports, wait until `heard` returns;
-        without `heard`, let other tasks run once."""
+        """Run the engine until cancelled. After each batch of reports, await `heard`, so that
+        listeners can slow the engine down; without `heard`, only let other tasks run."""
         heard = heard or anyio.lowlevel.checkpoint
         while True:
             due = self._engine.due
@@ -298,11 +305,11 @@ class SimulatorLink:
                 self._wake.set()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Call `hear` with every transition until the end of the block."""
+        """Return a context during which `hear` is called with every report of the engine."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """End the engine and its behaviours."""
+        """End the engine, and kill the behaviours that still run."""
         self._dead = "the simulated engine was switched off"
         if isinstance(self._performer, BehaviourPerformer):
             await anyio.to_thread.run_sync(self._performer.end, abandon_on_cancel=True)
@@ -320,7 +327,8 @@ class SimulatorLink:
             raise NoAnswer(self._dead)
 
     def _advance(self) -> bool:
-        """Catch up with the clock, by at most 50 steps; return whether nothing is due any more."""
+        """Process what is due by now, at most 50 steps, and report it; return whether nothing more
+        is due."""
         told: list[semantics.Trace] = []
         for returned in self._performer.taken() if self._performer is not None else ():
             told += self._engine.returned(returned, self._now())
@@ -355,8 +363,9 @@ class SimulatorLink:
                 self._fail(trace)
 
     def _begun(self, traces: Sequence[semantics.Trace]) -> dict[int, Values]:
-        """Return the input values of nodes that have just begun and still run, by the `id` of the trace that
-        tells of the begin. Nodes that have ended meanwhile have lost theirs."""
+        """Return the input values of the nodes that have begun in these traces and still run, by
+        the `id` of the Python object of the trace. Nodes that have ended meanwhile have lost
+        theirs."""
         last = {
             (trace.graph, trace.node): trace
             for trace in traces
@@ -370,8 +379,8 @@ class SimulatorLink:
         return found
 
     def _fail(self, hazard: semantics.HazardEvent) -> None:
-        """Stop answering after a crash or a hang, as a real engine does; report it as gone (crash)
-        or busy (hang)."""
+        """Stop answering after a crash or a hang (`hazard`), as a real engine does, and report the
+        engine as gone (crash) or busy (hang)."""
         what = "has crashed" if hazard.effect == "crash" else "hangs"
         why = f"The simulated engine {what} ({hazard.code}). {hazard.message}".rstrip()
         self._dead = why
@@ -384,8 +393,8 @@ class SimulatorLink:
         return self._origin_wall + round(t_ms * 1000)
 
     def _run_of(self, graph: str) -> str | None:
-        """Return the run to which a graph belongs. A sub-graph `GRAPH__NAME__ID` belongs to the run
-        of the longest known prefix."""
+        """Return the id of the run to which a graph belongs; None if there is none. A sub-graph
+        `GRAPH__NAME__ID` belongs to the run of the longest matching prefix."""
         if graph in self._runs:
             return self._runs[graph]
         owners = [name for name in self._runs if graph.startswith(f"{name}__")]
@@ -403,7 +412,8 @@ def _inside(order: Order) -> dict[str, Graph]:
 
 
 def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact | None:
-    """Return the change that a trace adds to the history; None for relations, which follow from results."""
+    """Return the change that a trace adds to the history, at the time `at` (µs UTC); None for
+    relations, which follow from results. `begun`: as `_begun` returns."""
     match trace:
         case semantics.NodeStateEvent():
             inputs = begun.get(id(trace))
@@ -423,7 +433,8 @@ def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact
 
 
 def slowed(script: Script) -> Script:
-    """Return the script with every action lasting at least 10 ms."""
+    """Return the script with every action lasting at least 10 ms, so that a graph without pauses
+    does not run without end in no time."""
     behaviours = {
         key: tuple(
             msgspec.structs.replace(each, after_s=max(each.after_s, _QUICKEST_S)) for each in calls

@@ -27,21 +27,21 @@ class UnreachableLink:
 
     @property
     def standing(self) -> Standing:
-        """The standing `gone`, with the reason."""
+        """The condition `gone`, with the reason."""
         return Standing(state="gone", why=self._why)
 
     async def _refuse(self, *_: object, **__: object) -> NoReturn:
-        """Raise NotSent: nobody can be told to do anything."""
+        """Raise NotSent: there is no engine that could be reached."""
         raise NotSent(self._why)
 
     start = stop = pause = resume = modify = _refuse
 
     async def get(self) -> Answer:
-        """Raise NoAnswer: nobody can be asked."""
+        """Raise NoAnswer: there is no engine that could be asked."""
         raise NoAnswer(self._why)
 
     async def run(self) -> None:
-        """Wait until cancelled; the link does nothing."""
+        """Wait until cancelled; such a link has no work to do."""
         await anyio.sleep_forever()
 
     def listen(self, _: Callable[[Report], None]) -> AbstractContextManager[None]:
@@ -49,4 +49,4 @@ class UnreachableLink:
         return nullcontext()
 
     async def aclose(self) -> None:
-        """Do nothing, since the link holds nothing."""
+        """Do nothing: such a link has nothing to close."""

@@ -34,8 +34,8 @@ _PAUSE_S: Final = 0.05  # between two such transactions
 
 
 class SumUpLoop:
-    """Sums up ended runs until cancelled. `summed` computes the sum of a run, given its id and the
-    present time in microseconds UTC."""
+    """Computes and stores the totals of ended runs, for lists and statistics. `summed` computes the
+    event with them for a run, given its id and the present time in microseconds UTC."""
 
     def __init__(
         self,
@@ -51,19 +51,20 @@ class SumUpLoop:
         self._tried: Counter[str] = Counter()  # how often the sum of a run ended its worker
 
     def begin_again(self) -> None:
-        """Examine all runs again, at once."""
+        """Examine all runs again, starting at once; the call does not wait."""
         self._summed_up = None
         self._ended.set()
 
     def run_changed(self, run: Run, recorder: RunRecorder) -> None:
-        """Note that an open run has changed."""
+        """Call this when an open run has changed: if it has ended, its totals are computed soon.
+        `recorder`: of the run."""
         if run.end is not None:
             if not recorder.recorded:
                 self._summed_up = None  # its end may be stored much later
             self._ended.set()
 
     async def run(self) -> None:
-        """Sum up ended runs, also those of earlier processes, until cancelled."""
+        """Compute the totals of ended runs, also of runs of earlier processes, until cancelled."""
         while True:
             ended, self._ended = self._ended, anyio.Event()
             try:
@@ -80,7 +81,8 @@ class SumUpLoop:
             await self._ended.wait()
 
     async def _some(self) -> bool:
-        """Sum up the newest of the ended runs that have no sum; return whether there were any."""
+        """Compute and store the totals of the newest ended runs that have none; return whether
+        there were any."""
         before, since = self._clock_us(), self._summed_up
         figures = func.coalesce(func.json_extract(run.c.summary, "$.figures"), 0)
         done = select(review.c.run).where(
@@ -116,14 +118,14 @@ class SumUpLoop:
 
 def due_after(stored: int) -> int:
     """Return the number of keyframes at which a run's keyframes are stored again, after `stored` of
-    them. All are written each time, so the interval grows: 100,000 events write some 70 MB in
-    all, not 200."""
+    them were stored. All are written each time, so the interval grows: 100,000 events write some 70
+    MB in all, not 200."""
     return stored + max(1, stored // _UNKEPT_PART)
 
 
 class KeyframeLoop:
-    """Stores keyframes of long runs while they go on, until cancelled, so that they need not be
-    folded from the start after a crash. `make` makes and stores the keyframes of a run."""
+    """Stores keyframes of long runs while they go on, so that they need not be folded from the
+    start after a crash. `make` makes and stores the keyframes of a run."""
 
     def __init__(self, make: Callable[[str], Awaitable[object]]) -> None:
         self._make = make
@@ -132,7 +134,8 @@ class KeyframeLoop:
         self._wake = anyio.Event()
 
     def run_changed(self, run: Run, recorder: RunRecorder) -> None:
-        """Note that an open run has changed."""
+        """Call this when an open run has changed: if it has grown enough, its keyframes are stored
+        soon. `recorder`: of the run."""
         count = recorder.seq // APART
         if run.end is not None:  # its sum makes its keyframes
             self._kept.pop(run.id, None)
@@ -158,8 +161,8 @@ class KeyframeLoop:
 
 
 async def index_words(journal: Journal) -> None:
-    """Index the words of old runs, in batches, until all are indexed. Raises nothing, since a
-    search reads unindexed runs."""
+    """Index the words of old runs for the search, in batches, until all are indexed. Wait and retry
+    while the journal is unavailable; no error is raised, since a search reads unindexed runs."""
     while True:
         try:
             if not await journal.derive(partial(index_some, most=_INDEXED_AT_ONCE)):

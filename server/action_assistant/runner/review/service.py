@@ -29,8 +29,9 @@ class RunMarks(msgspec.Struct, frozen=True):
 
 
 class ReviewService:
-    """Stores what people note about runs, and keeps the loops that work on stored runs. It sends no
-    commands. `queries` answers questions in workers; `next_number` gives the number for a new run."""
+    """Stores the marks of people on runs, and runs the loops that work on stored runs. It sends no
+    commands. `queries` answers questions in workers; `next_number` returns the number for a new
+    run."""
 
     def __init__(
         self,
@@ -49,18 +50,20 @@ class ReviewService:
         self._keyframes = KeyframeLoop(lambda run: queries.value(StoredRuns.made_keyframes, run))
 
     def run_changed(self, run: Run, recorder: RunRecorder) -> None:
-        """Note that an open run has changed."""
+        """Call this when an open run has changed, so that its totals and keyframes are stored when
+        due. `recorder`: of the run."""
         self._sums.run_changed(run, recorder)
         self._keyframes.run_changed(run, recorder)
 
     async def run(self) -> None:
-        """Sum up ended runs and store keyframes of long ones, until cancelled."""
+        """Compute totals of ended runs and store keyframes of long ones, until cancelled."""
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._sums.run)
             tasks.start_soon(self._keyframes.run)
 
     async def mark(self, run_id: str, marks: annotations.Marks, author: Author) -> RunMarks:
-        """Pin, note or label a run, and return its marks. Raise NotFound if there is no such run."""
+        """Pin, annotate or label a run in the name of `author`, and return all its marks. Raise
+        NotFound if there is no such run."""
         if not await self._journal.newest(stream_of(run_id)):
             raise NotFound("There is no such run.")
         marked = annotations.Marked(self._clock_us(), author, marks)
@@ -68,7 +71,7 @@ class ReviewService:
         return await self.marks(run_id)
 
     async def marks(self, run_id: str) -> RunMarks:
-        """Return the marks of a run."""
+        """Return the marks of a run: pin, note and labels."""
         rows = await self._journal.query(select(review).where(review.c.run == run_id))
         labels = await self._journal.query(
             select(run_label.c.label).where(run_label.c.run == run_id).order_by(run_label.c.label)
@@ -77,8 +80,9 @@ class ReviewService:
         return RunMarks(bool(pinned), note, [row.label for row in labels])
 
     async def take_in(self, texts: Sequence[bytes], author: Author) -> list[str]:
-        """Import recorded runs as examples, each once; return their ids. Raise BadInput if a text
-        is no recorded run, Unavailable if the journal cannot be written."""
+        """Import recorded runs as examples, each once; return their ids. `texts`: lines of JSON;
+        `author`: who imports them. Raise BadInput if a text is no recorded run, Unavailable if the
+        journal cannot be written."""
         imported: list[str] = []
         for text in texts:
             first, rest = examples.read(text)
@@ -100,8 +104,9 @@ class ReviewService:
     async def expect(
         self, wanted: expected_runs.Expect, author: Author
     ) -> expected_runs.Expectation:
-        """Save an expected course. Raise NotFound for an unknown run; BadInput, NotUmrf or TooLarge
-        for a bad request; Conflict if the simulator takes another course than the run."""
+        """Save an expected course in the name of `author`. `wanted`: a run, or a graph with a
+        script. Raise NotFound for an unknown run; BadInput, NotUmrf or TooLarge for a bad request;
+        Conflict if the simulator takes another course than the run."""
         name = expected_runs.name_of(wanted.name)
         now = self._clock_us()
         await self._queries.wait_until_stored(wanted.run)
@@ -110,7 +115,8 @@ class ReviewService:
         return expected_runs.expectation_view(saved)
 
     async def retire(self, name: str, author: Author) -> None:
-        """Remove the expected course of this name. Raise NotFound if there is none."""
+        """Remove the expected course of this name. `author`: who removes it. Raise NotFound if
+        there is no such course."""
         if not await self._journal.query(select(expectation).where(expectation.c.name == name)):
             raise NotFound(f"Nothing is expected under the name {name!r}.")
         retired = expected_runs.Retired(self._clock_us(), name, author)

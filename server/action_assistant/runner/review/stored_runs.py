@@ -71,7 +71,8 @@ class HistoryEvent(msgspec.Struct, frozen=True):
 async def numbers_with(
     text: str, rows: Callable[[Select[Any]], Awaitable[Sequence[Row[Any]]]]
 ) -> set[int] | None:
-    """Return the numbers of all runs that may contain a text; None if there may be very many."""
+    """Return the numbers of all runs that may contain a text, by the index of words; None if there
+    may be too many, or if only reading all runs can answer. `rows`: runs a SELECT."""
     pieces = word_index.pieces(text)
     late = await rows(word_index.unindexed()) if pieces else []
     for piece in pieces if len(late) <= word_index.MOST else []:
@@ -102,8 +103,8 @@ class StoredRuns:
         return (await self.keyframe_store.keyframes(run_id)).keys[-1].seq
 
     async def summed(self, run_id: str, now: int) -> annotations.SummedUp:
-        """Return the sum of a run that is over. `now` is the present time in microseconds UTC.
-        Raise NotFound if there is no such run."""
+        """Return the event with the totals of a run that is over. `now` is the present time in
+        microseconds UTC. Raise NotFound if there is no such run."""
         found = (await self.keyframe_store.keyframes(run_id)).keys[-1].run
         good = found.end == "finished" and found.result == "on_true"
         graph = None if good else await self._graph(run_id)  # only a run that went badly has causes
@@ -168,8 +169,8 @@ class StoredRuns:
         return shown
 
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
-        cannot be read."""
+        """Return the rows of a SELECT on the tables. Raise Unavailable if the journal cannot be
+        read."""
         return await self._journal.query(statement)
 
     async def events(self, run_id: str, after: int, limit: int) -> Sequence[Event]:
@@ -219,7 +220,8 @@ class StoredRuns:
         return (await self._history.umrf(run_id)).encode()
 
     async def compare(self, a: str, b: str) -> RunComparison:
-        """Compare two runs, given by their ids. Raise NotFound if one of them does not exist."""
+        """Return the comparison of the runs with the ids `a` and `b`. Raise NotFound if one of them
+        does not exist."""
         one, other = await self.known(a), await self.known(b)
         sent_a, sent_b = await self._sent_tree(a), await self._sent_tree(b)
         return compare(one, other, sent_a, sent_b)
@@ -230,8 +232,8 @@ class StoredRuns:
         return SentTree(sent.umrf, inside, sent.script)
 
     async def export(self, run_id: str, form: Format) -> bytes:
-        """Return the run as the contents of a file in this format. Raise NotFound if there is no
-        such run."""
+        """Return the run as the contents of a file in the format `form`: CSV of visits, MCAP, or
+        lines of JSON. Raise NotFound if there is no such run."""
         found = await self.known(run_id)
         if form == "csv":
             return exports.intervals(found)
@@ -245,8 +247,9 @@ class StoredRuns:
         return b"".join(exports.lines(run_id, events))
 
     async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
-        """Return a page of JSON lines of one stream, and the seq of its last event: a long run need
-        not be in memory as a whole. Raises NotFound when the run has no events."""
+        """Return a page of the stored events after number `after`, as lines of JSON, and the number
+        (seq) of its last event, so that a long run need not be in memory as a whole. Raise NotFound
+        if the run has no events."""
         events = await self._journal.read(stream_of(run_id), after=after, limit=_PAGE)
         if not events and not after:
             raise NotFound("There is no such run.")
@@ -260,8 +263,10 @@ class StoredRuns:
     async def script(
         self, run_id: str, fault: tuple[str, expected_runs.Fault] | None, umrf: bytes | None = None
     ) -> expected_runs.Recorded:
-        """Return the run as a script, for its own graph or for another version of it. Raise
-        NotFound for an unknown run; BadInput, NotUmrf or TooLarge for a bad fault or graph."""
+        """Return the run as a script, for its own graph or for another version of it (`umrf`: the
+        text, None for its own). `fault`: an action and the fault with which its last visit ends
+        instead. Raise NotFound for an unknown run; BadInput, NotUmrf or TooLarge for a bad fault or
+        graph."""
         found = await self.known(run_id)
         if fault is not None and fault[0] not in found.actions:
             raise BadInput(f"The run has no action {fault[0]!r}.", where={"path": "/fault"})
@@ -300,9 +305,10 @@ class StoredRuns:
         author: Author,
         now: int,
     ) -> expected_runs.Expected:
-        """Return the event that saves an expected course. Raise NotFound for an unknown run;
-        BadInput, NotUmrf or TooLarge for a bad request; Conflict if the simulator takes another
-        course than the run."""
+        """Return the event that saves an expected course under `name`. `wanted`: a run, or a graph
+        with a script; `author`: who saves it; `now`: µs UTC. Raise NotFound for an unknown run;
+        BadInput, NotUmrf or TooLarge for a bad request; Conflict if the run is not over or the
+        simulator takes another course."""
         if wanted.run == "":
             return expected_runs.of_dry_run(wanted, name, author, now)
         found = await self.known(wanted.run)
@@ -317,8 +323,8 @@ class StoredRuns:
         limit: int,
         open_runs: Mapping[str, views.RunSummary],
     ) -> list[views.Listed]:
-        """Return runs, newest first. `open_runs`: summaries of open runs by id, which the tables do not
-        have."""
+        """Return at most `limit` runs that fit the filter `wanted`, newest first. `open_runs`:
+        summaries of open runs by id, whose states the tables do not have."""
         among = None if wanted.text is None else await numbers_with(wanted.text, self.rows)
         rows = await self.rows(queries.listed(wanted, limit, among))
         labels = await self._labels(rows)
@@ -338,8 +344,8 @@ class StoredRuns:
         return found
 
     async def streamed(self, run: str, after: int) -> tuple[int, bytes]:
-        """Return a page of stored events in the format of an event stream, and the seq of the last
-        one."""
+        """Return a page of the stored events of a run after number `after`, in the format of an
+        HTTP event stream, and the number (seq) of the last one."""
         events = await self.events(run, after, _PAGE)
         lines = [
             b"id: %d\nevent: %b\ndata: %b\n\n" % (each.seq, each.kind.encode(), _event_json(each))
@@ -354,8 +360,8 @@ class StoredRuns:
     async def checked_courses(
         self, graph: str, umrf: bytes, subgraphs: Sequence[SentSubgraph] = ()
     ) -> CheckedCourses:
-        """Check the expected courses of a graph against this text of it. Raise BadInput, NotUmrf or
-        TooLarge if the text cannot be read."""
+        """Check the saved expected courses of a graph (its id) against this text of it and its
+        sub-graphs. Raise BadInput, NotUmrf or TooLarge if the text cannot be read."""
         saved = await self._all_saved(expectation.c.graph == graph)
         return check_courses(saved, umrf, subgraphs=subgraphs)
 

@@ -41,8 +41,9 @@ class StoragePaths(msgspec.Struct, frozen=True):
 
 
 class WorkerQueries:
-    """Answers questions in a worker. `recorder_of` returns the recorder of an open run, None for any
-    other id. Snapshots that the worker made are stored by `tasks` afterwards."""
+    """Answers questions about stored runs in a worker process. `recorder_of` returns the recorder
+    of an open run, None for any other id. Snapshots that the worker made are stored by `tasks`
+    afterwards."""
 
     def __init__(
         self,
@@ -63,8 +64,8 @@ class WorkerQueries:
         *args: P.args,
         **kw: P.kwargs,
     ) -> T:
-        """Return the result of a method of `StoredRuns`, called in a worker. Raise its errors;
-        Unavailable or TooMany if no worker can answer."""
+        """Call a method of `StoredRuns` (`question`) with these arguments in a worker, and return
+        its result. Raise its errors; Unavailable or TooMany if no worker can answer."""
         value: T = await self._ask(answered, partial(question, **kw), args)
         return value
 
@@ -74,18 +75,20 @@ class WorkerQueries:
         *args: P.args,
         **kw: P.kwargs,
     ) -> bytes:
-        """Return what a method of `StoredRuns` returns, as JSON that the worker encoded."""
+        """Call a method of `StoredRuns` (`question`) with these arguments in a worker, and return
+        its result as JSON. Raise its errors; Unavailable or TooMany if no worker can answer."""
         text: bytes = await self._ask(encoded, partial(question, **kw), args)
         return text
 
     async def newest(self, run: str) -> int:
-        """Return the seq of the last stored event of a run; 0 when there is none. Raise Unavailable
-        if the journal cannot be read."""
+        """Return the number (seq) of the last stored event of a run, after a wait until those shown
+        so far are stored; 0 without any. Raise Unavailable if the journal cannot be read."""
         await self.wait_until_stored(run)
         return await self._journal.newest(stream_of(run))
 
     async def past(self, run: str, robots_too: bool) -> tuple[Run, int]:
-        """Return a run that is over, and the seq of its last event, as `history.Past`."""
+        """Return a run that is over, and the number (seq) of its last event. `robots_too`: with all
+        its visits, else with the newest ones."""
         return await self.value(StoredRuns.followed, run, robots_too)
 
     async def _ask(
@@ -94,7 +97,8 @@ class WorkerQueries:
         question: Callable[..., Awaitable[Any]],
         args: Sequence[Any],
     ) -> Any:
-        """Return what `work` makes of a question, in a worker that sees all that was shown."""
+        """Return the result of `work` for a question, run in a worker. If the question is about an
+        open run, first wait until the events shown so far are stored."""
         for each in args:
             if isinstance(each, str):
                 await self.wait_until_stored(each)
@@ -125,8 +129,9 @@ class WorkerQueries:
 def answered(
     paths: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[Any, list[StreamSnapshot]]:
-    """Answer a question about stored runs in the worker. Return the answer, and the snapshots made
-    for it, which the caller stores. Raise the errors of the question."""
+    """Answer a question (a method of `StoredRuns`) in this worker process, from the database at
+    `paths`. Return the answer, and the snapshots made for it, which the caller stores. Raise the
+    errors of the question."""
     stored_runs, file = _reading(paths)
     found = asyncio.run(_asked(question, stored_runs, args))
     return found, file.given()
@@ -135,8 +140,9 @@ def answered(
 def encoded(
     paths: StoragePaths, question: Callable[..., Awaitable[Any]], args: Sequence[Any]
 ) -> tuple[bytes, list[StreamSnapshot]]:
-    """Answer a question about stored runs in the worker. Return the answer as JSON, and the
-    snapshots made for it, which the caller stores. Raise the errors of the question."""
+    """Answer a question (a method of `StoredRuns`) in this worker process, from the database at
+    `paths`. Return the answer as JSON, and the snapshots made for it, which the caller stores.
+    Raise the errors of the question."""
     found, snapshots = answered(paths, question, args)
     return msgspec.json.encode(found), snapshots
 
@@ -158,7 +164,7 @@ async def _in_this_thread(work: Callable[..., T], *args: Any) -> T:
 
 
 class _ReadOnlyJournal(FileJournalReader):
-    """The journal in a worker: snapshots to store are handed to the runner."""
+    """The journal in a worker, which cannot write: snapshots to store are collected for the runner."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
@@ -167,14 +173,14 @@ class _ReadOnlyJournal(FileJournalReader):
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
     ) -> int:
-        """Raise Unavailable always: a worker writes nothing."""
+        """Raise Unavailable always: a worker does not write."""
         raise Unavailable("A worker writes nothing.")
 
     async def keep_snapshot(self, stream: str, seq: int, state: bytes) -> None:
-        """Keep a snapshot for the runner to store."""
+        """Collect a snapshot of a stream at event number `seq`, which the runner stores."""
         self._kept.append(StreamSnapshot(stream, seq, state))
 
     def given(self) -> list[StreamSnapshot]:
-        """Return the snapshots to store, each once."""
+        """Return the collected snapshots, and empty the collection."""
         given, self._kept = self._kept, []
         return given

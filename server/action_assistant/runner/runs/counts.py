@@ -28,7 +28,8 @@ class VisitCount(msgspec.Struct, frozen=True):
 
 
 def visit_counts(run: Run) -> dict[str, VisitCount]:
-    """Return the count of each action of a run, by its name in the run."""
+    """Return how often each action of a run ran, by its name in the run, with visits that nobody
+    saw but that must have happened."""
     seen = {name: each.older + len(each.visits) for name, each in run.actions.items()}
     exact = {name for name, each in run.actions.items() if _is_exact(run, name, each)}
     inside = tuple(_inside(run)) if run.inner else ()
@@ -48,7 +49,8 @@ def visit_counts(run: Run) -> dict[str, VisitCount]:
 
 
 def _is_exact(run: Run, name: str, action: ActionRun) -> bool:
-    """Return whether no visit of this action can have been missed."""
+    """Return whether every visit of this action was seen for certain. `name`: of the action in the
+    run, with a "/" inside of a sub-graph."""
     if "/" in name and run.led is not None:
         return False  # a robot shows what is inside of a piece, and may miss visits
     if action.by == "" and action.visits:
@@ -61,8 +63,9 @@ def _is_exact(run: Run, name: str, action: ActionRun) -> bool:
 
 
 def _inside(run: Run) -> Iterator[tuple[str, str, Laps]]:
-    """Yield the actions of graphs inside, outer ones first: the name, the action around it, and the
-    laps of its graph."""
+    """Yield the actions inside of sub-graphs, those of outer sub-graphs first. Each item: the name
+    in the run, the name of the action around it, and the `Laps` of its graph (which of its actions
+    run only once)."""
     inside: dict[str, list[str]] = {}
     for name in run.actions:
         part, mark, node = name.rpartition("/")
@@ -81,8 +84,9 @@ def _inside(run: Run) -> Iterator[tuple[str, str, Laps]]:
 
 
 def _needs_inside(inside: Iterable[tuple[str, str, Laps]]) -> Iterator[tuple[str, str, int]]:
-    """Yield which visits the actions of graphs inside need: of their parents, and of the action
-    around them. How often the entry of a graph inside starts an action besides is not known."""
+    """Yield how visits of actions inside of sub-graphs need visits of others, as (action, needed
+    action, visits possible without it): of the only parent, and of the action around it. `inside`:
+    as `_inside` yields."""
     needs: dict[str, Mapping[str, str]] = {}
     for name, around, laps in inside:
         part, _, node = name.rpartition("/")
@@ -97,7 +101,8 @@ def _needs_inside(inside: Iterable[tuple[str, str, Laps]]) -> Iterator[tuple[str
 
 
 def _forced(proven: Mapping[str, int], needs: Iterable[tuple[str, str, int]]) -> dict[str, int]:
-    """Return the numbers of visits that are proven or that the arrows force."""
+    """Return the least number of visits of each action: `proven` by observations, or forced by
+    `needs`, items of (action, needed action, visits possible without it)."""
     least = dict(proven)
     parents: dict[str, list[tuple[str, int]]] = {}
     for child, parent, besides in needs:

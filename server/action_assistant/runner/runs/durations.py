@@ -30,7 +30,8 @@ class DurationBounds(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def duration_bounds(least: int, most: int | None) -> DurationBounds:
-    """Convert bounds in microseconds, each rounded outwards to a millisecond."""
+    """Convert bounds in microseconds to seconds, each rounded outwards to a millisecond. `most`:
+    None without an upper bound."""
     above = None if most is None else max(0, math.ceil(most / 1000) / 1000)
     return DurationBounds(least=max(0, math.floor(least / 1000) / 1000), most=above)
 
@@ -57,8 +58,8 @@ def of_run(run: Run) -> DurationBounds | None:
 
 
 def at_rank(spans: Sequence[DurationBounds], share: float) -> DurationBounds | None:
-    """Return the smallest duration that at least `share` of these do not exceed, each bound taken
-    separately; None without durations."""
+    """Return the percentile of durations: the smallest one that at least `share` (0 to 1) of
+    `spans` do not exceed, computed for both bounds separately; None without durations."""
     if not spans:
         return None
     place = max(0, math.ceil(share * len(spans)) - 1)

@@ -38,8 +38,8 @@ class Override(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Overridden(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """A problem that would have blocked a start, worded as in its pre-flight. `aid` and `path` are
-    its place in the graph that was sent."""
+    """A problem that would have blocked a start, with the words of its pre-flight. `aid` (the key
+    of the action) and `path` are its place in the graph that was sent."""
 
     code: str
     text: str
@@ -60,10 +60,11 @@ class RunSubgraph(msgspec.Struct, frozen=True, omit_defaults=True):
 
 class Led(msgspec.Struct, frozen=True, kw_only=True):
     """The robots of a conducted run. `robots`: the engine that plays each actor, "" being the actor
-    of actions that name none. `players`: the engine of each action, by full name. `lives`: the life of
-    each engine, as it was looked at before the start. `lost`: what
-    happens when a robot does not answer or its step fails, a Stop of everything or a wait for a
-    person. `together`: a person agreed that a robot may carry out two steps at once."""
+    of actions that name none. `players`: the engine of each action, by full name. `lives`: the id
+    of each engine's process when it was checked before the start. `lost`: what happens when a robot
+    does not answer or its step fails: a Stop of everything, or a wait for a person. `together`: a
+    person agreed that a robot may carry out two steps at once. `keeping`: the engines that have the
+    helper package by which outputs can be read."""
 
     robots: dict[str, str]
     players: dict[str, str]
@@ -115,8 +116,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The start message was sent, once. `incarnation`: the life of the engine that received it;
-    `process`: the engine's process, if it is on the runner's computer."""
+    """The start message was sent, once. `incarnation`: the id of the engine process that was to
+    receive it; `process`: that process, if it is on the runner's computer."""
 
     kind: ClassVar[str] = "run.published.v1"
 
@@ -272,9 +273,9 @@ class Loading(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class AtRest(msgspec.Struct, frozen=True):
-    """The observation that ended a run where no answer of the engine proves rest: `by` a person who
-    looked, or by the runner itself (None), which saw the engine's process, or its last
-    thread for the run, end."""
+    """The observation that ended a run where no answer of the engine proves that nothing moves.
+    `by`: the person who saw it; None if the runner saw that the engine's process, or its last
+    thread for the run, had ended. `how`: in words."""
 
     by: Author | None
     at: int
@@ -283,7 +284,7 @@ class AtRest(msgspec.Struct, frozen=True):
 
 class Ended(msgspec.Struct, frozen=True, omit_defaults=True):
     """The run is over, in this state; for `refused` and `lost` `detail` says why. `at_rest`: who
-    saw rest where no answer of the engine could prove it."""
+    saw that nothing moves, where no answer of the engine could prove it."""
 
     kind: ClassVar[str] = "run.ended.v1"
 
@@ -335,12 +336,12 @@ class PieceSeen(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class PieceRest(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The knowledge about the rest of a piece of a conducted run has changed. `state`: it goes on
-    ("going"), gets Stops until rest is proven ("stopping"), its robot does not answer ("silent"), no
-    answer can prove its rest any more ("unproven"), an answer has proven it ("proven"), somebody or
-    something has seen it ("seen"), or nothing of it ever began ("unsent"). `since`: when that began;
-    `why`: the reason, or how rest was seen; `stops`: a Stop is asked for; `asks`: the piece has ended
-    without an outcome, which a person has to give."""
+    """The proof that a piece of a conducted run is at rest (nothing of it moves) has come further,
+    or got lost. `state`: it goes on ("going"), gets Stops until rest is proven ("stopping"), its
+    robot does not answer ("silent"), no answer can prove its rest any more ("unproven"), an answer
+    has proven it ("proven"), a person or the runner has seen it ("seen"), or it never began
+    ("unsent"). `since`: when that began; `why`: the reason, or how rest was seen; `stops`: a Stop
+    is asked for; `asks`: the piece has ended without an outcome, which a person has to give."""
 
     kind: ClassVar[str] = "run.piece_rest.v1"
 
@@ -357,16 +358,16 @@ class PieceRest(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
     @property
     def rests(self) -> bool:
-        """True once nothing of the piece goes on."""
+        """True once the piece is at rest, proven or seen, or never began."""
         return self.state in {"proven", "seen", "unsent"}
 
 
 class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """A call of a conducted run has its outcome. `how`: by the states of the piece in an answer that
-    was asked for after its end, by the word of a person, or because nothing of it was ever sent.
-    `hash`: the SHA-256 of that answer. `outputs`: the values that the action gave, as JSON by flat
-    name, and `unset` those that it did not give, or that nobody saw where a person gave the outcome;
-    both empty where no answer can show them."""
+    """A call of a conducted run has its outcome. `how`: by the states of the piece in an answer
+    that was asked for after its end ("shape"), by a person's statement ("word"), or because nothing
+    of it was ever sent ("unsent"). `hash`: the SHA-256 of that answer. `outputs`: the values that
+    the action gave, as JSON by flat name; `unset`: outputs that it did not set, or that nobody saw
+    where a person gave the outcome; both empty where no answer can show them."""
 
     kind: ClassVar[str] = "run.piece_ended.v1"
 

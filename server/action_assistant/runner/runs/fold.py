@@ -80,8 +80,9 @@ _UNSEEN: Final = ActionRun()
 
 
 def replay(events: Iterable[RunEvent], run: Run | None = None) -> Run | None:
-    """Fold events in order, going on from `run`; None before a `Requested` event. A row of
-    `Observed` events is folded in one go, since each fold of observations copies all actions."""
+    """Fold events in order, going on from `run`, and return the run after the last one; None if
+    there was no `Requested` event. Consecutive `Observed` events are folded in one go, since each
+    fold of observations copies all actions."""
     for kind, row in groupby(events, key=type):
         if run is not None and run.end is None and kind is Observed:
             run = observe(run, chain.from_iterable(map(_SEEN, row)))
@@ -95,7 +96,7 @@ def replay(events: Iterable[RunEvent], run: Run | None = None) -> Run | None:
 
 
 def begin(event: Requested) -> Run:
-    """Return the run after its first event."""
+    """Return the run after its first event, the accepted start."""
     known = event.laps if event.laps is not None else _laps(event.umrf)
     players = event.led.players if event.led is not None else {}
     once, joined = frozenset(known.once), frozenset(known.barring_errors)
@@ -116,7 +117,7 @@ def begin(event: Requested) -> Run:
 
 
 def _laps(umrf: str) -> Laps:
-    """Derive from the graph which actions run once, for old runs that did not store this."""
+    """Derive from the graph text which actions run only once, for old runs that did not store this."""
     try:
         return laps(codec.read(umrf.encode()).graph)
     except codec.Unreadable:
@@ -187,7 +188,8 @@ def follow(run: Run, event: RunEvent) -> Run:
 
 
 def _desired(run: Run, event: PauseRequested | ResumeRequested | StopRequested) -> Run:
-    """Fold a pause, resume or stop: once a stop is wanted, nothing takes it back."""
+    """Fold the wish of a person to pause, resume or stop; once a Stop was pressed, no later wish
+    changes that."""
     is_stopped = run.desired == "stopped"
     match event:
         case PauseRequested():
@@ -222,7 +224,8 @@ def _with_intervention(
     event: PauseRequested | ResumeRequested | StopRequested | ModifyRequested,
     kind: Literal["stop", "pause", "resume", "modify"],
 ) -> Run:
-    """Add a command of a person, with the state of the run that was known at that time."""
+    """Add a command of a person to the run, with the state in which the run was then, as far as
+    known. `kind`: the command."""
     asked = Intervention(
         kind=kind, at=event.at, by=event.author, state=run.state, active=run.active
     )
@@ -240,7 +243,8 @@ def _alarmed(run: Run, event: AlarmRaised) -> Run:
 
 
 def _meddled(run: Run, alarm: str) -> Run:
-    """Fold the alarm of a foreign command: other people may do what the graph rules out."""
+    """Fold the code of an alarm about a command of another program: such a command may cause what
+    the graph alone rules out, so later conclusions allow for it."""
     match alarm:
         case "foreign_pause":
             return _held(run)
@@ -255,7 +259,7 @@ def _meddled(run: Run, alarm: str) -> Run:
 
 
 def is_news(run: Run, shown: Snapshot) -> bool:
-    """Return whether a snapshot shows a state or a message that is not known yet."""
+    """Return whether a snapshot shows any state, message or value of the run that is not known yet."""
     own = shown.graph == run.graph_name
     if shown.state != (run.graph_state if own else run.parts.get(shown.graph)):
         return True
@@ -274,14 +278,16 @@ def is_news(run: Run, shown: Snapshot) -> bool:
 
 
 def _has_new_values(run: Run, shown: Snapshot) -> bool:
-    """Return whether an answer shows other outputs of a piece than are known. Feedback may be old."""
+    """Return whether an answer shows other outputs of a piece than were seen so far. Feedback does
+    not count, since it may be old."""
     is_answer = shown.graph == run.graph_name and shown.source == "get"
     return is_answer and run.piece is not None and shown.kept != run.kept
 
 
 def thin(run: Run, seen: Iterable[Seen]) -> tuple[Seen, ...]:
-    """Drop known facts from snapshots, without a change of the fold. An engine repeats its whole
-    graph after every change; storing it each time would grow with the square of its size."""
+    """Return the observations without what the run already knows; the fold of both is the same. An
+    engine repeats its whole graph after every change; storing it each time would grow with the
+    square of its size."""
     thinned: list[Seen] = []
     for item in seen:
         less = _thin(run, item) if isinstance(item, Snapshot) and not item.same else item
@@ -324,7 +330,8 @@ def _modified(run: Run, event: ModifyRequested) -> Run:
 
 
 def _unmodified(run: Run, event: ModifyRefused) -> Run:
-    """Fold a refused change: actions that only the change would have brought are removed."""
+    """Fold a refused change of the graph: the earlier version is in force again, and actions that
+    only the change would have brought are removed."""
     actions = {
         name: replace(action, aid=event.actions.get(name, action.aid))
         for name, action in run.actions.items()
@@ -342,7 +349,8 @@ def _unmodified(run: Run, event: ModifyRefused) -> Run:
 
 
 def _reopen(run: Run, event: MovesAgain) -> Run:
-    """Fold motion after the end: the proof is void, but the last wish of people still counts."""
+    """Fold that a run was seen moving after its end: it is open again without a proof, and the last
+    command of people still counts."""
     alarm = Alarm("moves_again", event.at, event.text)
     return replace(
         run,
@@ -358,7 +366,8 @@ def _reopen(run: Run, event: MovesAgain) -> Run:
 
 
 def _end(run: Run, event: Ended) -> Run:
-    """Fold the end. Actions that nothing proves to have ended stay as they were seen last."""
+    """Fold the end of a run. Actions whose end is not proven keep the state in which they were seen
+    last."""
     return replace(
         run,
         end=event.state,
@@ -377,8 +386,8 @@ def _end(run: Run, event: Ended) -> Run:
 
 
 def _piece_seen(run: Run, event: PieceSeen) -> Run:
-    """Fold what a robot shows of an action that it plays in a conducted run. Each call is one visit,
-    whose bounds the piece's own run has found."""
+    """Fold what a robot shows of an action that it carries out in a conducted run. Each call is one
+    visit, with the bounds that the piece's own run has found."""
     known = run.actions.get(event.node, _UNSEEN)
     action = after_piece(known, event.call, event.state, event.visit, event.at)
     action = with_messages(action, event.messages, event.at)
@@ -386,8 +395,8 @@ def _piece_seen(run: Run, event: PieceSeen) -> Run:
 
 
 def _piece_ended(run: Run, event: PieceEnded) -> Run:
-    """Fold the outcome of a call of a conducted run. Streams without `PieceRest` events prove the
-    rest of a piece by its outcome where an answer has shown that."""
+    """Fold the outcome of a call of a conducted run. In older streams, without `PieceRest` events,
+    an outcome that an answer has shown also proves that the piece is at rest."""
     action = after_outcome(
         run.actions.get(event.node, _UNSEEN),
         event.call,
@@ -421,8 +430,8 @@ def _going(event: PieceBegan) -> PieceRest:
 
 
 def _piece_rest(run: Run, event: PieceRest) -> Run:
-    """Fold the rest of a piece. An earlier piece of its robot is kept while it may go on or waits for
-    an outcome."""
+    """Fold how far a piece is proven to be at rest. Earlier pieces of the same robot stay listed
+    only while they may move or wait for an outcome."""
     kept = {
         piece: known
         for piece, known in run.rests.items()
@@ -432,7 +441,7 @@ def _piece_rest(run: Run, event: PieceRest) -> Run:
 
 
 def observe(run: Run, seen: Iterable[Seen]) -> Run:
-    """Return the run after these observations, in this order."""
+    """Return the run after the observations `seen`, in their order."""
     actions = dict(run.actions)
     main = run.graph_name
     run = replace(run, actions=actions)  # the loop below fills the new dict
@@ -478,8 +487,8 @@ def _state_of(run: Run, graph: str, state: str) -> Run:
 
 
 def _after_snapshot(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> Run:
-    """Fold a snapshot into the actions of its graph. Failures and sub-graphs come first, since they
-    affect the other actions of the same snapshot."""
+    """Fold the snapshot `item` into `actions`, the actions of the run, and return the run. Failures
+    and sub-graphs come first, since they affect the other actions of the same snapshot."""
     own = item.graph == run.graph_name
     if item.kept != NOTHING_KEPT and _has_new_values(run, item):
         run = replace(run, kept=item.kept)
@@ -506,15 +515,17 @@ def _after_snapshot(run: Run, actions: dict[str, ActionRun], item: Snapshot) -> 
 
 
 def _looked_at(run: Run, looked: int) -> Run:
-    """Note that answers requested until `looked` showed the run in its known state."""
+    """Return the run after an answer requested at `looked` (µs UTC) has shown it as it was known:
+    it was not over by then."""
     if run.over_at is not None or looked <= max(run.going_at, run.reopened_at):
         return run
     return replace(run, going_at=looked)
 
 
 def _timed(run: Run, at: int, asked: int | None) -> Run:
-    """Note since when the run is over, as far as that was seen. All actions are examined only if
-    the graph's state is final."""
+    """Return the run with the time since when it is over, or was last seen going on. `at`: of the
+    observation; `asked`: when its answer was requested, None for other observations (µs UTC). All
+    actions are examined only if the graph's state is final."""
     if run.graph_state in TERMINAL and run.apparent_end is not None:
         return run if run.over_at is not None else replace(run, over_at=at)
     if run.over_at is None and (asked is None or asked <= run.going_at):
@@ -524,7 +535,7 @@ def _timed(run: Run, at: int, asked: int | None) -> Run:
 
 
 def names_all(run: Run, item: Snapshot) -> bool:
-    """Return whether a snapshot names every known action of its graph."""
+    """Return whether a snapshot names every action that the run has in this graph."""
     return all(name in item.nodes for name in _known_of(run, item.graph))
 
 
@@ -536,22 +547,22 @@ def _known_of(run: Run, graph: str) -> Iterator[str]:
 
 
 def key_of(run: Run, graph: str, node: str) -> str:
-    """Return the name of an action in a run: its full name, behind the running name of its
-    sub-graph if it is in one."""
+    """Return the name of an action in a run: its full name (`node`), after the running name of its
+    sub-graph and a "/" if it is in one."""
     return node if graph == run.graph_name else f"{graph}/{node}"
 
 
 def _asked_at(item: Snapshot) -> int | None:
-    """Return the request time of a snapshot's answer: it was taken after that. None for feedback,
-    which may be of any age."""
+    """Return when the answer of a snapshot was requested (µs UTC), so that the snapshot is newer
+    than that. None for feedback, which may be of any age."""
     if item.source == "feedback":
         return None
     return item.asked_at if item.asked_at is not None else item.at - _ASKED_US
 
 
 def _before(item: Snapshot) -> int:
-    """Return the request time of the answer before this snapshot. Older streams only have the time
-    at which it came."""
+    """Return when the answer before this snapshot was requested (µs UTC); 0 without one. Older
+    streams only have the time at which it came, from which the latest delay is subtracted."""
     if item.since_asked is not None:
         return item.since_asked
     return 0 if item.since is None else item.since - _ASKED_US

@@ -16,11 +16,11 @@ from action_assistant.runner.runs.run import Run
 
 
 class RunnerJournal(Store, Protocol):
-    """The journal of the runner: streams, and queries of its tables."""
+    """The journal of the runner: streams of events, and queries of its tables."""
 
     async def query(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
-        cannot be read."""
+        """Return the rows of a SELECT on the tables. Raise Unavailable if the journal cannot be
+        read."""
         ...
 
 
@@ -30,7 +30,8 @@ Past: TypeAlias = Callable[[str, bool], Awaitable[tuple[Run, int]]]
 
 
 class LeftRun(msgspec.Struct, frozen=True):
-    """A stored run, the seq of its last event, and whether all of its events could be read."""
+    """A stored run, the number (`seq`) of its last event, and whether all of its events could be
+    read."""
 
     run: Run
     seq: int
@@ -46,38 +47,41 @@ class RunHistory:
         self._past = past
 
     async def followed(self, run: str) -> tuple[Run | None, int]:
-        """Return a run with all its visits, so that it can be followed further, and the seq of its
-        last event. Raise msgspec.DecodeError if a stored event is damaged."""
+        """Return a run with all its visits, so that it can be followed further, and the number
+        (seq) of its last event; (None, 0) if there is no such run. Raise msgspec.DecodeError if a
+        stored event is damaged."""
         if self._past is not None:
             return await self._past(run, True)
         return await self.replayed(run)
 
     async def replayed(self, run: str) -> tuple[Run | None, int]:
-        """Fold a run in this process and return it with the seq of its last event; for use before
-        the runner accepts requests."""
+        """Fold a run in this process and return it with the number (seq) of its last event; (None,
+        0) if there is no such run. Only for use before the runner accepts requests, since it
+        blocks."""
         events = await self._journal.read(stream_of(run))
         found = replay(decode(each.kind, each.body) for each in events)
         return found, events[-1].seq if events else 0
 
     async def left(self, run: str) -> tuple[Run | None, int, bool]:
-        """Return a run that an earlier process left open, the seq of its last event, and whether
-        all events could be read; damaged events are skipped."""
+        """Return a run that an earlier process left open, the number (seq) of its last event, and
+        whether all events could be read. Damaged events are skipped; the run is None without its
+        first event."""
         events = await self._journal.read(stream_of(run))
         read = [_decoded(each) for each in events]
         events_read = [event for event in read if event is not None]
         return replay(events_read), events[-1].seq if events else 0, len(events_read) == len(read)
 
     async def piece_ids(self, run: str, having: str = "") -> list[str]:
-        """Return the ids of all stored pieces of a conducted run in the order of their numbers, of
-        which some may be missing: a piece that could not be stored has used up its number.
-        `having`: only of those with an event of this kind. Raise Unavailable while the journal
-        cannot be read."""
+        """Return the ids of all stored pieces of a conducted run, in the order of their numbers.
+        Numbers may be missing: a piece that could not be stored has used up its number. `having`:
+        return only pieces with an event of this kind. Raise Unavailable if the journal cannot be
+        read."""
         rows = await self._journal.query(queries.streams_of_pieces(run, having))
         return pieces_in(run, (row.stream.removeprefix(stream_of("")) for row in rows))
 
     async def pieces(self, run: str) -> tuple[list[LeftRun], list[str]]:
-        """Return the pieces of a conducted run in the order in which they began, and the ids of those
-        of which nothing can be read. Raise Unavailable while the journal cannot be read."""
+        """Return the pieces of a conducted run in the order of their numbers, and the ids of the
+        pieces that cannot be read at all. Raise Unavailable if the journal cannot be read."""
         found: list[LeftRun] = []
         lacking: list[str] = []
         for id_ in await self.piece_ids(run):
@@ -115,14 +119,14 @@ class RunHistory:
         return await self._journal.read(stream_of(run), after=after, limit=limit)
 
     async def rows(self, statement: Select[Any]) -> list[Row[Any]]:
-        """Return the rows that a query of the tables selects. Raise Unavailable if the journal
-        cannot be read."""
+        """Return the rows of a SELECT on the tables. Raise Unavailable if the journal cannot be
+        read."""
         return await self._journal.query(statement)
 
 
 def pieces_in(run: str, ids: Iterable[str]) -> list[str]:
-    """Return those of these ids that belong to pieces of this conducted run, each once, in the order
-    of their numbers."""
+    """Return those of `ids` that belong to pieces of the conducted run `run`, each once, in the
+    order of their numbers."""
     return sorted({each for each in ids if whole_of(each) == run}, key=piece_number)
 
 
@@ -147,8 +151,8 @@ def _decoded(event: Event) -> RunEvent | None:
 
 async def newest_sent_text(store: Store, run: Run) -> str | None:
     """Return the text of the graph that a run has now: the one that was started, or the last change
-    of it. Return None if no stored event has the text. Raise Unavailable if the journal cannot
-    be read."""
+    of it. Return None if no stored event has the text. Raise Unavailable if the journal (`store`)
+    cannot be read."""
     stored = await store.read(stream_of(run.id))
     sent = {Requested.kind, ModifyRequested.kind}
     for each in reversed(stored):

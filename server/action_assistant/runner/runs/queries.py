@@ -43,33 +43,33 @@ def open_runs() -> Select[Any]:
 
 
 def last_number() -> Select[Any]:
-    """Select the highest run number given so far, 0 without runs."""
+    """Select the highest run number so far, 0 without runs."""
     return select(func.coalesce(func.max(run.c.number), 0))
 
 
 def of_run(run_id: str) -> Select[Any]:
-    """Select `state` and `simulated` of a run."""
+    """Select `state` and `simulated` of the run with this id."""
     return select(run.c.state, run.c.simulated).where(run.c.id == run_id)
 
 
 def streams_of_pieces(run_id: str | ColumnElement[str], having: str = "") -> Select[Any]:
-    """Select the streams in the journal whose names begin as those of the pieces of a run do.
-    `having`: only those with an event of this kind."""
+    """Select the names of the streams whose names begin as those of the pieces of a run do.
+    `having`: only streams with an event of this kind, "" for all."""
     stream, own = runner_event.c.stream, literal("run/") + run_id
     found = select(stream).distinct().where(stream > own + ".", stream < own + "/")
     return found.where(runner_event.c.kind == having) if having else found
 
 
 def by_request(request_id: str) -> Select[Any]:
-    """Return the query for the run that a request has become: id, digest, engine, tree_digest,
-    summary."""
+    """Return the query for the run that the start with this request id has created: id, digest,
+    engine, tree_digest, summary."""
     fields = (run.c.id, run.c.digest, run.c.engine, run.c.tree_digest, run.c.summary)
     return select(*fields).where(run.c.request_id == request_id)
 
 
 def of_start(request_id: str) -> Select[Any]:
-    """Return the query for the ids of the runs that a start has become. In a start on several
-    robots the request id of each begins with the id of the group."""
+    """Return the query for the ids of the runs that a start has created. In a start on several
+    robots the request id of each run begins with the id of the group."""
     group = and_(run.c.request_id > f"{request_id}/", run.c.request_id < f"{request_id}0")
     return select(run.c.id).where(or_(run.c.request_id == request_id, group)).order_by(run.c.number)
 
@@ -94,9 +94,9 @@ class Filter(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def listed(wanted: Filter, limit: int, among: Iterable[int] | None = None) -> Select[Any]:
-    """Return the query for at most `limit` runs with their marks, newest first. `among`: the
-    numbers of the only possible runs. The table lacks the states of open runs, so `states`
-    selects all open ones, too."""
+    """Return the query for at most `limit` of the `wanted` runs with their marks, newest first.
+    `among`: the numbers of the only possible runs, None for any. The table does not have the states
+    of open runs, so a filter by `states` returns all open ones, too."""
     query = select(run, review.c.pinned, review.c.note)
     query = query.outerjoin(review, review.c.run == run.c.id)
     if among is not None:
@@ -119,15 +119,15 @@ def listed(wanted: Filter, limit: int, among: Iterable[int] | None = None) -> Se
 
 
 def _graph(wanted: Filter) -> tuple[ColumnElement[bool], ...]:
-    """Return the conditions of which a run of the wanted graph has one."""
+    """Return conditions, any of which holds for a run of the wanted graph: by its id or its name."""
     if wanted.graph is None:
         return (true(),)
     return (run.c.graph == wanted.graph, run.c.graph_name == wanted.graph)
 
 
 def on_engine(engine: str | None) -> tuple[ColumnElement[bool], ...]:
-    """Return the conditions of which a run on this engine has one: a conducted run is on each engine
-    that plays an actor in it. None: any engine."""
+    """Return conditions, any of which holds for a run on this engine; a conducted run is on each
+    engine that plays an actor in it. For None (any engine), one that always holds."""
     if engine is None:
         return (true(),)
     robots = _robots()
@@ -179,17 +179,17 @@ def _conditions(wanted: Filter) -> Iterator[ColumnElement[bool]]:
 
 
 def labels_of(runs: Sequence[str]) -> Select[Any]:
-    """Select the labels of these runs."""
+    """Select the labels of the runs with these ids, by run and label."""
     query = select(run_label).where(run_label.c.run.in_(runs))
     return query.order_by(run_label.c.run, run_label.c.label)
 
 
 def all_labels() -> Select[Any]:
-    """Select up to 200 labels, the most used first."""
+    """Select up to 200 labels of runs, the most used first."""
     query = select(run_label.c.label).group_by(run_label.c.label)
     return query.order_by(func.count().desc(), run_label.c.label).limit(200)
 
 
 def all_robots() -> Select[Any]:
-    """Select the registered robots by name."""
+    """Select all registered robots, sorted by name."""
     return select(robot).where(robot.c.retired_at.is_(None)).order_by(robot.c.name)

@@ -23,7 +23,7 @@ _AT_THE_END_S: Final = 1.0  # for what is left when writing is cancelled
 
 
 class Store(Protocol):
-    """The parts of a journal that recorders use."""
+    """The parts of a journal that the recording of runs uses."""
 
     async def append(
         self, stream: str, drafts: Sequence[Draft], *, expected: int | None = None
@@ -36,7 +36,8 @@ class Store(Protocol):
     async def read(
         self, stream: str, *, after: int = 0, upto: int | None = None, limit: int | None = None
     ) -> list[Event]:
-        """Return events of a stream, `after` < seq ≤ `upto`, in order."""
+        """Return the events of a stream with `after` < seq ≤ `upto`, in order, at most `limit`;
+        None for `upto` or `limit` sets no bound."""
         ...
 
     async def newest(self, stream: str) -> int:
@@ -50,8 +51,8 @@ def stream_of(run: str) -> str:
 
 
 class StreamAppender:
-    """Appends to a stream that ends at `seq`, negative while unknown. `changed` is called after
-    each change of `seq` or `recorded`."""
+    """Appends events to one stream in the background. `seq`: the number of the last stored event,
+    negative while unknown. `changed` is called after each change of `seq` or `recorded`."""
 
     def __init__(
         self, store: Store, stream: str, seq: int, changed: Callable[[], None] = lambda: None
@@ -66,7 +67,7 @@ class StreamAppender:
         self._done = anyio.Event()
 
     def add(self, draft: Draft) -> None:
-        """Queue an event for storing."""
+        """Queue an event for storing. The call does not wait."""
         self._waiting.append(draft)
         self._more.set()
 
@@ -81,7 +82,7 @@ class StreamAppender:
         return len(self._waiting)
 
     async def flushed(self) -> None:
-        """Wait until all events are stored."""
+        """Wait until all events added so far are stored."""
         while self._waiting:
             await self._done.wait()
 
@@ -99,7 +100,8 @@ class StreamAppender:
                 return
 
     async def run(self) -> None:
-        """Write until cancelled; then write the rest for a second at most."""
+        """Store queued events until cancelled; then try for one more second to store those that are
+        left."""
         try:
             while True:
                 await self._more.wait()
@@ -126,8 +128,9 @@ class StreamAppender:
                 failures += 1
 
     async def _write(self) -> bool:
-        """Store one batch in a transaction; return whether it is stored. `expected` prevents a
-        second commit if the result of the first got lost."""
+        """Store one batch of events in a transaction; return whether it is stored. If the result of
+        an earlier attempt got lost, the number of the last event that is expected (`expected`)
+        prevents a second copy."""
         batch = [self._waiting[i] for i in range(min(len(self._waiting), _BATCH))]
         try:
             try:
@@ -167,5 +170,5 @@ class RunRecorder(StreamAppender):
         super().__init__(store, stream_of(run), seq, changed)
 
     def put(self, event: RunEvent, author: str) -> None:
-        """Queue an event of the run for storing."""
+        """Queue an event of the run for storing. `author`: the id of a person, "" for the engine."""
         self.add(draft_of(event, author))

@@ -30,12 +30,10 @@ _LONGEST: Final = 300  # characters of the engine's words in a sentence
 
 
 class StartLog:
-    """Follows the engine's log lines about the start of `run`, after it is sent.
-
-    `words`: the engine's reason for a refusal; "" without a refusal, or if the start may have been
-    somebody else's. After a restart of the runner, lines are missing and prove nothing; an earlier
-    proven refusal is an alarm of the run.
-    """
+    """Reads the engine's log lines about the start of `run`, after it is sent. `words`: the
+    engine's reason for a refusal; "" without a refusal, or if the start may have been that of
+    another program. After a restart of the runner, lines are missing and prove nothing; an earlier
+    proven refusal is an alarm of the run."""
 
     def __init__(self, run: Run) -> None:
         self._graph = run.graph_name
@@ -46,11 +44,11 @@ class StartLog:
         self.words = "" if alarm is None or others else _between_quotes(alarm.text)
 
     def begins(self) -> None:
-        """Note that the start is sent: later lines may concern it."""
+        """Call this when the start is sent: log lines count from now on."""
         self._over = False
 
     def hear(self, text: str) -> bool:
-        """Read one more line; return whether it reports that the start was refused."""
+        """Read one more line of the log; return whether it reports that this start was refused."""
         if self._over or _OF_OTHERS.fullmatch(text):
             return False
         if not self._next:
@@ -62,7 +60,8 @@ class StartLog:
         return bool(self.words)
 
     def doubt(self) -> None:
-        """Ignore all lines, since they may concern a graph that somebody else has started."""
+        """Ignore all lines from now on, since they may concern a graph that another program has
+        started."""
         self._over, self.words = True, ""
 
 
@@ -73,14 +72,14 @@ def words_of(line: str) -> str:
 
 
 def in_words(engine: str, words: str) -> str:
-    """Return the text of the alarm that an engine has refused a start, while it is not known yet
-    whether some of the graph runs all the same. `engine`: its name; `words`: what it wrote as the
-    reason."""
+    """Return the text of the alarm that an engine has refused a start, while it is unknown whether
+    some of the graph runs all the same. `engine`: its name; `words`: the reason that it wrote."""
     return f"{engine} says of this start: “{words}”"
 
 
 def why_refused(engine: str, words: str) -> str:
-    """Return why a run is over that never began, with a hint for the error `map::at`."""
+    """Return the sentence for a run that is over because its engine refused to start it, with a
+    hint for the error `map::at`. `words`: the reason that the engine wrote."""
     hint = _MEANT if words == "map::at" else ""
     return f"{engine} refused the start: {words}.{hint}"
 

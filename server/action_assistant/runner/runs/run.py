@@ -69,8 +69,8 @@ class Intervention(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Said(msgspec.Struct, frozen=True, kw_only=True):
-    """The word of a person for the result of a visit that no answer has shown. `visit`: its number,
-    from 1."""
+    """The result of a visit as a person stated it, where no answer has shown it. `visit`: its
+    number, from 1."""
 
     visit: int
     by: Author
@@ -145,7 +145,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def state(self) -> State:
-        """The one word for the state of the run, derived from all other fields."""
+        """The state of the run in one term (docs/glossary.md), derived from all other fields."""
         if self.end is not None:
             return self.end
         if self.lost:
@@ -168,7 +168,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """The robots that the run keeps for itself from its request until it is proven over."""
+        """The names of the robots that the run occupies from its request until it is proven over."""
         if self.simulated:
             return ()
         if self.led is None:
@@ -177,12 +177,13 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def doubt(self) -> str:
-        """The reason why no answer of the engine can prove rest now; "" if one can."""
+        """The reason why no answer of the engine can prove now that the run is at rest; "" if one
+        can."""
         return self.unconfirmed or self.loading
 
     @property
     def active(self) -> tuple[str, ...]:
-        """Actions that move or may move again, by name."""
+        """The names of the actions that move or may move again."""
         return tuple(name for name, action in self.actions.items() if action.state in ACTIVE)
 
     @property

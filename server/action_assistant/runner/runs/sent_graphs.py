@@ -35,13 +35,14 @@ SentGraph: TypeAlias = Annotated[
 
 
 def counted(body: bytes) -> int:
-    """Return a lower bound of a body's length without the escapes of a graph that is sent as a
-    string."""
+    """Return the length of a request's body without its backslashes. That is a lower bound of the
+    length of a graph that is sent as a JSON string, and so with escapes."""
     return len(body) - body.count(b"\\")
 
 
 def read_sent(umrf: bytes) -> tuple[bytes, codec.Reading]:
-    """Return the exact text of a sent graph, and its reading. For workers. Raise BadInput, NotUmrf
+    """Return the exact text of a sent graph, and the parsed graph. `umrf`: JSON, the graph itself
+    or a string with its text. Parsing is slow: call it in a worker process. Raise BadInput, NotUmrf
     or TooLarge, with the place, if it cannot be read."""
     text = _text_of(umrf)
     if len(text) > MOST_BYTES:
@@ -89,10 +90,11 @@ def read_inside(
     *,
     approved: bool = True,
 ) -> tuple[tuple[RunSubgraph, ...], dict[str, Graph]]:
-    """Return the graphs inside as they are recorded, and their readings by name. `own`: the digest
-    of the graph around them; `tree`: of all together, None or "" if unknown. Unless the graph is
-    `approved`, digests may be missing. For workers. Raise BadInput, NotUmrf, TooLarge or
-    Conflict, with the place, if one is wrong."""
+    """Return the sub-graphs of a sent graph in the form in which they are recorded, and parsed by
+    name. `sent`: the sub-graphs; `own`: the digest of the graph around them; `tree`: the digest of
+    all together, None or "" if unknown. Digests may be missing unless `approved`. Call it in a
+    worker process. Raise BadInput, NotUmrf, TooLarge or Conflict, with the place, if one is wrong.
+    """
     if len(sent) > MOST_INSIDE:
         raise TooLarge(f"A graph that is sent has at most {MOST_INSIDE} graphs inside.")
     recorded: list[RunSubgraph] = []
@@ -117,7 +119,8 @@ def read_inside(
 
 
 def graphs_in(subgraphs: Sequence[RunSubgraph]) -> dict[str, Graph]:
-    """Return the recorded graphs by name, without those that cannot be read. For workers."""
+    """Return the recorded sub-graphs, parsed, by name; unreadable ones are missing. Call it in a
+    worker process."""
     found: dict[str, Graph] = {}
     for each in subgraphs:
         try:
@@ -128,7 +131,8 @@ def graphs_in(subgraphs: Sequence[RunSubgraph]) -> dict[str, Graph]:
 
 
 def tree_of(own: str, subgraphs: Sequence[RunSubgraph]) -> str:
-    """Return the digest of a graph together with all graphs inside."""
+    """Return the digest of a graph together with its sub-graphs. `own`: the digest of the graph
+    alone."""
     return tree_digest(own, ((each.name, each.digest) for each in subgraphs))
 
 
@@ -175,12 +179,13 @@ class Sent(msgspec.Struct, frozen=True):
 
 
 def sent_of(start: Requested) -> Sent:
-    """Read the graph of a start. For workers."""
+    """Read the graph of an accepted start, with its values and sub-graphs. Call it in a worker
+    process."""
     return Sent(start.umrf, sent(start.umrf), start.subgraphs, start.tree_digest)
 
 
 def subgraphs_shown(start: Sent) -> list[SubgraphShown]:
-    """Return the graphs inside for the API."""
+    """Return the sub-graphs of a sent graph as the API shows them."""
     return [
         SubgraphShown(
             each.name, each.version, each.digest, msgspec.Raw(each.umrf.encode()), each.graph

@@ -81,7 +81,8 @@ Wait: TypeAlias = ForParent | ForInput | ForOutcome | ForPart
 
 
 class Standstill:
-    """Decides from several answers whether a running graph stands still."""
+    """Decides from several answers whether a running graph stands still, that is, nothing of it
+    moves and it does not end."""
 
     def __init__(self) -> None:
         self._since: float | None = None
@@ -93,12 +94,13 @@ class Standstill:
 
     @property
     def lasts(self) -> bool:
-        """True if the last answer showed a standstill."""
+        """True if the last answer showed that nothing moves."""
         return self._since is not None
 
     def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
-        """Process one more answer, requested at `asked` (seconds), about a graph and its
-        sub-graphs; return whether it has stood still for so long that people must know."""
+        """Process one more answer, requested at `asked` (in seconds of any steady clock). `shown`:
+        the snapshots of the graph, first, and its sub-graphs. Return whether it has stood still for
+        so long that people must know."""
         if shown[0].state != "RUNNING" or moves(shown):
             self.forget()
             return False
@@ -108,8 +110,8 @@ class Standstill:
 
 
 def packed(run: Run) -> bytes:
-    """Encode the part of a run that `packed_alarm_text` needs: a whole large run takes long to send to a
-    worker."""
+    """Encode the parts of a run that `packed_alarm_text` needs; sending all of a large run to a
+    worker would take long."""
     actions = {
         name: replace(each, visits=each.visits[-1:], messages=())
         for name, each in run.actions.items()
@@ -118,13 +120,14 @@ def packed(run: Run) -> bytes:
 
 
 def packed_alarm_text(run: bytes, umrf: str | None) -> str:
-    """Return the alarm text for an encoded run and the graph that was sent. For workers."""
+    """Return the alarm text for a run (encoded by `packed`) that stands still. `umrf`: the text of
+    the graph that was sent, None if unknown. Call it in a worker process."""
     return alarm_text(msgspec.msgpack.decode(run, type=Run), None if umrf is None else _read(umrf))
 
 
 def lacking_in_words(umrf: str) -> str:
-    """Return why an engine that holds this graph has not begun it, in sentences; "" where no value
-    is lacking. For workers."""
+    """Return, in sentences, which values keep an engine that holds this graph (`umrf`: its text)
+    from beginning it; "" if none is lacking. Call it in a worker process."""
     graph = _read(umrf)
     found = () if graph is None else unbegun(graph)
     return " ".join(in_words(each) for each in found[:_NAMED])
@@ -138,8 +141,8 @@ def _read(umrf: str) -> Graph | None:
 
 
 def moves(shown: Sequence[Snapshot]) -> bool:
-    """Return whether an action is active. An action that is a sub-graph counts by the actions of
-    that."""
+    """Return whether an action is active in these snapshots of a graph and its sub-graphs. An
+    action that stands for one of the sub-graphs counts only by the actions inside."""
     held = {each.graph for each in shown}
     return any(
         state in ACTIVE and _part(each.graph, node) not in held
@@ -154,8 +157,8 @@ def _part(graph: str, node: str) -> str:
 
 
 def unbegun(graph: Graph) -> tuple[ForInput, ...]:
-    """Return why an engine that holds a graph has not begun it: required inputs of entry actions
-    without a value (H7)."""
+    """Return the inputs that keep an engine from beginning a graph: required ones of entry actions
+    that have no value (hazard H7)."""
     entries = {each.child for each in graph.relations if each.parent == ENTRY}
     return tuple(
         ForInput(action.full_name, name)
@@ -168,9 +171,9 @@ def unbegun(graph: Graph) -> tuple[ForInput, ...]:
 
 def waits(run: Run, graph: Graph, moment: int | None = None) -> tuple[Wait, ...]:
     """Return what the actions of a graph that makes no progress wait for, as far as the
-    observations show it. An action that no arrow has reached yet is left out, because it waits
-    for another action, which is in the result. `moment`: the time of an earlier standstill, in
-    microseconds since 1970 UTC, after which no action has begun; None means now."""
+    observations of `run` show it. `graph`: as it was sent. An action that no arrow has reached yet
+    is not listed: it waits for another one that is. `moment`: the time of an earlier standstill (µs
+    UTC), after which no action has begun; None means now."""
     stalled = _Stalled(run, graph, moment)
     found: list[Wait] = [*stalled.parts()]
     for action in graph.actions:
@@ -203,7 +206,7 @@ class _Stalled:
                 yield ForPart(name, part if self._moment is None else "")
 
     def waits_of(self, action: Action | None) -> list[Wait]:
-        """Return what one action waits for, or the end of the graph (None); empty if no arrow has
+        """Return what one action waits for, or (None) the end of the graph; empty if no arrow has
         reached it."""
         key = EXIT if action is None else action.key
         name = None if action is None else action.full_name
@@ -240,8 +243,8 @@ class _Stalled:
         return bool(visits) and visits[-1].until is not None and not self.moves(self._name(key))
 
     def _answers(self, arrow: Relation) -> set[Response]:
-        """Return the responses that an arrow may have given, for every outcome that its parent may
-        have had."""
+        """Return the responses that an arrow may have had, for every outcome that the action it
+        comes from may have had."""
         if arrow.parent == ENTRY:
             return {"run"}
         name = self._name(arrow.parent)
@@ -255,7 +258,8 @@ class _Stalled:
         return {arrow.conditions.answer(outcome) for outcome in possible}
 
     def _unanswered(self, name: str | None, fired: list[Relation]) -> Iterator[Wait]:
-        """Yield the arrows that respond with something else than running the action."""
+        """Yield a reason to wait for each of the `fired` arrows whose parent has ended but whose
+        response does not run the action `name` (None: the end of the graph)."""
         for arrow in fired:
             answers = self._answers(arrow) - {"bypass"}
             if answers:
@@ -263,7 +267,8 @@ class _Stalled:
                 yield ForOutcome(name, self._name(arrow.parent), said, certain=True)
 
     def _lacking(self, action: Action | None, fired: list[Relation]) -> Iterator[ForInput]:
-        """Yield required inputs that no ended parent gives."""
+        """Yield the required inputs of an action, or outputs at the end of the graph (None), that
+        have no value and that no parent of the `fired` arrows gives."""
         giver = self._last_exit() if action is None else None
         if action is None and giver is None:
             return
@@ -292,11 +297,8 @@ class _Stalled:
         }
 
     def _last_exit(self) -> Action | None:
-        """Return the action that is listed last among those that lead to the end: the end of a
-        graph needs its outputs.
-
-        See docs/umrf-and-the-engine.md 2.6.
-        """
+        """Return the last one listed of the actions that lead to the end, whose outputs the end of
+        a graph needs; None if no arrow leads there. See docs/umrf-and-the-engine.md 2.6."""
         ends = sorted(
             (each for each in self._graph.relations if each.child == EXIT),
             key=lambda each: each.child_order,
@@ -304,8 +306,8 @@ class _Stalled:
         return self._actions.get(ends[-1].parent) if ends else None
 
     def _unsure(self, name: str | None, fired: list[Relation]) -> Iterator[ForOutcome]:
-        """Yield the arrows that ran the action for some outcomes only, while nothing else is
-        lacking."""
+        """Yield a reason to wait for each of the `fired` arrows that runs the action `name` only
+        for some of the possible outcomes."""
         for arrow in fired:
             others = self._answers(arrow) - {"run"}
             if others and arrow.child != EXIT:
@@ -319,7 +321,7 @@ class _Stalled:
 
 
 def in_words(wait: Wait) -> str:
-    """Return the reason to wait as one sentence."""
+    """Return the sentence for a reason to wait."""
     who = wait.action if wait.action is not None else "The end of the graph"
     match wait:
         case ForParent(parent=parent, begun=True):
@@ -350,8 +352,8 @@ def in_words(wait: Wait) -> str:
 
 
 def alarm_text(run: Run, graph: Graph | None) -> str:
-    """Return the alarm text of a run that stands still. It is the same for as long as the reasons
-    are."""
+    """Return the alarm text of a run that stands still. `graph`: as it was sent, None if unknown.
+    The same reasons always give the same text."""
     found = waits(run, graph) if graph is not None else ()
     why = " ".join(in_words(each) for each in found[:_NAMED])
     more = f" And {len(found) - _NAMED} more." if len(found) > _NAMED else ""

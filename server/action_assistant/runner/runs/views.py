@@ -55,8 +55,8 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
     none were seen; `outputs`: likewise those that it gave, where an answer could show them. In a
-    conducted run, `robot`: the engine that played it; `said`: who gave the result by word, where no
-    answer has shown it."""
+    conducted run, `robot`: the engine that played it; `said`: the person who stated the result,
+    where no answer has shown it."""
 
     start: datetime
     not_before: datetime
@@ -71,7 +71,7 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
 
 
 class SaidShown(msgspec.Struct, frozen=True):
-    """The word of a person for the result of a visit."""
+    """A person's statement of the result of a visit that no answer has shown."""
 
     by: Author
     at: datetime
@@ -115,8 +115,8 @@ class AlarmShown(msgspec.Struct, frozen=True):
 
 
 class AtRestShown(msgspec.Struct, frozen=True):
-    """The observation of rest where no answer of the engine could prove it: by whom (null: the
-    runner saw the engine's process end), when, and how."""
+    """The observation that a run is at rest, where no answer of the engine could prove it: by whom
+    (null: the runner saw the engine's process end), when, and how."""
 
     by: Author | None
     at: datetime
@@ -136,13 +136,14 @@ class HeldShown(msgspec.Struct, frozen=True):
 
 
 class RobotRestShown(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The knowledge about the rest of one robot of a conducted run. `state`: nothing of the run was
-    ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is proven
-    ("stopping"), it does not answer ("silent"), no answer can prove rest any more ("unproven"), an
-    answer has proven it ("proven"), somebody or something has seen it ("seen"), nothing of the last
-    action began ("unsent"), or nothing was recorded of it ("unknown"). `since`: when that began;
-    `action`, `piece`: the action and the run of its piece; `why`: the reason, or how rest was seen;
-    `by`: who has seen it; `stops`: a Stop is asked for, and repeated until rest is proven."""
+    """The state of the proof that one robot of a conducted run is at rest. `state`: nothing of the
+    run was ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is
+    proven ("stopping"), it does not answer ("silent"), no answer can prove rest any more
+    ("unproven"), an answer has proven it ("proven"), a person or the runner has seen it ("seen"),
+    nothing of the last action began ("unsent"), or nothing was recorded of it ("unknown"). `since`:
+    when that began; `action`, `piece`: the action and the run of its piece; `why`: the reason, or
+    how rest was seen; `by`: who has seen it; `stops`: a Stop is asked for, and repeated until rest
+    is proven."""
 
     robot: str
     state: RestState
@@ -226,8 +227,8 @@ class Listed(RunSummary, frozen=True, kw_only=True):
 
 class RunShown(RunSummary, frozen=True, kw_only=True):
     """A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
-    robot whose engine the simulator plays; `behaviours`: whether its actions have Python behaviours;
-    `rests`: of a conducted run, what is known of the rest of each robot."""
+    robot whose engine the simulator plays; `behaviours`: whether its actions have Python
+    behaviours; `rests`: of a conducted run, how far each robot is proven to be at rest."""
 
     like: str | None
     behaviours: bool
@@ -260,12 +261,12 @@ class StartShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def time(us: int) -> datetime:
-    """Convert microseconds UTC to a datetime."""
+    """Convert microseconds UTC to an aware datetime in UTC."""
     return _EPOCH + timedelta(microseconds=us)
 
 
 def summary(run: Run, *, recorded: bool = True) -> RunSummary:
-    """Return a run without its actions. `recorded`: all of its events are stored."""
+    """Return the view of a run without its actions. `recorded`: all of its events are stored."""
     return RunSummary(**_fields(run, recorded))
 
 
@@ -277,7 +278,8 @@ class ActionViewCache:
         self._known: dict[str, tuple[ActionRun, tuple[Any, ...], ActionShown]] = {}
 
     def action(self, run: Run, name: str, most: int, count: VisitCount) -> ActionShown:
-        """Return the view of an action of a run with at most `most` of its newest visits."""
+        """Return the view of the action `name` of a run with at most `most` of its newest visits.
+        `count`: how often it ran."""
         action, said = run.actions[name], run.said.get(name, ())
         asks = any(each.node == name and each.asks for each in run.rests.values())
         rest = (most, count, said, asks)
@@ -289,8 +291,8 @@ class ActionViewCache:
         return found
 
     def prepare(self, run: Run, at_once: int) -> Iterator[None]:
-        """Fill the cache for `run_view`; yield after each `at_once` actions, so that the event loop
-        can do other work in between."""
+        """Return an iterator that fills the cache for `run_view`, step by step: each step views
+        `at_once` actions, so that the event loop can do other work in between."""
         most, counts = _most(run, _LIVE), visit_counts(run)
         for number, name in enumerate(run.actions, 1):
             self.action(run, name, most, counts[name])
@@ -299,7 +301,8 @@ class ActionViewCache:
 
 
 def run_view(run: Run, *, recorded: bool = True, cache: ActionViewCache | None = None) -> RunShown:
-    """Return a run with its actions and their newest visits, as live messages carry it."""
+    """Return the view of a run with its actions and their newest visits, as live messages carry it.
+    `recorded`: all of its events are stored; `cache`: reuses the views of unchanged actions."""
     return RunShown(
         **_fields(run, recorded),
         like=run.like,
@@ -318,8 +321,9 @@ def whole_view(
     place: ArchivePlace | Row[Any] | None = None,
     cache: ActionViewCache | None = None,
 ) -> RunWhole:
-    """Return a run with all visits and its graph; with a `cache` with as many visits as `run_view`.
-    `place`: the run's archive, or a row with it; None if its events are in the journal."""
+    """Return the view of a run with its graph and all visits; with a `cache`, with as many visits
+    as `run_view`. `recorded`: all of its events are stored; `place`: the run's archive, or a row
+    with it; None if its events are in the journal."""
     actions = _actions(run, _WHOLE if cache is None else _LIVE, cache)
     return RunWhole(
         **_fields(run, recorded),
@@ -365,7 +369,7 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
 
 def with_newest_visits(run: Run) -> Run:
     """Return the run with only the newest visits of each action, as many as `run_view` shows. The
-    visits left out are counted in the action's `older`."""
+    removed visits are counted in the action's `older`."""
     most = _most(run, _LIVE)
     actions = {
         name: replace(
@@ -379,7 +383,8 @@ def with_newest_visits(run: Run) -> Run:
 
 
 def list_entry(found: RunSummary, row: Row[Any], labels: list[str]) -> Listed:
-    """Return a summary with the marks that its row carries."""
+    """Return a summary together with the marks (pin, note, cause) in the run's row and its
+    `labels`."""
     fields = {name: getattr(found, name) for name in RunSummary.__struct_fields__}
     return Listed(
         **fields,
@@ -400,7 +405,7 @@ def archived(row: ArchivePlace | Row[Any] | None) -> ArchivedShown | None:
 
 
 def _fields_of_row_and_run(source: Run | Row[Any]) -> dict[str, Any]:
-    """Return the fields of a summary that have the same name in a run and in its row."""
+    """Return the fields of a summary that a run and its row have under the same name."""
     plain = {name: getattr(source, name) for name in _SAME}
     return plain | {name: _time(getattr(source, name)) for name in _SAME_TIMES}
 
@@ -449,8 +454,8 @@ _WORST: Final = (
 
 
 def _rests(run: Run) -> list[RobotRestShown] | msgspec.UnsetType:
-    """Return the rest of each robot of a conducted run: that of its piece which is the furthest from
-    being proven."""
+    """Return, for each robot of a conducted run, the state of its piece that is the furthest from
+    proven rest; unset for other runs."""
     if run.led is None:
         return msgspec.UNSET
     found: dict[str, list[RobotRestShown]] = {
@@ -467,7 +472,8 @@ def _rests(run: Run) -> list[RobotRestShown] | msgspec.UnsetType:
 
 
 def _rest_view(run: Run, rest: PieceRest) -> RobotRestShown:
-    """Return the rest of one piece. The proof of a run that is over is made of those of its pieces."""
+    """Return the view of how far a piece is proven to be at rest. Once the whole run is over, its
+    proof or observation of rest counts for the piece, too."""
     shown = RobotRestShown(
         rest.engine,
         rest.state,
@@ -489,8 +495,8 @@ def _rest_view(run: Run, rest: PieceRest) -> RobotRestShown:
 def visit_view(
     each: Visit, robot: str = "", said: SaidShown | msgspec.UnsetType = msgspec.UNSET
 ) -> VisitShown:
-    """Return one visit with its times as datetimes. `robot`: the engine that played it in
-    a conducted run; `said`: who gave its result by word."""
+    """Return the view of one visit, with its times as datetimes. `robot`: the engine that played it
+    in a conducted run; `said`: the person who stated its result."""
     return VisitShown(
         time(each.start),
         time(each.not_before),
@@ -506,8 +512,8 @@ def visit_view(
 
 
 def _most(run: Run, visits: int) -> int:
-    """Return how many visits of each action a view may have: all actions together about `visits`,
-    since encoding them blocks the event loop."""
+    """Return how many visits of each action a view of this run may have, so that all actions
+    together have about `visits`: encoding them blocks the event loop."""
     return max(1, visits // max(1, len(run.actions)))
 
 
@@ -517,7 +523,7 @@ def _actions(run: Run, visits: int, cache: ActionViewCache | None = None) -> dic
 
 
 def words_for(said: Iterable[Said]) -> dict[int, SaidShown]:
-    """Return who gave results by word, by the number of the visit, from 1."""
+    """Return the views of the results that persons stated, by the number of the visit, from 1."""
     return {each.visit: SaidShown(each.by, time(each.at), each.reason) for each in said}
 
 

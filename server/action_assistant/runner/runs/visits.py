@@ -60,15 +60,12 @@ _OUTCOMES: Final[dict[str, Outcome]] = {
 
 
 class Visit(msgspec.Struct, frozen=True, gc=False, kw_only=True):
-    """One execution of an action, in microseconds UTC.
-
-    It began at `not_before` or later and at `start` or earlier; it ended at `until` or later (None:
-    no end was seen) and at `not_after` or earlier (None: as far as is known it may still go on). So
-    `until` may lie before `start`: then no moment is known at which it was going on for certain.
-    `how` says whether start and result were seen or inferred. `inputs`: the values that the engine
-    reported during the visit; None when nobody saw them. `outputs`: those that an answer showed after
-    it; None likewise.
-    """
+    """One execution of an action, in microseconds UTC. It began at `not_before` or later and at
+    `start` or earlier; it ended at `until` or later (None: no end was seen) and at `not_after` or
+    earlier (None: it may still go on). So `until` may lie before `start`: then there is no moment
+    at which it was certainly going on. `how` says whether start and result were seen or inferred.
+    `inputs`: the values that the engine reported during the visit; None when nobody saw them.
+    `outputs`: those that an answer showed after it; None likewise."""
 
     start: int
     not_before: int
@@ -127,7 +124,7 @@ class RestEvidence(msgspec.Struct, frozen=True, gc=False, array_like=True):
     oldest: int = 0
 
     def and_at(self, asked: int) -> "RestEvidence":
-        """Return this evidence with one more answer."""
+        """Return this evidence with one more answer, requested at `asked` (µs UTC)."""
         if asked <= self.newest:
             return self
         if asked - self.older >= _OLD_US:
@@ -135,7 +132,7 @@ class RestEvidence(msgspec.Struct, frozen=True, gc=False, array_like=True):
         return RestEvidence(asked, self.older, self.oldest)
 
     def by(self, moment: int) -> int:
-        """Return the newest of these times that is not later than `moment`; 0 without one."""
+        """Return the newest of the three times that is not later than `moment`; 0 without one."""
         kept = (self.newest, self.older, self.oldest)
         return next((each for each in kept if each <= moment), 0)
 
@@ -150,7 +147,8 @@ class Changes(msgspec.Struct, frozen=True, gc=False, array_like=True):
     at: int = 0
 
     def to(self, state: str) -> int:
-        """Return the smallest number of changes that can have led to a later `state`."""
+        """Return the smallest number of changes that can have led to `state`, if it was shown later
+        than this one."""
         moves, moved = state in ACTIVE, self.least % 2 == 1
         if moves is not moved:
             return self.least + 1
@@ -195,8 +193,8 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 
     @property
     def proven(self) -> int:
-        """The smallest number of visits that explains everything that answers and feedback
-        showed."""
+        """The smallest number of visits by which everything can have happened that answers and
+        feedback showed."""
         fed = self.feedback[-1].least if self.feedback else 0
         return (max(self.answers.least, fed) + 1) // 2
 
@@ -204,7 +202,8 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 def after_transition(
     action: ActionRun, state: str, at: int, inputs: dict[str, str] | None = None
 ) -> ActionRun:
-    """Return the action after an exact transition to `state`."""
+    """Return the action after a transition to `state` at exactly `at` (µs UTC), which only the
+    simulator reports. `inputs`: the values with which it began, None if unknown."""
     visits, older = action.visits, action.older
     if state in ACTIVE:
         if not is_open(action):
@@ -235,8 +234,8 @@ def after_transition(
 
 
 def after_result(action: ActionRun, item: NodeResult) -> ActionRun:
-    """Return the action after an exact result, which comes while the visit is open or right after
-    its end."""
+    """Return the action after an exact result (`item`), which the simulator reports while the visit
+    is open or right after its end."""
     visits = action.visits
     if visits:
         visits = _and(visits[:-1], replace(visits[-1], result=_OUTCOMES.get(item.result)))
@@ -249,9 +248,9 @@ def after_result(action: ActionRun, item: NodeResult) -> ActionRun:
 def after_piece(
     action: ActionRun, call: int, state: str, visit: Visit | None, at: int
 ) -> ActionRun:
-    """Return an action of a conducted run after its robot showed another state of the call with this
-    number. `visit`: that call, None as long as nothing of it was seen. A known outcome stays, unless the
-    action is seen to go on."""
+    """Return an action of a conducted run after its robot showed another state of the call with
+    this number, at `at` (µs UTC). `visit`: that call, None as long as nothing of it was seen. An
+    outcome that is there stays, unless the action is seen to go on."""
     visits, older = action.visits, action.older
     if visit is not None and action.call == call:
         last = visits[-1]
@@ -277,9 +276,9 @@ def after_outcome(
     action: ActionRun, call: int, outcome: str, how: How, outputs: dict[str, str] | None = None
 ) -> ActionRun:
     """Return an action of a conducted run after the call with this number has an outcome. `how`:
-    observed if an answer of its robot has shown the outcome, even where the visit was too short to
-    be seen, and inferred otherwise. `outputs`: the values that the answer showed, as texts for
-    people."""
+    "observed" if an answer of its robot has shown the outcome, even where the visit was too short
+    to be seen, else "inferred". `outputs`: the values that the answer showed, as texts for people.
+    """
     if action.call != call or not action.visits:  # nothing of it was ever seen
         return action
     result = _OUTCOMES.get(outcome)
@@ -296,7 +295,8 @@ def with_possible_pause(action: ActionRun) -> ActionRun:
 def after_snapshot(
     action: ActionRun, state: str, sight: SnapshotEvidence, inputs: dict[str, str] | None = None
 ) -> ActionRun:
-    """Return the action after a snapshot, which shows a state but not when that began."""
+    """Return the action after a snapshot, which shows a state but not when that began. `sight`: the
+    times and circumstances of the snapshot; `inputs`: the values in it, None if none were seen."""
     is_same = state == action.state
     if is_same and (sight.asked is None or not awaits_answer(action)):
         return action
@@ -334,8 +334,9 @@ def after_snapshot(
 
 
 def _counted(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
-    """Count the changes that led to the state of a snapshot. The earlier snapshots of its source
-    come before it, and those of the other source where the times prove that."""
+    """Return the action with the least number of changes that can have led to the state in a
+    snapshot (`sight`). Earlier snapshots of the same source precede it, and those of the other
+    source where the times prove that."""
     fed, answers = action.feedback, action.answers
     if sight.asked is None:
         last = fed[-1] if fed else Changes()
@@ -349,17 +350,18 @@ def _counted(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRu
 
 
 def awaits_answer(action: ActionRun) -> bool:
-    """Return whether an answer that repeats the state of feedback would still prove more."""
+    """Return whether an answer that repeats the state shown by feedback would prove more than that."""
     return not action.once and action.by == "feedback" and (action.doubted or is_open(action))
 
 
 def is_open(action: ActionRun) -> bool:
-    """Return whether the last visit has no end, as far as is known."""
+    """Return whether no end of the last visit was seen."""
     return bool(action.visits) and action.visits[-1].until is None
 
 
 def _looked_at(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
-    """Apply the proofs of earlier answers that showed the present state."""
+    """Return the action with what follows from earlier answers that showed its present state: until
+    the newest of them (`sight.looked`) it was at rest, or went on."""
     if sight.looked <= action.since:
         return action
     if action.state not in ACTIVE:
@@ -371,7 +373,8 @@ def _looked_at(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
 
 
 def _is_no_news(action: ActionRun, state: str, sight: SnapshotEvidence) -> bool:
-    """Return whether a snapshot may be older than what is known, and so changes nothing."""
+    """Return whether a snapshot may be older than what was seen so far, so that its state changes
+    nothing."""
     if sight.once and _goes_back(action, state):
         return sight.asked is None or sight.asked < action.changed_at
     if sight.asked is not None:
@@ -382,8 +385,8 @@ def _is_no_news(action: ActionRun, state: str, sight: SnapshotEvidence) -> bool:
 
 
 def _may_be_old(action: ActionRun, sight: SnapshotEvidence) -> bool:
-    """Return whether a snapshot is of feedback that may be older than the last answer: then no visit
-    that it shows is known to be another one than those that answers have shown."""
+    """Return whether a snapshot is of feedback that may be older than the last answer, so that a
+    visit in it may be one that answers have shown already."""
     if sight.once or sight.asked is not None or not action.visits:
         return False
     is_recent = sight.at - action.answers.at < _OLD_US
@@ -395,9 +398,9 @@ def _goes_back(action: ActionRun, state: str) -> bool:
 
 
 def _confirmed(action: ActionRun, sight: SnapshotEvidence) -> ActionRun:
-    """Return an action whose visit only feedback has shown so far, after an answer shows it
-    running: the visit is the one of that answer, and began after the last answer that showed
-    rest."""
+    """Return an action whose visit only feedback has shown so far, after an answer (`sight`) shows
+    it running: the visit is the one in that answer, and began after the last answer that showed the
+    action at rest."""
     if (sight.asked or 0) < action.changed_at:
         return action
     last = action.visits[-1]
@@ -430,8 +433,8 @@ def _closed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun
 
 
 def _blurred(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
-    """Return an action of an older stream, in which no answer tells whether feedback is of the last
-    visit or of another one: the last visit gets bounds that hold for each of them."""
+    """Return an action of an older stream, in which no answer decides whether feedback is of the
+    last visit or of another one: the last visit gets bounds that hold in both cases."""
     last = action.visits[-1]
     if state in ACTIVE and sight.asked is not None:
         last = replace(last, until=None, not_after=None, result=None)
@@ -444,7 +447,8 @@ def _blurred(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRu
 
 
 def _missed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun:
-    """Return the action with a visit that has ended and was never seen going on."""
+    """Return the action with one more visit, which has ended (in `state`) and was never seen going
+    on."""
     before = _not_before(action, sight)
     if action.by == "feedback" and not sight.once:  # its state may be older than the last answer
         before = min(before, max(action.rests.by(action.changed_at - _OLD_US), sight.begun))
@@ -461,20 +465,22 @@ def _missed(action: ActionRun, state: str, sight: SnapshotEvidence) -> ActionRun
 
 
 def _not_before(action: ActionRun, sight: SnapshotEvidence) -> int:
-    """Return the earliest moment at which the new visit can have begun."""
+    """Return the earliest time (µs UTC) at which a visit that a snapshot shows for the first time
+    can have begun."""
     is_reliable = sight.once or sight.asked is not None
     rest = action.rests.newest if is_reliable else action.rests.by(sight.at - _OLD_US)
     return min(sight.at, max(rest, sight.begun))
 
 
 def _not_after(state: str, sight: SnapshotEvidence) -> int | None:
-    """Return the moment by which the action's code had ended; None for one that was told to stop
-    and failed, since it may go on."""
+    """Return the time (µs UTC) by which the action's code had certainly ended; None for an action
+    that ended in ERROR and may have been stopped, since its code may go on."""
     return None if state == "ERROR" and sight.stoppable else sight.at
 
 
 def with_messages(action: ActionRun, messages: tuple[str, ...], at: int) -> ActionRun:
-    """Add the new ones of these messages: a snapshot repeats all that the engine still keeps."""
+    """Return the action with the new ones of these messages, which were shown at `at` (µs UTC): a
+    snapshot repeats all messages that the engine still has."""
     first = len(messages) if is_heard(action, messages) else _known(action, messages)
     if first == len(messages):
         return action if first == action.heard else replace(action, heard=first)
@@ -483,8 +489,8 @@ def with_messages(action: ActionRun, messages: tuple[str, ...], at: int) -> Acti
 
 
 def is_heard(action: ActionRun, messages: tuple[str, ...]) -> bool:
-    """Return whether none of these messages is new. An engine keeps the last ten, so that with each
-    new one the oldest goes; that is seen unless all of them have the same text."""
+    """Return whether all of these messages were seen before. An engine has the last ten, so that
+    with each new one the oldest goes; that is noticed unless all of them have the same text."""
     if len(messages) != action.heard or not messages:
         return len(messages) <= action.heard
     last = action.messages[-len(messages) :]
@@ -492,7 +498,7 @@ def is_heard(action: ActionRun, messages: tuple[str, ...]) -> bool:
 
 
 def _known(action: ActionRun, messages: tuple[str, ...]) -> int:
-    """Return how many of these messages, from the first on, are known already."""
+    """Return how many of these messages, counted from the first, were seen before."""
     if len(messages) > action.heard:
         return action.heard
     last = tuple(each.text for each in action.messages[-len(messages) :])
@@ -500,7 +506,8 @@ def _known(action: ActionRun, messages: tuple[str, ...]) -> int:
 
 
 def _implied(before: str, after: str) -> Outcome | None:
-    """Return the result that a pair of states leaves no doubt about."""
+    """Return the result that a change from the state `before` to `after` proves: "error",
+    "stopped", or None."""
     if after == "ERROR":
         return "error"
     return "stopped" if before == "STOPPING" else None

@@ -26,16 +26,16 @@ _HELD: Final = text(
 
 
 class Piece(msgspec.Struct, frozen=True):
-    """A word of the searched text, and its position in a word of a run: "begin" if a word of the
-    run begins with it, and so on."""
+    """A word of the searched text, and where it has to stand in a word of a run: "all" of it, at
+    its "begin" or "end", or "within" it."""
 
     text: str
     place: Literal["all", "end", "begin", "within"]
 
 
 def holds(run_id: str, *texts: str) -> Sequence[Executable]:
-    """Return the statements that put the words of these texts into the index, for the transaction
-    that stores the texts."""
+    """Return the statements that put the words of these texts into the index for the run; ()
+    without words. They belong into the transaction that stores the texts."""
     words = sorted({each for part in texts for each in _WORD.findall(_lower(part))})
     if not words:
         return ()
@@ -44,15 +44,15 @@ def holds(run_id: str, *texts: str) -> Sequence[Executable]:
 
 
 def will_be_indexed(run_id: str, number: int) -> Executable:
-    """Return the statement that marks a run as not indexed yet, unless there is such a run
-    already."""
+    """Return the statement that marks a new run with this number as not indexed yet; it does
+    nothing if the run exists already."""
     chosen = select(literal(number)).where(~select(run.c.id).where(run.c.id == run_id).exists())
     return insert(unindexed_run).prefix_with("OR IGNORE").from_select(["number"], chosen)
 
 
 def index_some(connection: Connection, most: int) -> bool:
-    """Index the words of at most `most` runs that are marked as not indexed, the newest first;
-    return whether there were any."""
+    """Index the words of at most `most` runs that are marked as not indexed, the newest first, in
+    the transaction of `connection`; return whether there were any."""
     texts = (run.c.graph_name, run.c.engine, run.c.author_name, review.c.words, review.c.note)
     chosen = (
         select(unindexed_run.c.number, run.c.id, *texts)
@@ -71,8 +71,8 @@ def index_some(connection: Connection, most: int) -> bool:
 
 
 def pieces(wanted: str) -> list[Piece]:
-    """Split a searched text into words, those first that fewer runs hold; empty where only reading
-    all runs can answer."""
+    """Split a searched text into words, the rarest first as far as can be guessed (whole and long
+    words); empty if only reading all runs can answer."""
     if "\0" in wanted:  # `like` takes it for the end of the text
         return []
     lowered = _lower(wanted)
@@ -84,7 +84,7 @@ def pieces(wanted: str) -> list[Piece]:
 
 
 def holding(piece: Piece) -> Select[Any]:
-    """Select the numbers of runs that hold such a word: all of them, or `MOST` + 1."""
+    """Select the numbers of the runs with this word: all of them, or `MOST` + 1 if there are more."""
     match piece.place:
         case "all":
             fits = word.c.text == piece.text
@@ -100,13 +100,15 @@ def holding(piece: Piece) -> Select[Any]:
 
 
 def unindexed() -> Select[Any]:
-    """Select the numbers of runs that are not indexed: all of them, or `MOST` + 1."""
+    """Select the numbers of the runs that are not indexed: all of them, or `MOST` + 1 if there are
+    more."""
     return select(unindexed_run.c.number).limit(MOST + 1)
 
 
 def _place(begins: bool, ends: bool) -> Literal["all", "end", "begin", "within"]:
-    """Return the position of a word: `begins` and `ends` are true where another character stands
-    before, or after, it."""
+    """Return where a searched word has to stand in a word of a run. `begins` and `ends`: another
+    character stands before, or after, it in the searched text, so that its begin or end is that of
+    the word."""
     if begins and ends:
         return "all"
     if begins:

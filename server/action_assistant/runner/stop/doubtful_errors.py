@@ -12,9 +12,8 @@ from action_assistant.runner.links.observations import Snapshot, did_not_obey, f
 
 
 class DoubtfulErrors:
-    """Actions of one run that the engine shows in ERROR although their code may still run.
-
-    `reached`: a stop or a pause may have reached the graph before its first answer here.
+    """Decides for the actions of one run that the engine shows in ERROR whether their code may
+    still run. `reached`: a stop or a pause may have reached the graph before its first answer here.
     """
 
     def __init__(self, *, reached: bool) -> None:
@@ -23,12 +22,14 @@ class DoubtfulErrors:
         self._open: dict[tuple[str, str], None] = {}
 
     def reach(self) -> None:
-        """Note that from now on a stop, a pause or a change may reach the graph."""
+        """Allow, from now on, for a stop, a pause or a change that may reach the graph: an action
+        in ERROR may then still run."""
         self._reached = True
 
     @property
     def places(self) -> frozenset[tuple[str, str]]:
-        """All actions in ERROR, doubtful or over, as pairs of the graph's running name and the full name."""
+        """All actions in ERROR, with or without code that may run, as pairs of the graph's running
+        name and the full name."""
         return frozenset({*self._open, *self._thrown})
 
     @property
@@ -37,8 +38,8 @@ class DoubtfulErrors:
         return frozenset(graph for graph, _ in self._open)
 
     def look(self, shown: Sequence[Snapshot]) -> str:
-        """Process one more answer about a graph and its sub-graphs; return why the code of an
-        action may still run, "" if nothing suggests that."""
+        """Process one more answer (`shown`: the snapshots of a graph and its sub-graphs); return,
+        as a sentence, why the code of an action may still run, "" if nothing suggests that."""
         for each in shown:
             failed = failed_in(each)
             self._thrown -= {

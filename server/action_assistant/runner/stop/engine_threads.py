@@ -32,19 +32,21 @@ class EngineThreads:
         self._was_seen = False
 
     def starts(self, process: EngineProcess | None) -> None:
-        """Remember the existing threads, right before the start is handed over."""
+        """Store which threads the process has, right before the start is sent. `process`: None if
+        it cannot be observed."""
         self._process = process
         self._before = None if process is None else self._threads_of(process)
         self._was_seen = False
 
     def see_moving(self) -> None:
-        """Look for a thread of the run while an answer shows an action of it moving."""
+        """List the threads of the process while an answer shows an action moving, to make sure that
+        the threads of the run can be seen."""
         if not self._was_seen and self._before is not None:
             self._was_seen = len(self._since_the_start() or ()) >= _OF_A_RUN
 
     def have_ended(self, process: EngineProcess | None) -> bool:
-        """Return whether no thread is left that began since the start, in the process that the run was
-        sent to."""
+        """Return whether all threads that began since the start have ended, in the process that the
+        run was sent to. False if that cannot be observed."""
         if not self._was_seen or process is None or process != self._process:
             return False
         return all(self._since_the_start() == frozenset() for _ in range(_SCANS))

@@ -47,9 +47,9 @@ _REMOVED: Final = "the robot was taken out of the registry meanwhile: look at it
 
 
 class StoppedAll(msgspec.Struct, frozen=True):
-    """The answer to a stop of everything. `runs` are the runs that are being stopped, `graphs` the graphs of
-    others, by robot. `unknown` says, by robot, why it is not known what a robot runs: a graph there is not
-    being stopped unless it was seen before."""
+    """The answer to a Stop of everything. `runs` are the runs that are being stopped, `graphs`
+    those of other programs, by robot. `unknown` says, by robot, why it is not known what a robot
+    runs: a graph there is not being stopped unless it was seen before."""
 
     runs: list[str]
     graphs: dict[str, list[str]] = {}
@@ -57,8 +57,9 @@ class StoppedAll(msgspec.Struct, frozen=True):
 
 
 class _ForeignStop:
-    """One Stop that is not proven yet. `life`: the incarnation of the engine that was to stop the
-    graph; `why`: why it is not proven, "" at first."""
+    """One Stop, not proven yet, of a graph that another program has started. `life`: the id
+    (incarnation) of the engine process that was to stop the graph; `why`: why it is not proven, ""
+    at first."""
 
     def __init__(self, robot: str, graph: str, life: str, why: str) -> None:
         self.robot = robot
@@ -73,8 +74,8 @@ class _ForeignStop:
 
 
 class ForeignStopLoop:
-    """Carries out all Stops of graphs that others have started on `robots`. `changed` is called when
-    the page has to show something else."""
+    """Carries out all Stops of graphs that other programs have started on `robots`. `changed` is
+    called when the page has to show a change."""
 
     def __init__(self, robots: Robots, runtime: Runtime, changed: Callable[[], None]) -> None:
         self._robots = robots
@@ -85,7 +86,7 @@ class ForeignStopLoop:
         self._going: dict[tuple[str, str], _ForeignStop] = {}
 
     def trouble(self, robot: str, graph: str) -> str | None:
-        """Return why it is not proven yet that the graph has stopped; the text is empty until a
+        """Return why it is not proven yet that the graph has stopped on this robot; "" until a
         reason is known. Return None if the graph is not being stopped, or no longer."""
         found = self._going.get((robot, graph))
         return None if found is None else found.why
@@ -108,9 +109,10 @@ class ForeignStopLoop:
     def stop(
         self, author: Author, own_runs: Callable[[str], Collection[str]], robot: str | None = None
     ) -> list[str]:
-        """Begin to stop all graphs that others have started, on one robot or on all robots, and
-        return each as "robot: graph". `own_runs(robot)` returns the ids of this runner's open runs
-        on a robot. The call never waits. Raise NotFound if the robot is not registered."""
+        """Begin to stop all graphs that other programs have started, on one robot or (None) on all
+        robots, and return each as "robot: graph". `author`: who pressed Stop; `own_runs(robot)`
+        returns the ids of this runner's open runs on a robot. The call never waits. Raise NotFound
+        if the robot is not registered."""
         stopped: list[str] = []
         for engine in self._robots.engines(robot):
             name, answer = engine.registration.name, engine.answer
@@ -120,8 +122,8 @@ class ForeignStopLoop:
         return stopped
 
     def _stop_graph(self, engine: KnownEngine, graph: str, author: Author) -> None:
-        """Begin to stop a graph, and return at once. If it is being stopped already, only wait
-        longer for the proof."""
+        """Begin to stop a graph on a robot, and return at once. If it is being stopped already,
+        only wait longer for the proof. `author`: who pressed Stop."""
         robot = engine.registration.name
         known = self._going.get((robot, graph))
         if known is not None:
@@ -146,15 +148,16 @@ class ForeignStopLoop:
                     self._begin(_ForeignStop(robot, asked.graph, asked.life, _TAKEN_UP), None)
 
     def hear_of(self, robot: str, command: ForeignCommand) -> None:
-        """Process a command of somebody else that may just have started the graph: an answer
-        requested before it proves nothing."""
+        """Process a command that another program has sent to the robot. If it may just have started
+        a graph that is being stopped, an answer requested before it proves nothing."""
         found = self._going.get((robot, command.graph))
         if command.command in SET_GOING and found is not None:
             found.disturbed = True
             found.loading.meddle()
 
     def shows(self, engine: KnownEngine, snapshots: tuple[Snapshot, ...]) -> None:
-        """Process graphs that an engine shows, in an answer or by feedback; return at once."""
+        """Process graphs (`snapshots`) that an engine shows, in an answer or by feedback; return at
+        once."""
         for (robot, graph), wanted in self._going.items():
             if robot != engine.registration.name:
                 continue
@@ -183,9 +186,9 @@ class ForeignStopLoop:
             self._changed()
 
     async def _until_proven(self, wanted: _ForeignStop, known: KnownEngine | None) -> RobotEvent:
-        """Stop a graph until that is proven or impossible to prove; return the event for it.
-        `known`: the engine that is known to be the one to stop; after a new link or a restart of
-        the runner it has to show that first."""
+        """Send stop messages for a graph until the Stop is proven or can never be proven; return
+        the event for that. `known`: the engine if it is known to be the one to stop, else None;
+        after a new link or a restart of the runner it has to show that first."""
         began, gap = anyio.current_time(), _GAP_S
         while True:
             engine = self._robots.present(wanted.robot)
@@ -208,8 +211,9 @@ class ForeignStopLoop:
             gap = min(1.5 * gap, _SLOWEST_S)
 
     async def _recognise(self, wanted: _ForeignStop, engine: KnownEngine) -> StopUnproven | str:
-        """Ask an engine, without sending a stop, whether it is the one that was to stop the graph.
-        Return "" if it is, why that is unknown, or the event that it is another engine."""
+        """Ask an engine, without sending a stop, whether it is the process that was to stop the
+        graph (`wanted`). Return "" if it is, the reason if that cannot be known yet, or the event
+        that it is another one."""
         answer = await _ask(engine)
         if answer is None:
             return engine.why or "the engine does not answer"
@@ -218,8 +222,8 @@ class ForeignStopLoop:
         return "" if answer.incarnation == wanted.life else self._unproven(wanted, _RESTARTED)
 
     async def _steadily(self, wanted: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
-        """Send one stop message and check the answer, as `_once`. An exception is logged, so that
-        the stop is sent again."""
+        """Do as `_once`, but log any exception and return it as the reason, so that the stop is
+        sent again."""
         try:
             return await self._once(wanted, engine)
         except Exception as error:
@@ -230,8 +234,8 @@ class ForeignStopLoop:
             return f"the runner failed: {error!r}"
 
     async def _once(self, wanted: _ForeignStop, engine: KnownEngine) -> RobotEvent | str:
-        """Send one stop message and check the answer; return the event that ends the Stop, or why
-        it is not proven yet."""
+        """Send one stop message, ask the engine, and judge its answer. Return the event that ends
+        the Stop `wanted`, or the reason why it is not proven yet."""
         why = await send_stop(engine, wanted.graph)
         asked = anyio.current_time()
         answer = await _ask(engine)
@@ -256,8 +260,8 @@ class ForeignStopLoop:
         return StopWasProven(at=answer.at, graph=wanted.graph, asked_at=answer.asked_at)
 
     async def _still_loading(self, wanted: _ForeignStop, answer: Answer) -> str:
-        """Return in words which actions of the graph may still be loading; "" for none. Sub-graphs
-        of other starts count, too, since they cannot be distinguished."""
+        """Return in words which actions of the graph may still be loading by this answer; "" for
+        none. Sub-graphs of other starts count, too, since they cannot be distinguished."""
         shown = _shown(answer, wanted.graph)
         try:
             unread = wanted.loading.unread(shown)
@@ -279,7 +283,8 @@ async def _ask(engine: KnownEngine) -> Answer | None:
 
 
 def _at_rest(answer: Answer, graph: str, rest: RestProof, asked: float) -> bool:
-    """Return whether neither the graph nor a sub-graph moves, or will move by itself."""
+    """Return whether this answer, requested at `asked` (seconds of the event loop), proves together
+    with earlier ones (`rest`) that neither the graph nor a sub-graph moves."""
     shown = _shown(answer, graph)
     is_held = bool(shown) and shown[0].graph == graph
     return rest.seen(shown, asked) if is_held else rest.missing(shown, asked)
@@ -290,6 +295,7 @@ def _shown(answer: Answer, graph: str) -> list[Snapshot]:
 
 
 def _parts_of(snapshots: Sequence[Snapshot], graph: str) -> list[Snapshot]:
-    """Return the snapshot of a graph, if there is one, and then those of its sub-graphs."""
+    """Return the snapshot of a graph, if it is among them, and then the snapshots of its
+    sub-graphs."""
     own = [each for each in snapshots if each.graph == graph]
     return [*own, *(each for each in snapshots if each.graph.startswith(f"{graph}__"))]

@@ -35,8 +35,8 @@ _DRAINED: Final = frozenset({"FINISHED", "HALTED"})
 
 
 class LoadingAction(msgspec.Struct, frozen=True):
-    """One action that may be loading: the running name of its graph, its full name, and what people
-    call it. `sure`: it was triggered; else nobody knows whether it was."""
+    """One action that may be loading: the running name of its graph, its full name, and its name
+    for people. `sure`: it was triggered; else that is unknown."""
 
     graph: str
     node: str
@@ -46,8 +46,9 @@ class LoadingAction(msgspec.Struct, frozen=True):
 
 def read_triggers(text: str | None, sent: Sequence[str], meddled: bool) -> Triggers | None:
     """Return the arrows of a graph by which actions trigger others; None if it cannot be read.
-    `text`: the graph as the engine wrote it; `sent`: the texts that were sent, changes last;
-    `meddled`: somebody else may have changed the graph. For workers."""
+    `text`: the graph as the engine wrote it, None if unknown; `sent`: the texts that were sent,
+    changes last; `meddled`: another program may have changed the graph. Parsing is slow: call it in
+    a worker process."""
     try:
         versions = [triggers_of(codec.read(each).graph, exits_known=True) for each in sent]
         if len(versions) == 1 and not meddled:
@@ -65,11 +66,8 @@ def read_triggers(text: str | None, sent: Sequence[str], meddled: bool) -> Trigg
 
 class LoadingWatch:
     """Collects what was seen of one graph and its sub-graphs, to decide which actions may be
-    loading.
-
-    `meddled`: somebody else may have changed the graph or started actions of it, so that they may
-    have run more often than the arrows allow, and side by side.
-    """
+    loading. `meddled`: another program may have changed the graph or started actions of it, so that
+    they may have run more often than the arrows allow, and side by side."""
 
     def __init__(self, main: str, *, meddled: bool = False) -> None:
         self._main = main
@@ -81,8 +79,8 @@ class LoadingWatch:
         self._age = 0  # number of calls of `forget`
 
     def see(self, shown: Sequence[Snapshot]) -> None:
-        """Process an answer, or feedback of an engine that is alone on its name. A sub-graph may
-        begin again while a graph around it is RUNNING."""
+        """Process an answer, or feedback of an engine that is alone on its name (`shown`: its
+        snapshots). A sub-graph may begin again while a graph around it is RUNNING."""
         self._known.update(each.graph for each in shown)
         for each in sorted(shown, key=lambda one: len(one.graph)):
             if each.state not in LEFT:
@@ -94,24 +92,23 @@ class LoadingWatch:
                 self._after[each.graph] = first, _and(seen, each)
 
     def sends(self, umrf: str, *, beside: bool = False) -> None:
-        """Note that this graph is sent: at the start, or as a change. `beside`: the change starts
-        an action while others run."""
+        """Record that the graph text `umrf` is sent: at the start, or as a change. `beside`: the
+        change starts an action while others run."""
         self.forget()
         self._sent.append(umrf)
         self._meddled = self._meddled or beside
 
     def recalls(self, umrf: str) -> None:
-        """Note that `umrf`, the text of the graph, was sent before this watch began: by an earlier
-        process, or before the run ended and then moved again.
-
-        This changes nothing if a graph was sent since, or if somebody else may have changed it.
-        """
+        """Record that `umrf`, the text of the graph, was sent before this watch began: by an
+        earlier process, or before the run ended and then moved again. This changes nothing if a
+        graph was sent since, or if another program may have changed it."""
         if not self._sent and not self._meddled:
             self._sent.append(umrf)
             self._read.pop(self._main, None)
 
     def meddle(self) -> None:
-        """Note that somebody else may have changed or started the graph."""
+        """Record that another program may have changed or started the graph; earlier observations
+        are forgotten."""
         self.forget()
         self._meddled = True
 
@@ -122,7 +119,8 @@ class LoadingWatch:
         self._age += 1
 
     def unread(self, shown: Sequence[Snapshot]) -> tuple[str, ...]:
-        """Return the graphs whose arrows have to be read to tell which actions may be loading."""
+        """Return the names of the graphs whose arrows have to be read, by `read`, to decide which
+        actions may be loading."""
         return tuple(
             each.graph for each in shown if _is_open(each) and each.graph not in self._read
         )
@@ -130,8 +128,8 @@ class LoadingWatch:
     async def read(
         self, graphs: Sequence[str], texts: Mapping[str, str], run_in_worker: RunInWorker
     ) -> None:
-        """Read the arrows of these graphs, from the engine's `texts` or else from what was sent.
-        Raises the errors of workers."""
+        """Read the arrows of these graphs in a worker, from the engine's `texts` by name, or else
+        from what was sent, and store them. Raise the errors of workers."""
         for graph in graphs:
             sent = tuple(self._sent) if graph == self._main else ()
             text = texts.get(graph)
@@ -144,7 +142,7 @@ class LoadingWatch:
 
     def actions(self, shown: Sequence[Snapshot]) -> tuple[LoadingAction, ...]:
         """Return the actions that may be loading. `shown`: snapshots of a graph and its sub-graphs,
-        without an active action. If the arrows of a graph are not known, each of its actions that
+        without an active action. If the arrows of a graph were not read, each of its actions that
         has not begun may be loading."""
         held = {each.graph for each in shown}
         found: list[LoadingAction] = []
@@ -156,8 +154,8 @@ class LoadingWatch:
         return tuple(found)
 
     def _seen(self, shown: Snapshot) -> SeenAfter:
-        """Return what was seen of a graph; nothing if this answer shows that an action which was
-        seen moving has not begun: another engine, or a forgery, has shown it."""
+        """Return what was seen of a graph so far; nothing if this answer shows as not begun an
+        action that was seen moving: then another engine, or a forgery, has shown that."""
         seen = self._after.get(shown.graph, (0, SeenAfter()))[1]
         denied = any(shown.nodes.get(each) in NEVER_BEGAN for each in seen.active)
         return SeenAfter() if denied else seen
@@ -193,8 +191,8 @@ class LoadingTimes:
             times.append((first.start - sent_at) / 1e6)
 
     def usual(self, robot: str, actions: Sequence[LoadingAction]) -> str:
-        """Return in words how long one action usually loads; "" for several actions, or if too few
-        begins were seen."""
+        """Return in words how long one action usually loads on this robot; "" for several actions,
+        or if too few begins were seen."""
         nodes = {each.node.rpartition("_")[0] for each in actions}
         times = self._known.get((robot, nodes.pop()), ()) if len(nodes) == 1 else ()
         if len(times) < _ENOUGH:
@@ -204,7 +202,8 @@ class LoadingTimes:
 
 
 def in_words(actions: Sequence[LoadingAction]) -> str:
-    """Return one sentence without its full stop; "" for none."""
+    """Return one sentence, without its full stop, that says which actions are or may be loading; ""
+    for none."""
     if not actions:
         return ""
     names = list(dict.fromkeys(each.name for each in actions))
@@ -222,13 +221,13 @@ def in_words(actions: Sequence[LoadingAction]) -> str:
 
 
 def _is_open(shown: Snapshot) -> bool:
-    """Return whether a graph was begun and some action of it was not."""
+    """Return whether a graph has begun and some action of it has not."""
     return shown.state not in NEVER_BEGAN and not NEVER_BEGAN.isdisjoint(shown.nodes.values())
 
 
 def _and(seen: SeenAfter, shown: Snapshot) -> SeenAfter:
-    """Return the observations with one more snapshot. Only an answer counts for the end of a graph,
-    since anybody may publish feedback."""
+    """Return the observations `seen` with one more snapshot. Only an answer counts for the end of a
+    graph, since any program may publish feedback."""
     has_ended = shown.source == "get" and shown.state in _DRAINED
     return SeenAfter(
         active=seen.active.union(node for node, state in shown.nodes.items() if state in ACTIVE),

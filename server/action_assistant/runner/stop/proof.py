@@ -24,7 +24,8 @@ SET_GOING: Final = frozenset({"start", "resume", "modify"})
 
 
 async def send_stop(link: Link, graph: str) -> str:
-    """Send one stop message; return what went wrong, "" for nothing. Never raises."""
+    """Send one stop message for a graph, waiting a second at most; return why that failed, "" if it
+    was sent. No error is raised."""
     try:
         with anyio.fail_after(_SEND_S):
             await link.stop(graph)
@@ -39,36 +40,34 @@ async def send_stop(link: Link, graph: str) -> str:
 
 
 def hash_of(shown: Sequence[Snapshot]) -> str:
-    """Return the SHA-256 of what an answer showed, for the record of a proof."""
+    """Return the SHA-256 of the snapshots in an answer, for the record of a proof."""
     return hashlib.sha256(msgspec.json.encode(list(shown))).hexdigest()
 
 
 class RestProof:
-    """Decides from several answers whether a graph is at rest. Loading actions are decided by
-    `loading`.
-
-    An action that was loaded before and is triggered again is RUNNING only after its thread starts,
-    so one answer is not enough: the graph must be seen at rest for a while. A graph in RUNNING
-    without a running action may be about to start one. `exact`: an engine that hides nothing, as
-    the simulator.
-    """
+    """Decides from several answers whether a graph is at rest (nothing of it moves); actions that
+    are loading are judged elsewhere, by `LoadingWatch`. An action that was loaded before and is
+    triggered again is RUNNING only after its thread starts, so one answer is not enough: the graph
+    must be seen at rest for a while. A graph in RUNNING without a running action may be about to
+    start one. `exact`: an engine that hides nothing, as the simulator."""
 
     def __init__(self, *, exact: bool) -> None:
         self._exact = exact
         self._since: float | None = None
 
     def forget(self) -> None:
-        """Start over: the graph was not seen, or somebody may have set it going."""
+        """Start over: the graph was not seen, or another program may have started it."""
         self._since = None
 
     @property
     def pending(self) -> bool:
-        """True if the graph was at rest in the last answer."""
+        """True if nothing moved in the last answer."""
         return self._since is not None
 
     def seen(self, shown: Sequence[Snapshot], asked: float) -> bool:
-        """Process one more answer about a graph (the first of `shown`) and its sub-graphs,
-        requested at `asked` (seconds); return whether they have been at rest for long enough."""
+        """Process one more answer, requested at `asked` (seconds of the event loop). `shown`: the
+        snapshots of the graph, first, and its sub-graphs. Return whether nothing has moved for long
+        enough."""
         state = shown[0].state
         moving = any(each.active for each in shown)
         if moving or state not in TERMINAL | NEVER_BEGAN:
@@ -81,9 +80,9 @@ class RestProof:
 
     def missing(self, parts: Sequence[Snapshot], asked: float) -> bool:
         """Process one more answer that lacks a graph but shows its sub-graphs (`parts`). `asked`:
-        the time of the request, in seconds. Return whether the graph has been missing, without an
-        active action in `parts`, for long enough to be proven at rest: an engine does not show a
-        graph at once after its start."""
+        the time of the request, in seconds of the event loop. Return whether the graph has been
+        missing, without an active action in `parts`, for long enough to be proven at rest: an
+        engine does not show a graph at once after its start."""
         if any(each.active for each in parts):
             self._since = None
             return False
@@ -92,5 +91,5 @@ class RestProof:
 
 
 def _long_enough(shown: Sequence[Snapshot]) -> float:
-    """Return for how long a graph like this must be seen at rest, in seconds."""
+    """Return for how many seconds such a graph must be seen without motion to count as at rest."""
     return _AGAIN_S if any(each.spontaneous for each in shown) else _STARTING_S

@@ -30,8 +30,8 @@ class StopAttempt(NamedTuple):
 
 
 class StopLoop:
-    """Takes presses of Stop, and yields the times at which stop messages are due. `hung`: why the
-    engine will never answer again."""
+    """Takes presses of Stop for one run, and yields the times at which stop messages are due.
+    `hung`: why the engine will never answer again."""
 
     def __init__(self, run: Run, clock_us: ClockUs) -> None:
         self.hung = ""
@@ -47,8 +47,9 @@ class StopLoop:
             self._wanted.set()
 
     def press(self, author: Author, stop_id: str) -> StopRequested | None:
-        """Request the Stop, and return the event to record. One press may arrive several times on
-        several ways; only the first arrival gives an event."""
+        """Request the Stop in the name of `author`, and return the event to record; None if this is
+        the same press again, which may arrive several times on several ways. `stop_id`: the id of
+        the press."""
         # Unlike `anyio.current_time` this needs no task: whoever presses Stop is heard.
         now, (who, when) = asyncio.get_running_loop().time(), self._asked
         is_new = who != author.id or (stop_id not in self._ids and now - when > _ONE_PRESS_S)
@@ -61,8 +62,8 @@ class StopLoop:
         return StopRequested(self._clock_us(), author, stop_id) if is_new else None
 
     def notice(self, run: Run) -> None:
-        """Note the present state of the run. If the last stop message was in vain and the next one
-        may be of use, have it sent soon."""
+        """Process the present state of the run: if the last stop message was useless and the next
+        one may not be, that is sent soon."""
         self._run = run
         if self._vain and not _is_vain(run):
             self._news.set()
@@ -92,6 +93,6 @@ class StopLoop:
 
 
 def _is_vain(run: Run) -> bool:
-    """Return whether further stop messages are in vain: nothing of the run moves any more, and the
-    engine can never prove that it is at rest."""
+    """Return whether further stop messages are useless: nothing of the run moves any more, and the
+    engine can never prove it."""
     return bool(run.unconfirmed) and not run.active and run.unknown_since is None

@@ -43,9 +43,9 @@ _Reports: TypeAlias = Mapping[Key, set[Precondition]]
 
 
 class _Actors(NamedTuple):
-    """The actors that perform an action, or the actions of a sub-graph: all of them (`every`), those
-    of its first actions and those of its last ones. "" is no actor; in a sub-graph it stands for the
-    actor of the action around."""
+    """The actors that perform an action, or the actions of a sub-graph: all of them (`every`), the
+    actors of its first actions and of its last ones. "" is no actor; in a sub-graph it stands for
+    the actor of the action around."""
 
     every: frozenset[str]
     first: frozenset[str]
@@ -56,13 +56,10 @@ _ByKey: TypeAlias = Mapping[Key, _Actors]
 
 
 def check_actors(subject: Subject, graphs: SubGraphs, flow: Flow | None = None) -> None:
-    """Report what a graph with several actors means on robots. A graph has several actors if its
-    actions and those of its sub-graphs, at any depth, name more than one.
-
-    `graphs`: the sub-graphs of this graph, which have been checked; `flow`: that of this graph, if it
-    was followed already. Nothing is reported for the simulator, which performs the actions of all
-    actors.
-    """
+    """Report in `subject` what a graph with several actors means on robots. A graph has several
+    actors if its actions and those of its sub-graphs, at any depth, name more than one. `graphs`:
+    its sub-graphs, which have been checked; `flow`: the result of `follow`, None if that was not
+    called yet. Nothing is reported for the simulator, which performs the actions of all actors."""
     everywhere = (subject.graph, *(graphs.by_name[name] for name in graphs.found))
     named = {a.actor for graph in everywhere for a in graph.actions if not a.missing} - {""}
     facts = subject.facts
@@ -87,8 +84,9 @@ def check_actors(subject: Subject, graphs: SubGraphs, flow: Flow | None = None) 
 
 
 def led_problems(graph: Graph, facts: EngineFacts) -> list[Problem]:
-    """Return what leading a graph step by step means, with the robot of each action as its actor, ""
-    for the simulator. The graph may have only one robot. What its sub-graphs mean is not returned."""
+    """Return the problems of leading a graph step by step, in which the robot of each action is its
+    actor and "" is the simulator. The graph may have only one robot. Problems inside sub-graphs are
+    not returned. `facts`: the engine build."""
     subject = Subject(graph, facts)
     _LedGraph(SubGraphs({}, (), Resolution()), is_cast=True).check(subject, "", 0)
     return subject.problems
@@ -107,8 +105,9 @@ class _LedGraph:
             self._actors[name] = self._of_graph(graphs.by_name[name])
 
     def check(self, subject: Subject, around: str, depth: int, flow: Flow | None = None) -> None:
-        """Report the problems of one graph. `around`: the actor of the action for which the graph
-        stands; `depth`: the number of graphs around it; `flow`: that of the graph, if it is known."""
+        """Report the problems of one graph in its `subject`. `around`: the actor of the action for
+        which the graph stands; `depth`: the number of graphs around it; `flow`: the result of
+        `follow`, None if that was not called yet."""
         actors_of = {a.key: self._of_action(a, around) for a in subject.real}
         reachability, concurrency = flow or follow(subject)
         reports, runs = reachability.reports, reachability.runs
@@ -136,8 +135,9 @@ class _LedGraph:
     def _check_stop(
         self, subject: Subject, relation: Relation, actors_of: _ByKey, reports: _Reports
     ) -> None:
-        """Report an arrow that stops an action: for a robot that is led it is a message of the
-        runner."""
+        """Report an arrow (`relation`) that stops an action: on a robot that is led this is a
+        message of the runner. `actors_of`: the actors of each action by key; `reports`: the
+        outcomes that each action can report."""
         child = actors_of[relation.child]
         if "stop" not in _answers(relation, reports) or (self._is_cast and child.every == {""}):
             return
@@ -164,9 +164,9 @@ class _LedGraph:
         runs: Container[Key],
         concurrency: Concurrency,
     ) -> None:
-        """Report each action that may run at the same time as later ones of its actor. `runs`: the
-        keys of the actions that can run. If the graph is too large for `concurrency` to follow it,
-        report only the first action of each actor."""
+        """Report each action that may run at the same time as later ones of its actor. `actors_of`:
+        the actors of each action by key; `runs`: the keys of the actions that can run. If the graph
+        is too large for `concurrency` to follow it, report only the first action of each actor."""
         place = {action.key: number for number, action in enumerate(subject.real)}
         members: dict[str, list[Key]] = {}
         for action in subject.real:
@@ -195,8 +195,9 @@ class _LedGraph:
                 )
 
     def _check_repeated(self, subject: Subject, actors_of: _ByKey, runs: Container[Key]) -> None:
-        """Report the actions that can run more than once, but no sub-graphs: an engine loads their
-        actions anew in any case."""
+        """Report the actions that can run more than once, since a robot that is led loads them anew
+        each time; but no sub-graphs, whose actions an engine loads anew in any case. `actors_of`:
+        the actors of each action by key."""
         graph = msgspec.structs.replace(subject.graph, relations=tuple(subject.sound))
         again = repeated(graph)
         for action in subject.real:
@@ -213,7 +214,9 @@ class _LedGraph:
             subject.report("loaded-anew", "warning", message, action=action)
 
     def _check_inside(self, subject: Subject, action: Action, actor: str, depth: int) -> None:
-        """Report the problems of a sub-graph of several actors at the action that stands for it."""
+        """Report the problems of a sub-graph of several actors at the action that stands for it.
+        `actor`: that of the action, for actions inside without one; `depth`: the number of graphs
+        around."""
         if (action.name, actor) not in self._found:
             inner = Subject(self._graphs.by_name[action.name], subject.facts)
             self.check(inner, actor, depth + 1)
@@ -246,7 +249,8 @@ class _LedGraph:
 
 
 def _report_shared(subject: Subject, action: Action, every: frozenset[str]) -> None:
-    """Report a sub-graph of several actors, which goes to no robot as one step of a led run."""
+    """Report that `action` stands for a sub-graph of several actors (`every`), which cannot be one
+    step of a conducted run."""
     whose = joined(set(every) - {""}) + ("; some name none" if "" in every else "")
     message = (
         f"{action.full_name} stands for a graph of several actors ({whose}). A runner that leads the "
@@ -257,7 +261,8 @@ def _report_shared(subject: Subject, action: Action, every: frozenset[str]) -> N
 
 
 def _answers(relation: Relation, reports: _Reports) -> set[str]:
-    """Return the responses that the outcomes of the parent can really cause."""
+    """Return the responses of an arrow that can really occur, given the outcomes that its parent
+    can report (`reports`, by key)."""
     reported = reports.get(relation.parent, set())
     return {relation.conditions.answer(outcome) for outcome in PRECONDITIONS if outcome in reported}
 
@@ -265,8 +270,9 @@ def _answers(relation: Relation, reports: _Reports) -> set[str]:
 def _check_values(
     subject: Subject, arrows: Iterable[Relation], actors_of: _ByKey, reports: _Reports
 ) -> None:
-    """Report each arrow whose values no robot shows, each that hands values to an action of another
-    actor, and once all those that hand them to one of the same actor."""
+    """Report each arrow whose values cannot be read from a robot, and each that hands values to an
+    action of another actor; those that hand values to an action of the same actor are reported as
+    one problem."""
     handed = tuple(value_arrows(subject.graph))
     outputs = {(each.parent, each.child): set(names) for each, names in handed}
     refused = {
@@ -308,7 +314,7 @@ def _check_values(
 
 
 def _check_pauses(subject: Subject, arrows: Iterable[Relation]) -> None:
-    """Report each arrow that pauses an action."""
+    """Report each arrow that pauses an action: a led robot can only begin and stop an action."""
     for relation in arrows:
         if "pause" in map(relation.conditions.answer, PRECONDITIONS):
             message = (
@@ -321,7 +327,8 @@ def _check_pauses(subject: Subject, arrows: Iterable[Relation]) -> None:
 
 
 def _check_spontaneous(subject: Subject, actors_of: _ByKey, runs: Container[Key]) -> None:
-    """Report spontaneous actions, with the actions of other actors to which arrows lead from them."""
+    """Report spontaneous actions, with the actions of other actors to which arrows lead from them.
+    `actors_of`: the actors of each action by key; `runs`: the keys of the actions that can run."""
     place = {action.key: number for number, action in enumerate(subject.real)}
     lively = [a for a in subject.real if a.type == "spontaneous"]
     after = reachable(
@@ -354,6 +361,7 @@ def _check_spontaneous(subject: Subject, actors_of: _ByKey, runs: Container[Key]
 
 
 def _with_actor(subject: Subject, key: Key, actors: Iterable[str]) -> str:
-    """Return the name of an action with whose it is, for a sentence."""
+    """Return the name of the action with this key together with its actors, as in a sentence:
+    "grip_0 of Carrier"."""
     whose = joined(set(actors) - {""})
     return f"{subject.name(key)} of {whose}" if whose else f"{subject.name(key)} without an actor"

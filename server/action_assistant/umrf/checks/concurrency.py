@@ -173,8 +173,7 @@ class Concurrency:
         return found
 
     def _behind(self, mask: Mask) -> Mask:
-        """Return, as a mask, the actions that paths of arrows reach from any action of the given
-        mask."""
+        """Return, as a mask, the actions that paths of arrows reach from any action in `mask`."""
         found = self._behind_kept.get(mask)
         if found is None:
             found = 0
@@ -244,8 +243,8 @@ class Concurrency:
         return own | self._when(key, outcome)
 
     def _join(self, child: Key) -> None:
-        """Follow the parents of an action again, since more actions may run beside this action than
-        was known when they were followed."""
+        """Follow the parents of the action `child` again, after it was found that more actions may
+        run beside it."""
         for relation in self._subject.incoming.get(child, []):
             for outcome in self._reports.get(relation.parent, ()):
                 run = relation.parent == ENTRY or relation.conditions.answer(outcome) == "run"
@@ -303,8 +302,8 @@ class Concurrency:
         )
 
     def _again(self, key: Key) -> None:
-        """Queue an action to be followed again, since more actions may run beside it than was
-        known."""
+        """Queue an action to be followed again, after it was found that more actions may run beside
+        it."""
         if key not in self._waiting and key in self._reports:
             self._waiting.add(key)
             self._open.append(key)

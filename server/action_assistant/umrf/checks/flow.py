@@ -31,7 +31,7 @@ from action_assistant.umrf.model import (
 
 
 def check_spontaneous(subject: Subject) -> None:
-    """Report spontaneous actions from which a loop can be reached (H9)."""
+    """Report in `subject` the spontaneous actions from which a loop can be reached (hazard H9)."""
     spontaneous = [action for action in subject.real if action.type == "spontaneous"]
     if not spontaneous:
         return
@@ -48,12 +48,10 @@ def check_spontaneous(subject: Subject) -> None:
 def check_instant_loops(
     subject: Subject, runs: Collection[Key], reports: Mapping[Key, Collection[Precondition]]
 ) -> None:
-    """Report each loop of actions, none of which is declared to take time (H5): if all its actions
-    end at once, the engine blocks itself and obeys no stop.
-
-    `runs`: keys of the actions that can run; a loop with any other action is not reported.
-    `reports`: the outcomes with which each action can end, by key.
-    """
+    """Report each loop of actions, none of which is declared to take time (hazard H5): if all its
+    actions end at once, the engine blocks itself and obeys no stop. `runs`: keys of the actions
+    that can run; a loop with any other action is not reported. `reports`: the outcomes with which
+    each action can end, by key."""
     if "H5" not in subject.facts.hazards:
         return
 
@@ -83,7 +81,8 @@ def _takes_time(action: Action) -> bool:
 
 
 def _leading_to(subject: Subject, keys: set[Key]) -> set[Key]:
-    """Return the given actions, and all actions from which a path of arrows leads to any of them."""
+    """Return the keys in `keys`, with those of all actions from which a path of arrows leads to any
+    of them."""
     found = set(keys)
     stack = list(keys)
     while stack:
@@ -97,8 +96,8 @@ def _leading_to(subject: Subject, keys: set[Key]) -> set[Key]:
 def loops(
     subject: Subject, follows: Callable[[Relation], bool] = lambda _: True
 ) -> list[list[Key]]:
-    """Return groups of actions that lie on loops: each group is one loop, or several loops that
-    share actions. Only arrows that `follows` accepts are followed."""
+    """Return the actions that lie on loops, in groups of keys: each group is one loop, or several
+    loops that share actions. Only arrows that `follows` accepts are followed."""
     number = {action.key: place for place, action in enumerate(subject.real)}
     ways = [
         [number[r.child] for r in subject.outgoing.get(key, []) if r.child in number and follows(r)]
@@ -119,14 +118,16 @@ class Flow(NamedTuple):
 
 
 def follow(subject: Subject) -> Flow:
-    """Follow a graph from its entry."""
+    """Return which actions of a graph can run, with which outcomes, and which at the same time, by
+    following its arrows from the entry."""
     reachability = Reachability(subject)
     return Flow(reachability, Concurrency(subject, reachability.runs, reachability.reports))
 
 
 def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> Flow | None:
-    """Report all problems of the graph's flow from entry to exit, and return the flow; None for a
-    graph without actions or without a way in. `nested`: names of actions that are sub-graphs."""
+    """Report all problems of the graph's flow from entry to exit in `subject`, and return the
+    result of `follow`; None for a graph without actions or without an arrow from the entry.
+    `nested`: names of actions that are sub-graphs."""
     _check_sides(subject)
     if not subject.real:
         subject.report(
@@ -173,8 +174,9 @@ def _check_sides(subject: Subject) -> None:
 
 
 def _check_bypasses(subject: Subject, reachability: "Reachability") -> None:
-    """Report arrows that can bypass their child (hazard H3): the child is passed over because of an
-    outcome that its parent can really have. All such arrows are reported as one problem."""
+    """Report arrows that can bypass their child (hazard H3): the child is skipped because of an
+    outcome that its parent can really have. All such arrows are reported as one problem. Nothing is
+    reported for engine builds without the hazard."""
     if "H3" not in subject.facts.hazards or subject.facts.bypass_fixed:
         return
     found: list[tuple[Relation, list[Precondition]]] = []
@@ -273,7 +275,8 @@ def _first(relations: list[Relation]) -> list[Relation]:
 
 
 def _check_waiting(subject: Subject, reachability: Reachability) -> None:
-    """Report actions that never run, with the reason."""
+    """Report actions that never run, with the reason: no arrow leads to them from the entry, or a
+    required parent never reports."""
     net: dict[Key, int] = {}
     for number, members in enumerate(loops(subject)):
         net.update(dict.fromkeys(members, number))
@@ -298,11 +301,8 @@ def _check_waiting(subject: Subject, reachability: Reachability) -> None:
 def _report_missed_join(
     subject: Subject, key: Key, missing: list[Relation], net: dict[Key, int]
 ) -> None:
-    """Report each relation of `missing`: its parent is required and never reports, so that the
-    action `key` never runs.
-
-    `net`: for each action on a loop, the number of its group of loops.
-    """
+    """Report each relation of `missing`, whose parent is required and never reports, so that the
+    action `key` never runs. `net`: for each action on a loop, the number of its group of loops."""
     action = subject.actions[key]
     for relation in missing:
         parent = subject.name(relation.parent)

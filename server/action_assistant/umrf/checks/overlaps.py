@@ -38,11 +38,9 @@ def check_responses(
     nested: Container[str] = frozenset(),
 ) -> None:
     """Report responses that may reach a child in a state in which the engine aborts or does nothing
-    (H4, H5).
-
-    `reports`: the outcomes that each action can report, by key. `nested`: names of actions that are
-    sub-graphs; a sub-graph runs without loading first.
-    """
+    (hazards H4, H5). `reports`: the outcomes that each action can report, by key; `concurrency`:
+    which actions can run at the same time. `nested`: names of actions that are sub-graphs; a
+    sub-graph runs without loading first."""
     killed: set[Key] = set()
     for key, relations in subject.incoming.items():
         if key == EXIT:
@@ -82,8 +80,9 @@ def check_responses(
 def _asking(
     relations: list[Relation], reports: _Reports
 ) -> dict[str, set[tuple[Key, Precondition]]]:
-    """Return, for each response, the parents that can ask the child for this response, each with
-    the outcome that makes it ask."""
+    """Return, for each response, the parents that can cause it by one of these relations to a
+    child, each with the outcome that does. `reports`: the outcomes that each action can report, by
+    key."""
     found: dict[str, set[tuple[Key, Precondition]]] = {}
     for relation in relations:
         reported = reports.get(relation.parent, ())
@@ -129,13 +128,11 @@ def check_loading(
     concurrency: Concurrency,
     nested: Container[str] = frozenset(),
 ) -> None:
-    """Report as one problem (H14) all ends of actions that halt the graph while another action may
-    still load.
-
-    `reports` and `nested` are as in `check_responses`. An end with on_error is reported only if it
-    starts an action and halts the graph by itself: otherwise every graph that ignores the errors of
-    one branch would get this problem, though an action would have to fail while another one loads.
-    """
+    """Report as one problem (hazard H14) all ends of actions that halt the graph while another
+    action may still load. The parameters are as in `check_responses`. An end with on_error is
+    reported only if it starts an action and halts the graph by itself: otherwise every graph that
+    ignores the errors of one branch would get this problem, though an action would have to fail
+    while another one loads."""
     if "H14" not in subject.facts.hazards:
         return
     runs_at_once = {action.key for action in subject.real if action.name in nested}
@@ -177,12 +174,10 @@ def check_loading(
 def _failing_starts(
     subject: Subject, reports: _Reports, runs_at_once: Container[Key]
 ) -> Iterator[tuple[Action, Key, set[Key]]]:
-    """Yield each action whose end with on_error starts other actions and bypasses one action after
-    which nothing follows.
-
-    With it come the key of the bypassed action and the keys of the started actions that wait for no
-    other parent.
-    """
+    """Yield each action whose end with on_error starts other actions and bypasses one action from
+    which no arrow goes on. With it come the key of the bypassed action and the keys of the started
+    actions that wait for no other parent. `runs_at_once`: actions that need no loading, which are
+    ignored."""
     for action in subject.real:
         if "on_error" not in reports.get(action.key, ()):
             continue
@@ -202,11 +197,10 @@ def _failing_starts(
 
 
 def check_endless(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
-    """Report as one problem (H12) all spontaneous actions that continue when the graph is FINISHED.
-
-    They begin again and again, and no stop reaches them. The problem is an error if this happens
-    even when all actions end with on_true, else a warning.
-    """
+    """Report as one problem (hazard H12) all spontaneous actions that continue when the graph is
+    FINISHED. They begin again and again, and no stop reaches them. The problem is an error if this
+    happens even when all actions end with on_true, else a warning. The parameters are as in
+    `check_responses`."""
     lively = {action.key for action in subject.real if action.type == "spontaneous"}
     if "H12" not in subject.facts.hazards or not lively:
         return
@@ -246,11 +240,8 @@ def _going_on(
     lively: Collection[Key],
     concurrency: Concurrency,
 ) -> set[Key]:
-    """Return the keys of spontaneous actions that may continue after the parent of this arrow has
-    reported this outcome and the arrow has led to the exit.
-
-    `lively`: the keys of all spontaneous actions.
-    """
+    """Return the keys of spontaneous actions that may continue after the parent of an arrow to the
+    exit (`relation`) has reported this outcome. `lively`: the keys of all spontaneous actions."""
     parent = relation.parent
     if relation.conditions.answer(outcome) == "ignore":
         return set()
@@ -298,8 +289,8 @@ class _EarlyExit(msgspec.Struct, frozen=True):
 
 
 def check_stragglers(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
-    """Report as one problem (H12) all arrows to the exit by which the graph is FINISHED while other
-    actions may still run."""
+    """Report as one problem (hazard H12) all arrows to the exit by which the graph is FINISHED
+    while other actions may still run. The parameters are as in `check_responses`."""
     if "H12" not in subject.facts.hazards:
         return
     incoming = [r for r in subject.incoming.get(EXIT, []) if not r.listing]
@@ -383,10 +374,8 @@ def _begun(subject: Subject, key: Key, outcome: Precondition) -> set[Key]:
 
 def _comes_after(subject: Subject, key: Key, others: list[Key]) -> bool:
     """Return whether at least one of the actions `others` cannot be reached from the entry except
-    through the action `key`.
-
-    The graph's exit waits for all of `others`, so it then comes after the action `key` as well.
-    """
+    through the action `key`. The graph's exit waits for all of `others`, so it is then reached only
+    after `key`."""
     if not others:
         return False
     seen, stack = {ENTRY}, [ENTRY]

@@ -92,12 +92,9 @@ class Subject:
         listed.append(relation)
 
     def fix_of_input(self, action: Action, name: str) -> str | None:
-        """Return `take-example`, the name of the fix that gives an input its declared example as
-        value; None if the input has no example, or one that does not fit its type and allowed
-        values.
-
-        `name` is the flat name of the input. The caller knows that the input has no value.
-        """
+        """Return `take-example`, the name of the fix that gives an input of the action its declared
+        example as value; None if the input has no example, or one that does not fit its type and
+        allowed values. `name` is the flat name of the input, which must not have a value."""
         if action.key not in self._texts:
             self._texts[action.key] = {p.path: p.text for p in action.inputs}
         text = self._texts[action.key].get(self.path_of(action, name), "null")
@@ -140,15 +137,12 @@ class Subject:
         also: Iterable[Relation | Action] = (),
         inside: PlaceInside | None = None,
     ) -> None:
-        """Add a problem that concerns an action, a relation, or, without either, the whole graph.
-
-        `member` is the JSON pointer of the faulty value below that action, relation or graph.
-        `side` is the list in which the relation is shown, since a file lists each relation twice.
-        `also`: other relations or actions with the same problem. `inside`: the place in the sub-graph for
-        which the action stands.
-
-        Only the first `MAX_EACH` problems of one code and severity are kept.
-        """
+        """Add a problem with this code and message that concerns an action, a relation, or, without
+        either, the whole graph. `member`: the JSON pointer of the faulty value below that action,
+        relation or graph. `fix`: the name of a fix that mends it. `side`: the list in which the
+        relation is shown, since a file lists each relation twice. `also`: other relations or
+        actions with the same problem. `inside`: the place in the sub-graph for which the action
+        stands. Only the first `MAX_EACH` problems of one code and severity are kept."""
         if not self._problems.has_room(severity, code):
             return
         about = action or relation
@@ -187,7 +181,7 @@ def joined(names: set[str]) -> str:
 
 
 def quoted(names: set[str]) -> str:
-    """Join names with commas, each in quotes, for a sentence about a problem at whose place these
+    """Join names with commas, each in quotes, for a sentence about a problem at whose place the
     names are written."""
     return ", ".join(f"“{name}”" for name in sorted(names))
 

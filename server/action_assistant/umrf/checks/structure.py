@@ -26,8 +26,8 @@ TYPES: Final = ("sync", "async", "spontaneous")
 
 
 def check_structure(subject: Subject) -> None:
-    """Report all problems of the structure: names, numbers, types, fields and relations that the
-    engine refuses or misreads."""
+    """Report in `subject` all problems of the structure: names, numbers, types, fields and
+    relations that the engine refuses or misreads."""
     graph = subject.graph
     for field, text in graph.extra:
         _check_known(subject, field, parse_small(text), f"/{field}", None)
@@ -47,7 +47,9 @@ def check_structure(subject: Subject) -> None:
 def _check_known(
     subject: Subject, field: str, value: Json, member: str, action: Action | None
 ) -> None:
-    """Report a known field whose value was kept in `extra` because it does not fit."""
+    """Report a field of the format whose value has the wrong type, so that it was stored among the
+    unknown fields (`extra`). `member`: its JSON pointer below the `action`, or below the graph if
+    that is None."""
     wanted = None
     if field in _TEXTS and not isinstance(value, str):
         wanted = "a text"
@@ -63,8 +65,8 @@ def _check_known(
 
 
 def _check_number(value: Json) -> tuple[str, Severity, str] | None:
-    """Return code, severity and message for an `instance_id` that is not valid; None for a valid
-    one."""
+    """Return code, severity and message of the problem of an `instance_id` (`value`) that is not
+    valid; None for a valid one."""
     if whole_of(value)[1]:
         return None
     if isinstance(value, Number):
@@ -203,7 +205,8 @@ def _check_parent_field(subject: Subject, relation: Relation, field: str, value:
 
 
 def _check_conditions(subject: Subject, relation: Relation, value: Json) -> None:
-    """Report each condition of a list that the engine refuses, at its own place in the list."""
+    """Report each condition in the list `value` of a relation that the engine refuses, at its own
+    place in the list; or that `value` is no list."""
     if not isinstance(value, list):
         message = "“conditions” must be a list of texts; the engine refuses the graph."
         subject.report(
@@ -266,8 +269,8 @@ def _check_parameters(
 
 
 def refusal_of(value: Json) -> str | None:
-    """Return the reason for which the engine's parser refuses one parameter, as the end of a
-    sentence; None if it takes it."""
+    """Return the reason for which the engine's parser refuses one parameter (`value`, as JSON
+    data), as the end of a sentence; None if it accepts it."""
     if not isinstance(value, dict):
         return "must be an object"
     if "pvf_type" not in value:

@@ -151,9 +151,9 @@ def check_subgraphs(
     known: Container[str] = frozenset(),
     resolution: Resolution = CERTAIN,
 ) -> SubGraphs:
-    """Report all problems of the sub-graphs, and return what was found. `graphs`: the indexed
-    graphs by name. `known`: names of actions, which take precedence over graphs of the same
-    name."""
+    """Report all problems of the sub-graphs in `subject`, and return the results for each of them.
+    `graphs`: the indexed graphs by name. `known`: names of actions, which take precedence over
+    graphs of the same name. `resolution`: how names were resolved to graphs."""
     if resolution.cut:
         message = (
             "There are more graphs inside this one than are examined. Deeper graphs were not checked, "
@@ -169,8 +169,8 @@ def check_subgraphs(
 
 
 def _check_each(subject: Subject, within: str, graphs: SubGraphs) -> None:
-    """Report how each sub-graph of one graph affects this graph. `within`: the name by which the
-    graph around uses it."""
+    """Report how each sub-graph of one graph (`subject`) affects this graph. `within`: the name by
+    which the graph around uses it. `graphs`: has the results of the checks of the sub-graphs."""
     for action in subject.real:
         graph = graphs.of(action.name)
         if graph is None:
@@ -199,7 +199,7 @@ def _check_each(subject: Subject, within: str, graphs: SubGraphs) -> None:
 
 
 def _report(subject: Subject, action: Action, graph: Graph, found: _Inner) -> None:
-    """Report the results of the check of a sub-graph at the action that stands for this sub-graph."""
+    """Report the results of the check of a sub-graph (`found`) at the action that stands for it."""
     own = slots_of(action.inputs), slots_of(action.outputs)
     check_signature(subject, action, found.signature, *own)
     for each in found.findings:
@@ -228,8 +228,9 @@ def _sentence(severity: Severity, place: PlaceInside) -> str:
 
 
 def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container[str]) -> None:
-    """Report sub-graphs that an engine has used already when it comes to them a second time. Each
-    engine (actor) resolves only its own actions."""
+    """Report sub-graphs that occur twice where the engine can use them only once. Each engine
+    (actor) resolves only its own actions. `known`: names of actions, which take precedence over
+    graphs."""
     reported: set[tuple[Key, str]] = set()
     for found in unresolved(subject.graph, graphs, known):
         place = (found.action.key, found.name)
@@ -246,8 +247,8 @@ def _check_again(subject: Subject, graphs: Mapping[str, Graph], known: Container
 
 
 def _inner(name: str, facts: EngineFacts, graphs: SubGraphs) -> _Inner:
-    """Check one sub-graph, and return the results. The graphs inside it must have been checked
-    before."""
+    """Check the sub-graph called `name`, and return the results. The graphs inside it must have
+    been checked before. `facts`: the engine build."""
     graph = graphs.by_name[name]
     inside = Subject(with_inputs(graph), facts)
     check_structure(inside)
@@ -267,10 +268,10 @@ def _stays(finding: _Finding) -> bool:
 
 
 def _findings(inside: Subject) -> tuple[_Finding, ...]:
-    """Return the findings about a sub-graph for the graph around it. With errors: the first
-    `_ERRORS` of them, those that nobody can override before others; the last one says how many are
-    left. Without errors: the first problem of each code that affects the graph around, with the
-    number of further problems of this code."""
+    """Return the problems of a sub-graph (`inside`) as findings for the graph around it. With
+    errors: the first `_ERRORS` of them, errors that no person can override first; the last one says
+    how many more there are. Without errors: the first problem of each code that affects the graph
+    around, with the number of further problems of this code."""
     problems = sorted(inside.problems, key=rank)
     errors = [each for each in problems if each.severity == "error"]
     errors.sort(key=lambda each: each.code not in FINAL)  # final errors are always among them
@@ -288,18 +289,16 @@ def _findings(inside: Subject) -> tuple[_Finding, ...]:
 
 
 def _finding(inside: Subject, problem: Problem, left: int = 0) -> _Finding:
-    """Return a problem of a sub-graph as a finding for the graph around.
-
-    `left`: how many further problems this finding stands for.
-    """
+    """Return a problem of a sub-graph (`inside`) as a finding for the graph around. `left`: how
+    many further problems this finding stands for."""
     place = place_inside(inside, problem)
     message = place.message + more(left, "problem", "problems")
     return _Finding(problem.severity, msgspec.structs.replace(place, message=message))
 
 
 def place_inside(inside: Subject, problem: Problem) -> PlaceInside:
-    """Return the place of a problem of a sub-graph. A problem from a deeper graph keeps its place
-    there."""
+    """Return the place of a problem of the sub-graph `inside`. A problem from a deeper graph keeps
+    its place there."""
     return problem.inside or PlaceInside(
         levels=(),
         aids=(),

@@ -138,10 +138,8 @@ _BLOCKED: Final = {"H2", "H6", "H7", "H8", "H9", "no-entry", "ghost"}
 
 
 def check_scenarios(subject: Subject) -> Coverage:
-    """Run all trials of a graph, report those that end stuck (H8), and return how much was tried.
-
-    The coverage is empty if another error keeps the graph from running.
-    """
+    """Try all courses of a graph, report in `subject` those that end stuck (hazard H8), and return
+    how many were tried. The result is empty if another error keeps the graph from running."""
     if not subject.real or any(
         p.code in _BLOCKED and p.severity == "error" for p in subject.problems
     ):
@@ -230,7 +228,7 @@ class _Waiting:
 
 def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
     """Report once each parent for which the exit waits for ever, and once the outputs that the exit
-    lacks. `found`: the trials in which the exit waits."""
+    lacks. `found`: the trials in which the exit waits; `net`: the graph as numbers."""
     mended = _mended(subject.graph, {name for trial in found for name in trial.end.lacking})
     is_mend = bool(found) and _never_stuck(mended)
     reported: set[str] = set()
@@ -260,11 +258,8 @@ def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
 
 def _may_fit(subject: Subject, last: str) -> bool:
     """Return whether an action can give an output other than its default that the exit accepts, so
-    that the error is not certain.
-
-    The outputs of the action whose outputs the exit takes count only if this action was the `last`
-    that ended.
-    """
+    that the error is not certain. `last`: the full name of the action that ended last; the outputs
+    of the action whose outputs the exit takes count only if it is that."""
     owner = exit_owner(subject.graph)
     limited = {
         name: slot.type
@@ -314,11 +309,9 @@ def _mended(graph: Graph, lacking: set[str]) -> Graph:
 
 
 def _never_stuck(mended: Graph) -> bool:
-    """Return whether all courses of the graph were tried, and each of them ends, and none while an
-    action still runs. Each course is tried with both orders in which concurrent actions can end.
-
-    `mended`: the graph after a fix. Return False if there are too many courses to try all.
-    """
+    """Return whether all courses of the graph were tried, and each of them ends, and no action
+    still runs then. Each course is tried with both orders in which concurrent actions can end.
+    `mended`: the graph after a fix. Return False if there are too many courses to try all."""
     for slower_first in (False, True):
         trials = Trials(mended, slower_first=slower_first)
         if any(trial.end.kind == "stuck" or trial.end.early for trial in trials):
@@ -329,8 +322,8 @@ def _never_stuck(mended: Graph) -> bool:
 
 
 def halted(subject: Subject) -> str | None:
-    """Return the first trial in which the graph ends HALTED, as words that end a sentence ("if …",
-    "in any case"); None if there is no such trial."""
+    """Return the first trial course in which the graph of `subject` ends HALTED, as words that end
+    a sentence ("if …", "in any case"); None if no course does."""
     for trial in Trials(subject.graph):
         if trial.end.kind == "halted":
             return f"if {trial.when[3:]}" if trial.action else "in any case"

@@ -15,9 +15,9 @@ def check_values(
     library: Mapping[str, Signature] | None,
     graphs: Container[str] = frozenset(),
 ) -> None:
-    """Report all problems of parameters and their values. `library`: the actions that the engine
-    has, by name, or None if unknown. `graphs`: names of sub-graphs, which need not be in the
-    library."""
+    """Report in `subject` all problems of parameters and their values. `library`: the actions that
+    the engine has, by name, or None if unknown. `graphs`: names of sub-graphs, which need not be in
+    the library."""
     inputs = {action.key: slots_of(action.inputs) for action in subject.real}
     outputs = {action.key: slots_of(action.outputs) for action in subject.real}
     for relation in subject.sound:
@@ -60,7 +60,9 @@ def _check_remap(
 
 
 def _check_order(subject: Subject, relation: Relation, own: _Slots, targets: _Slots) -> None:
-    """Report a renaming that changes the order in which the engine looks for outputs."""
+    """Report a renaming on an arrow (`relation`) that changes the order in which the engine
+    searches for outputs, so that it does not find some. `own`: the outputs of the parent;
+    `targets`: the inputs of the child."""
     parent, child = subject.name(relation.parent), subject.name(relation.child)
     meant = {name: name for name in own} | {r.source: r.target for r in relation.remap}
     try:
@@ -90,7 +92,9 @@ def _check_inputs(
     outputs: Mapping[Key, _Slots],
     library: Mapping[str, Signature] | None,
 ) -> None:
-    """Report required inputs for which there is no value."""
+    """Report required inputs of an action that have no value in the file and get none that fits by
+    an arrow. `inputs`, `outputs`: the parameters of all actions, by key; `library`: as in
+    `check_values`."""
     known = (library or {}).get(action.name)
     incoming = subject.incoming.get(action.key, [])
     needed = {
@@ -123,8 +127,8 @@ def _check_inputs(
 def _given_kinds(
     incoming: list[Relation], outputs: Mapping[Key, _Slots], needed: _Slots
 ) -> dict[str, set[str]]:
-    """Return, for each input that is not locked, the types of the outputs that parents hand over to
-    it."""
+    """Return, for each input in `needed` that is not locked, the types of the outputs that the
+    arrows `incoming` hand over to it. `outputs`: those of all actions, by key."""
     open_ = {name: slot for name, slot in needed.items() if slot.updatable}
     kinds: dict[str, set[str]] = {}
     for relation in incoming if open_ else []:
@@ -139,7 +143,7 @@ def _given_kinds(
 
 
 def check_static(subject: Subject) -> None:
-    """Report each value that is not among the allowed values of its parameter."""
+    """Report in `subject` each value that is not among the allowed values of its parameter."""
     for action in subject.real:
         _check_static(subject, action, slots_of(action.inputs))
 
@@ -173,8 +177,8 @@ def _check_known(
 def check_signature(
     subject: Subject, action: Action, known: Signature, inputs: _Slots, outputs: _Slots
 ) -> None:
-    """Report the parameters in which an action differs from `known`, the library action or
-    sub-graph that it stands for."""
+    """Report the parameters in which an action (with these `inputs` and `outputs`) differs from
+    `known`, the library action or sub-graph that it stands for."""
     for side, ours, theirs in (("input", inputs, known.inputs), ("output", outputs, known.outputs)):
         surplus, lacking = set(ours) - set(theirs), set(theirs) - set(ours)
         if surplus or lacking:

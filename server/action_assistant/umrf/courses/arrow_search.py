@@ -93,7 +93,8 @@ class _RecordingInstant(Instant):
         return False  # every edge is to be recorded, also one that is known to lead to the exit
 
     def after(self, before: _GraphState) -> _GraphState:
-        """Return the state that follows. Times are dropped, since any order of ends is searched."""
+        """Return the state of the graph after this instant; `before`: the state before it. Times
+        are dropped, since any order of ends is searched."""
         states = list(before.states)
         for index, state in self.states.items():
             states[index] = state._replace(due=0.0)
@@ -202,11 +203,9 @@ class _Search:
                     pass
 
     def _results_of(self, row: Sequence[EdgeQuestion | None]) -> list[Precondition]:
-        """Return the results of an action that can make a difference.
-
-        A failed action gives no outputs and may begin again, and a bypass passes the result itself
-        on.
-        """
+        """Return the results of an action that can make a difference, given its edges (`row`; None
+        for an edge at which the engine aborts). A failed action gives no outputs and may begin
+        again, and a bypass passes the result itself on."""
         if any(edge is None or "bypass" in edge.responses.values() for edge in row):
             return list(OUTCOMES)
         found: dict[tuple[object, ...], Precondition] = {}
@@ -217,7 +216,7 @@ class _Search:
         return list(found.values())
 
     def script(self, ends: Sequence[_End]) -> Script:
-        """Return the script under which actions end in this order with these results."""
+        """Return the script under which actions end in the order and with the results of `ends`."""
         visits: dict[int, list[_Visit]] = {}
         before = _first(self._net)
         for step, end in enumerate((None, *ends)):
@@ -288,7 +287,8 @@ def _way(
 
 
 def _distances(net: Network, to: int) -> list[int]:
-    """Return for each action the least number of arrows from this action to the action `to`."""
+    """Return for each action, by index, the least number of arrows from it to the action with the
+    index `to`; a large number if no path leads there."""
     above: dict[int, list[int]] = {}
     for index, row in enumerate(net.edges):
         for edge in row:

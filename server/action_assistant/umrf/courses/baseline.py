@@ -40,13 +40,11 @@ class Outcome(NamedTuple):
 
 
 class BaselineCourse:
-    """The course in which every action ends with on_true, with its history.
-
-    By number of the instant: `times` in ms, `roots` (the index of the action that ended; -1 for the
-    entry), `touched` (the actions whose state was set), and counts after the instant. By index of
-    the action: `instants`, at which it was asked or ended, and `states`, its state after each of
-    them.
-    """
+    """The course in which every action ends with on_true, with its history. An instant is a moment
+    at which an action ends. By number of the instant: `times` in ms, `roots` (the index of the
+    action that ended; -1 for the entry), `touched` (the actions whose state was set), and counts
+    after the instant. By index of the action: `instants`, at which it was asked or ended, and
+    `states`, its state after each of them."""
 
     def __init__(self, net: Network) -> None:
         self.net = net
@@ -75,14 +73,14 @@ class BaselineCourse:
         self.outcome = Outcome("never") if self._never_starts() else self._followed()
 
     def state(self, index: int, before: int) -> State:
-        """Return the state of an action just before the instant with the number `before`."""
+        """Return the state of the action `index` just before the instant with the number `before`."""
         own = self.instants[index]
         found = len(own) if before > (own[-1] if own else -1) else bisect_left(own, before)
         return self.states[index][found - 1] if found else self.initial[index]
 
     def first_end(self, index: int) -> int | None:
-        """Return the number of the instant at which an action first ends by itself; None if it does
-        not."""
+        """Return the number of the instant at which the action `index` first ends by itself; None
+        if it does not."""
         for instant in self.instants[index]:
             if self.roots[instant] == index:
                 return instant if self.state(index, instant).does == RUNS else None
@@ -154,8 +152,9 @@ class BaselineCourse:
         self.last.append(self._last)
 
     def _seen(self, at: float) -> tuple[object, ...]:
-        """Return a value by which two laps are compared: the action that ended last, and all
-        states, with times relative to their round."""
+        """Return a value that is equal for two situations from which the course goes on in the same
+        way: the action that ended last, and all states, with times relative to their round. `at`:
+        now, in ms."""
         start = at // self.net.round_ms * self.net.round_ms
         states = [
             state._replace(due=state.due - start) if state.does in DUE else state
@@ -167,11 +166,9 @@ class BaselineCourse:
 
 
 def stuck(net: Network, waiting: Mask, ended: State, last: int) -> Outcome:
-    """Return the outcome of a graph in which nothing runs any more although it has not ended.
-
-    `waiting`: the actions that wait, as a mask. `ended`: the state of the exit. `last`: the index
-    of the last action that asked the exit.
-    """
+    """Return the outcome of a graph in which no action runs any more although it has not ended.
+    `net`: the graph as numbers. `waiting`: the actions that wait, as a mask. `ended`: the state of
+    the exit. `last`: the index of the last action that asked the exit."""
     lacking = frozenset(
         name for bit, name in net.required[net.exit].items() if not ended.links & bit
     )

@@ -57,8 +57,8 @@ class ArrowCoverage(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def arrows_of(graph: Graph) -> Iterator[OutcomeArrow]:
-    """Yield one `OutcomeArrow` for each outcome of each arrow that its child does not ignore, in
-    file order and without repetition."""
+    """Yield one `OutcomeArrow` for each outcome of each arrow of a graph that its child does not
+    ignore, in file order and without repetition. Arrows at missing actions are skipped."""
     ends = {action.key for action in graph.actions if not action.missing} | {ENTRY, EXIT}
     found: dict[OutcomeArrow, None] = {}
     for relation in graph.relations:
@@ -75,7 +75,7 @@ def arrows_of(graph: Graph) -> Iterator[OutcomeArrow]:
 
 
 def outcomes_of(relation: Relation) -> list[Precondition]:
-    """Return the outcomes of an arrow's parent that its child does not ignore."""
+    """Return the outcomes of the parent of an arrow (`relation`) that its child does not ignore."""
     if relation.parent == ENTRY:
         return ["on_true"]  # the entry reports no other outcome, whatever the conditions say
     return [o for o in PRECONDITIONS if relation.conditions.answer(o) != "ignore"]
@@ -83,10 +83,7 @@ def outcomes_of(relation: Relation) -> list[Precondition]:
 
 def arrows_taken(graph: Graph, traces: Iterable[Trace]) -> TakenArrows:
     """Return the arrows of this graph that were taken and its actions that ran, according to the
-    trace events of one course or run.
-
-    Events of its sub-graphs are not counted.
-    """
+    trace events of one course or run (`traces`). Events of its sub-graphs are not counted."""
     keys = {a.full_name: a.key for a in graph.actions if not a.missing}
     ends = keys | {ENTRY_NODE: ENTRY, EXIT_NODE: EXIT}
     labels = {f"{p} => {c}": (ends[p], ends[c]) for p, c in _pairs(graph, ends)}
@@ -115,7 +112,7 @@ def _pairs(graph: Graph, ends: dict[str, Key]) -> Iterator[tuple[str, str]]:
 
 
 def coverage(graph: Graph, courses: Iterable[TakenArrows]) -> ArrowCoverage:
-    """Return the coverage of a graph by these courses together: an arrow or action counts if any of
+    """Return the coverage of a graph by `courses` together: an arrow or action counts if any of
     them took or ran it."""
     took: set[OutcomeArrow] = set()
     came: set[Key] = set()

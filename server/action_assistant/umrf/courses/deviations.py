@@ -48,7 +48,8 @@ class DeviatingCourses:
                 self._note_alone(number)
 
     def _note_alone(self, number: int) -> None:
-        """Note the baseline course as one that came to a situation with a single running action."""
+        """Store the outcome of the baseline course for its situations in which only one action
+        runs, to be reused by courses that come there. `number`: that of the instant."""
         course = self.course
         for index in course.touched[number]:
             if index == self.net.exit or course.state(index, number + 1).does != RUNS:
@@ -58,7 +59,7 @@ class DeviatingCourses:
 
     def outcome(self, index: int, result: Precondition) -> Outcome:
         """Return how the graph ends if the first run of the action at `index` ends with `result`.
-        Raises `SimultaneousEnds` if two actions end at the same moment."""
+        Raise `SimultaneousEnds` if two actions end at the same moment."""
         instant = self.course.first_end(index)
         if instant is None:
             return self.course.outcome
@@ -67,11 +68,8 @@ class DeviatingCourses:
 
 class _DeviatingCourse:
     """One course that differs from the baseline. `apart`: the states that differ, by index; `mask`:
-    their indices.
-
-    `dropped`: actions that were left out because nothing reaches them any more; `forgotten`: those
-    of them that wait.
-    """
+    their indices. `dropped`: actions that are not followed because no arrow reaches them any more;
+    `forgotten`: those of them that wait."""
 
     def __init__(self, all_: DeviatingCourses) -> None:
         self.all = all_
@@ -95,8 +93,9 @@ class _DeviatingCourse:
         self._since = 0  # instants since states were last dropped
 
     def followed(self, instant: int, result: Precondition) -> Outcome:
-        """Follow the course from the instant at which its action ends with `result`, and return how
-        the graph ends."""
+        """Follow the course from the instant with this number, at which its action ends with
+        `result`, and return how the graph ends. Raise SimultaneousEnds if two actions end at the
+        same moment."""
         found = self._at(self.course.times[instant], self.course.roots[instant], result)
         if instant < len(self.course.times) - 1:
             self._push(len(self.course.times) - 1)
@@ -123,8 +122,8 @@ class _DeviatingCourse:
         return self._remembered(found)
 
     def _is_lap(self, at: float, root: int) -> bool:
-        """Return whether the course has come to an earlier situation again after the end of the
-        baseline course."""
+        """Return whether the course, after the end of the baseline course, has come to an earlier
+        situation again. `at`: now, in ms; `root`: the index of the action that has ended."""
         self._steps += 1
         again = root == self._point[0] and self._differing(at) == self._point[1]
         if self._steps >= self._power:
@@ -191,7 +190,8 @@ class _DeviatingCourse:
         return None
 
     def _root(self, usually: int, root: int) -> int:
-        """Return the action that ends at a moment of the baseline course. Raises `SimultaneousEnds`
+        """Return the index of the action that ends at a moment of the baseline course. `usually`:
+        that of the baseline; `root`: the one that ends here, -1 for none. Raise `SimultaneousEnds`
         if two do."""
         if usually in self.apart:
             return root
@@ -204,7 +204,8 @@ class _DeviatingCourse:
         return own if own is not None else self.course.state(index, before)
 
     def _compare(self, index: int, state: State, after: int) -> None:
-        """Note whether the state of an action differs from the baseline course now."""
+        """Record if the new `state` of an action differs from that in the baseline course. `after`:
+        the number of the following instant."""
         usual = self.course.state(index, after)
         running, active = self._sums.pop(index, (0, 0))
         self._running -= running
@@ -230,8 +231,8 @@ class _DeviatingCourse:
             self._push(instants[following])
 
     def _await_halt(self, after: int) -> None:
-        """Queue the next instant of the baseline course that would halt the graph, if that fewer
-        actions run here."""
+        """If fewer actions run here than in the baseline, queue its next instant that would halt
+        the graph then. `after`: the first number that counts."""
         if self._running < 0:
             halting = self.course.halting.get(-self._running, ())
             following = bisect_left(halting, after)
@@ -246,7 +247,7 @@ class _DeviatingCourse:
 
     def _beyond(self) -> Outcome | None:
         """Continue after the end of the baseline course, or after the point up to which it was
-        followed."""
+        followed. Return the outcome if it is decided by that, else None."""
         course = self.course
         end = len(course.times)
         if course.outcome.kind == "endless":
@@ -265,8 +266,9 @@ class _DeviatingCourse:
     # Situations that are known
 
     def _forget(self, after: int) -> Outcome | None:
-        """Drop states that can make no difference any more. Return an outcome if none is left, or
-        if it is known."""
+        """Drop states that can make no difference any more. Return the outcome if no state is left
+        or if another course had the same situation, else None. `after`: the number of the following
+        instant of the baseline."""
         course = self.course
         lively: Mask = 0
         idle: list[int] = []
@@ -297,8 +299,8 @@ class _DeviatingCourse:
             self.forgotten |= 1 << index
 
     def _as_before(self, after: int) -> Outcome | None:
-        """Return the outcome of another course that came to the same situation; None if there was
-        none."""
+        """Return the outcome of another course that came to the same situation; None if no course
+        did. `after`: the number of the following instant of the baseline."""
         if self.course.active[after - 1] + self._active == 1:
             alone = [index for index, state in self.apart.items() if state.does == RUNS]
             if alone and self._is_fresh(alone[0], after):
@@ -315,7 +317,8 @@ class _DeviatingCourse:
         return None
 
     def _is_fresh(self, index: int, after: int) -> bool:
-        """Return whether everything reachable from a running action is as at the start."""
+        """Return whether all actions reachable from the running action `index` are as at the start.
+        `after`: the number of the following instant of the baseline."""
         behind = self.net.reachable[index]
         if self.course.came[after - 1] & behind & ~self.mask:
             return False
@@ -332,14 +335,15 @@ class _DeviatingCourse:
     # The end
 
     def _quiet(self, after: int) -> Outcome:
-        """Return the outcome when nothing is left to happen."""
+        """Return the outcome of a graph in which no event is left: it is stuck. `after`: the number
+        of the following instant of the baseline."""
         return stuck(
             self.net, self._waiting(after), self._state(self.net.exit, after), self._last()
         )
 
     def _came_alone(self, index: int, known: Outcome, after: int) -> Outcome:
-        """Return the known outcome of a single running action. Actions that it cannot reach stay as
-        they are."""
+        """Return the outcome of a situation in which only the action `index` runs, from the outcome
+        of an equal one (`known`). Actions that it cannot reach stay as they are."""
         behind = self.net.reachable[index]
         waiting = self._waiting(after) | known.waiting & behind
         if known.kind == "stuck" and not behind >> self.net.exit & 1:
@@ -347,13 +351,14 @@ class _DeviatingCourse:
         return self._joined(known, waiting)
 
     def _met_again(self, known: Outcome, dropped: Mask, after: int) -> Outcome:
-        """Return the known outcome of a situation. `dropped`: the actions that the earlier course
-        had left out of it, which may be as in the baseline course here."""
+        """Return the outcome of this situation from that of an earlier course that met it
+        (`known`). `dropped`: the actions that the earlier course did not follow, which may be as in
+        the baseline course here."""
         usual = self.course.waiting[after - 1] & dropped & ~(self.dropped | self.mask)
         return self._joined(known, self.forgotten | known.waiting & ~self.dropped | usual)
 
     def _joined(self, known: Outcome, waiting: Mask) -> Outcome:
-        """Return an outcome that is known from here on, with the actions that wait in the end."""
+        """Return the outcome `known` with `waiting` as the actions that wait in the end."""
         if known.kind != "stuck":
             return known
         last = known.last if known.last >= 0 else self._last()

@@ -32,7 +32,7 @@ class CourseCheck(msgspec.Struct, frozen=True):
 
     @property
     def why(self) -> str:
-        """The first difference in words; empty if there is none."""
+        """The first difference in words; "" without one."""
         if self.apart is None:
             return ""
         expected, found = step_text(self.apart.expected), step_text(self.apart.found)

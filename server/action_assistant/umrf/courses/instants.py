@@ -89,7 +89,7 @@ class Instant:
 
     def ends(self, index: int, result: Precondition) -> None:
         """End the action at this index. An action that runs ends with `result`; one that is being
-        stopped ends with on_stopped, and one that is given up with on_error."""
+        stopped ends with on_stopped, and one that did not stop in time with on_error."""
         state = self._state(index)
         match state.does:
             case 1:
@@ -168,7 +168,8 @@ class Instant:
                 self.end = "halted"
 
     def _ask(self, index: int, edge: EdgeQuestion, result: Precondition) -> bool:
-        """Ask one child for its response. Return whether it ignores the result."""
+        """Ask one child, over an edge of the action `index`, for its response to a result. Return
+        whether it ignores the result."""
         child, net = edge.child, self._net
         before = state = self._state(child)
         if edge.link & ~state.links:

@@ -94,8 +94,8 @@ class Network:
             self.edges.append(row)
 
     def due(self, index: int, now_ms: float) -> float:
-        """Return the time in ms at which an action ends that begins now: its own time within the
-        next round."""
+        """Return the time in ms at which the action `index` ends if it begins at `now_ms`: its own
+        time within the next round."""
         return (now_ms // self.round_ms + 1) * self.round_ms + self.late[index]
 
     @cached_property
@@ -185,10 +185,9 @@ def _asked(
     slots: Sequence[dict[str, Mask]],
 ) -> EdgeQuestion | None:
     """Return an edge in numbers; None if the engine aborts at this edge, since the child is missing
-    or does not list the parent.
-
-    `outputs`: the parent's outputs that have a value before its first run, and all of its outputs.
-    """
+    or does not list the parent. `outputs`: the parent's outputs that have a value before its first
+    run, and all of its outputs. `indices`: of the actions; `bits`, `slots`: by index of the action,
+    the bits of its required parents and of its inputs."""
     link = edge.child.links.get(parent.full_name) if edge.child is not None else None
     if edge.child is None or link is None:
         return None
@@ -209,7 +208,8 @@ def _asked(
 
 
 def _takes(target: Slot, source: Slot) -> bool:
-    """Return whether an input accepts the value that this output holds once its action has run."""
+    """Return whether the input `target` accepts the value that the output `source` holds once its
+    action has run."""
     filled = {source.name: _copy(source)}
     fill_outputs(filled, None)
     probe = _copy(target)

@@ -56,11 +56,9 @@ def simulated_outcome(
     net: Network, graph: Graph, full_name: str, result: str
 ) -> tuple[Outcome, int]:
     """Simulate a graph in which the first run of the action `full_name` ends with `result`, and
-    every other run with on_true. Return how the graph ends, and the number of trace events of
-    the simulation.
-
-    If `full_name` is empty, every run ends with on_true.
-    """
+    every other run with on_true. `net`: the graph as numbers, with its times. Return how the graph
+    ends, and the number of trace events of the simulation. If `full_name` is empty, every run ends
+    with on_true."""
     calls: dict[str, tuple[Behaviour, ...]] = {}
     if full_name:
         calls[full_name] = (Behaviour(result=result), Behaviour())
@@ -98,7 +96,7 @@ def simulated_outcome(
 
 
 def _going_on(net: Network, engine: Engine, name: str) -> Mask:
-    """Return the spontaneous actions that still run in a graph of this engine, as a mask."""
+    """Return, as a mask, the spontaneous actions that still run in the graph `name` of this engine."""
     return sum(
         1 << net.index[node.full_name]
         for node in engine.graphs[name].nodes.values()
@@ -117,8 +115,8 @@ class _TraceReader:
         self._asked = -1
 
     def take(self, traces: list[Trace]) -> Kind | None:
-        """Read the next trace events, and return how the graph ends if one of them tells; None
-        otherwise."""
+        """Read the next trace events, and return how the graph ends if one of them shows its end;
+        None otherwise."""
         kind: Kind | None = None
         for trace in traces:
             match trace:

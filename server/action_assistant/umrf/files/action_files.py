@@ -34,7 +34,7 @@ class FileReading(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """The remarks as sentences, in the order of their messages."""
+        """The remarks as sentences, in the order in which their messages first occurred."""
         return tuple(note.sentence for note in self.remarks)
 
     def placed(self, problems: Iterable[Problem]) -> list[Problem]:
@@ -50,11 +50,8 @@ class ActionReading(FileReading, frozen=True, kw_only=True):
 
 
 def read_action(text: str | bytes) -> ActionReading:
-    """Read a text that is known to be the file of one action (`codec.read` recognises it among
-    others).
-
-    Raises `Unreadable` for any other text, or one beyond the limits.
-    """
+    """Read a text that must be the file of one action (`codec.read` recognises it among others).
+    Raise `Unreadable` for any other text, or one beyond the limits."""
     text = decoded(text)
     value = parse(text)
     dialect = action_dialect(value) if isinstance(value, dict) else None

@@ -32,9 +32,8 @@ class Reading(FileReading, frozen=True, kw_only=True):
 
 
 def read(text: str | bytes) -> Reading:
-    """Read a graph. Raises `Unreadable` for a text that is no UMRF or beyond the limits.
-
-    Everything else is read, and reported if it is wrong.
+    """Read a UMRF graph from its text. Raise `Unreadable` for a text that is no UMRF or beyond the
+    limits. Everything else is read, and reported among the problems of the result if it is wrong.
     """
     text = decoded(text)
     value = parse(text)
@@ -69,8 +68,8 @@ def read(text: str | bytes) -> Reading:
 
 
 def _no_object(value: Json) -> str:
-    """Return the reason for which a text that is no object is not a graph, with what it holds
-    instead."""
+    """Return the sentence why a text that is no JSON object is not a graph, with what `value`, the
+    data in it, is instead."""
     items = [item for item in value if isinstance(item, dict)] if isinstance(value, list) else []
     dialects = [found for found in map(dialect_of, items) if found is not None]
     if not dialects:
@@ -88,8 +87,8 @@ def _no_object(value: Json) -> str:
 
 
 def _carried_states(tree: Tree) -> list[Problem]:
-    """Return a problem H1 for each run state: an engine that is given one takes the action for
-    loaded."""
+    """Return a problem (hazard H1) for each run state in a file: an engine that gets a state takes
+    the action for loaded."""
     return [
         Problem(
             code="H1",

@@ -75,11 +75,8 @@ def _is_action(file: dict[str, Json]) -> bool:
 
 
 def action_dialect(file: dict[str, Json]) -> str | None:
-    """Return the dialect of a file that is known to be that of an action, as the engine sees it:
-    with a name and a type.
-
-    None for a graph, and for a file without members of an action.
-    """
+    """Return the dialect of a file that is expected to describe one action, as the engine sees it:
+    with a name and a type. None for a graph, and for a file without members of an action."""
     if any(mark in file for mark in _MARKS):
         return None
     members = file.keys() & {"name", "type", "effect", "suffix", "package_name", *_PARAMETERS}
@@ -97,10 +94,8 @@ def _is_d2(action: dict[str, Json]) -> bool:
 
 def translated(file: dict[str, Json], dialect: str) -> Translation:
     """Translate a UMRF file of this dialect into D3, the dialect of current graphs. The result also
-    has notes on what was translated, and the problems for which the engine refuses the original.
-
-    A file that is in D3 already is returned unchanged.
-    """
+    has remarks on what was translated, and the problems for which the engine refuses the original.
+    A file that is in D3 already is returned unchanged."""
     match dialect:
         case "D3-designer":
             old = _from_designer(file)
@@ -155,7 +150,8 @@ def _add_attributes(file: dict[str, Json], ours: dict[str, Json]) -> None:
 
 
 def renumber(old: OldFile) -> None:
-    """Give each action whose `instance_id` no relation can refer to the lowest free one."""
+    """Change the file in place: each action whose `instance_id` no relation can refer to gets the
+    lowest free one."""
     file = old.file
     actions = file.get("actions")
     if not isinstance(actions, list):

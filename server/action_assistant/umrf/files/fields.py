@@ -16,7 +16,8 @@ Extra: TypeAlias = list[tuple[str, str]]
 
 
 def text_of(item: dict[str, Json], field: str, extra: Extra, default: str = "") -> str:
-    """Return a text; any other value goes to `extra`."""
+    """Return the text in a field of a file's object, or `default` without one. Any other value is
+    added to `extra`, the list of values that do not fit."""
     value = item.get(field, default)
     if isinstance(value, str):
         return value
@@ -25,7 +26,8 @@ def text_of(item: dict[str, Json], field: str, extra: Extra, default: str = "") 
 
 
 def number_of(item: dict[str, Json], extra: Extra) -> int:
-    """Return the `instance_id`; a value that is not valid also goes to `extra`."""
+    """Return the `instance_id` of an action in a file; a value that is not valid is also added to
+    `extra`, the list of values that do not fit."""
     value = item.get("instance_id", ZERO)
     number, fits = whole_of(value)
     if not fits:
@@ -34,7 +36,8 @@ def number_of(item: dict[str, Json], extra: Extra) -> int:
 
 
 def parameters_of(item: dict[str, Json], field: str, extra: Extra) -> tuple[Parameter, ...]:
-    """Return the parameters of one side; a value that is no object goes to `extra`."""
+    """Return the parameters in a field of a file's object (inputs or outputs); a value that is no
+    object is added to `extra`, the list of values that do not fit."""
     value = item.get(field, {})
     if isinstance(value, dict):
         return flatten(value)
@@ -43,7 +46,7 @@ def parameters_of(item: dict[str, Json], field: str, extra: Extra) -> tuple[Para
 
 
 def is_runtime(value: Json) -> bool:
-    """Return whether the engine can read a run log."""
+    """Return whether the engine can read a run log in a file: an object with a list of messages."""
     messages = value.get("messages") if isinstance(value, dict) else None
     return isinstance(messages, list) and all(
         isinstance(message, dict)
@@ -54,7 +57,8 @@ def is_runtime(value: Json) -> bool:
 
 
 def graph_attributes(file: dict[str, Json]) -> tuple[dict[str, Json], str | None]:
-    """Return our part of a graph's `gui_attributes`, and the text of the rest."""
+    """Return this program's part of a graph's `gui_attributes`, and the JSON text of the other
+    members, None if there are none."""
     if "gui_attributes" not in file:
         return {}, None
     value = file["gui_attributes"]
@@ -70,7 +74,7 @@ def action_attributes(
 ) -> tuple[Position | None, str | None, str | None]:
     """Return the position and the identity (aid) in an action's `gui_attributes`, and the remainder
     of the attributes as JSON text. Each is None if it is missing or invalid; an invalid position
-    stays in the text."""
+    stays in the remainder."""
     if "gui_attributes" not in item:
         return None, None, None
     value = item["gui_attributes"]
@@ -96,7 +100,7 @@ def direction_of(value: Json) -> Direction:
 
 
 def position_of(value: Json) -> Position | None:
-    """Return a position on the canvas; None if the value is none."""
+    """Return a position on the canvas from JSON data; None for a value that is no position."""
     if not isinstance(value, dict):
         return None
     x, y = value.get("x"), value.get("y")

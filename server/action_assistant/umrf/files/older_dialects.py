@@ -32,11 +32,9 @@ _STOPS: Final = (
 
 
 class OldFile:
-    """One file under translation. Parsed values are never changed; copies are.
-
-    `origins` lead from the translated file to the given one (`origins.Origins`); notes and problems
-    name places of the given one.
-    """
+    """One file of an older dialect under translation. Parsed values are never changed, only copies.
+    `origins` lead from the translated file to the original one (`origins.Origins`); notes and
+    problems name places of the original one."""
 
     def __init__(self, file: dict[str, Json]) -> None:
         self.file = dict(file)
@@ -45,12 +43,13 @@ class OldFile:
         self.origins: dict[str, str] = {}
 
     def at(self, path: str, member: str = "") -> str:
-        """Return the place in the given file of the value at `path` in the translated one, or of
-        its former `member`."""
+        """Return the place (JSON pointer), in the original file, of the value at `path` in the
+        translated one, or of its former `member`."""
         return origin(self.origins, path) + (pointer(member) if member else "")
 
     def note(self, text: str, path: str) -> None:
-        """Note that a value at a place of the given file was translated."""
+        """Add the remark `text` that the value at `path`, a JSON pointer in the original file, was
+        translated."""
         self.notes.add(text, path)
 
     def renamed(self, path: str, was: str, now: str) -> None:
@@ -58,15 +57,16 @@ class OldFile:
         self.origins[path + pointer(now)] = self.at(path, was)
 
     def refuse(self, path: str, message: str, code: str = "dialect-old") -> None:
-        """Report the reason for which the current engine refuses the file, or runs another
-        graph."""
+        """Add a problem at `path` (JSON pointer in the original file): the current engine refuses
+        the file, or for other codes than `dialect-old`, runs another graph."""
         where = Where(path=path)
         severity: Severity = "error" if code == "dialect-old" else "warning"
         self.problems.append(Problem(code=code, severity=severity, where=where, message=message))
 
 
 def from_umrf_actions(file: dict[str, Json], shallow: bool) -> OldFile:
-    """Translate D1 and D1': `umrf_actions` without entry and exit."""
+    """Translate a file of the dialects D1 and D1': `umrf_actions` without entry and exit.
+    `shallow`: it is D1'."""
     old = OldFile(file)
     actions = old.file.pop("umrf_actions")
     old.file["actions"] = actions
@@ -80,8 +80,8 @@ def from_umrf_actions(file: dict[str, Json], shallow: bool) -> OldFile:
 
 
 def from_actions(file: dict[str, Json]) -> OldFile:
-    """Translate D2: `actions` with `condition`, numbers as states, and perhaps no entry and
-    exit."""
+    """Translate a file of the dialect D2: `actions` with `condition`, numbers as states, and
+    perhaps no entry and exit."""
     old = OldFile(file)
     old.refuse(
         "", "The file has the form of an engine of 2023; the current one refuses or misreads it."
@@ -91,10 +91,8 @@ def from_actions(file: dict[str, Json]) -> OldFile:
 
 
 def from_action(file: dict[str, Json]) -> OldFile:
-    """Translate D0, and a current action file: the action becomes a graph of its own.
-
-    The neighbours that it names are left out, since they are in other files.
-    """
+    """Translate a file of one action (D0, or current): the action becomes a graph of its own. The
+    neighbours that it names are dropped, since they are in other files."""
     name = file.get("name")
     graph: dict[str, Json] = {"graph_name": name if isinstance(name, str) else ""}
     graph["actions"] = [{key: value for key, value in file.items() if key not in RELATIONS}]
@@ -123,7 +121,8 @@ def _translate(old: OldFile, shallow: bool) -> None:
 
 
 def _actions(old: OldFile, shallow: bool) -> set[int]:
-    """Translate the actions, and return the indices of those that are marked to be first."""
+    """Translate the actions of the file in place, and return the indices of those that are marked
+    to be first. `shallow`: the dialect is D1' or D0."""
     actions = old.file.get("actions")
     first: set[int] = set()
     if not isinstance(actions, list):
@@ -184,7 +183,8 @@ def _type(old: OldFile, item: dict[str, Json], path: str, shallow: bool) -> None
 
 
 def _number(old: OldFile, item: dict[str, Json], path: str) -> None:
-    """Rename `id` or `suffix`, the former names of `instance_id`."""
+    """Rename `id` or `suffix`, the former names of `instance_id`, in an action (`item`) at the JSON
+    pointer `path`."""
     if "instance_id" in item:
         return
     for field in ("id", "suffix"):
@@ -231,11 +231,9 @@ def _relation(old: OldFile, relation: Json, path: str, side: str) -> Json:
 
 
 def _stop(old: OldFile, relation: dict[str, Json], path: str) -> None:
-    """Translate a parent whose end stopped the child.
-
-    The older engine never counted it among the parents for which the child waits, so a required one
-    kept the child from ever running.
-    """
+    """Translate an item of `parents` (at the JSON pointer `path`) whose end stopped the child. The
+    older engine never counted it among the parents for which the child waits, so that a required
+    one prevented the child from ever running."""
     relation["conditions"] = list[Json](_STOPS)
     old.renamed(path, "stop_when_received", "conditions")
     place = old.at(path, "stop_when_received")
@@ -290,8 +288,8 @@ def _is_flag(value: Json) -> bool:
 
 
 def _ends(old: OldFile, actions: list[Json], first: set[int]) -> None:
-    """Derive the ends: actions without parents, or marked to be first, are the entry, and actions
-    without children the exit."""
+    """Add entry and exit to the file, if it has neither: actions without parents, or marked to be
+    first (`first`: their indices), are the entry, and actions without children the exit."""
     if "graph_entry" in old.file or "graph_exit" in old.file:
         return
     listed = [(i, item) for i, item in enumerate(actions) if isinstance(item, dict)]
@@ -350,7 +348,7 @@ def _name(item: dict[str, Json]) -> tuple[str, str]:
 
 
 def items_of(file: dict[str, Json], field: str) -> Iterator[dict[str, Json]]:
-    """Yield the objects in one of a file's lists."""
+    """Yield the objects in the list in a field of a file; none if it is no list."""
     value = file.get(field)
     for item in value if isinstance(value, list) else []:
         if isinstance(item, dict):

@@ -35,12 +35,13 @@ def origin(origins: Origins, path: str) -> str:
 
 
 def placed(problems: Iterable[Problem], text: str, steps: Steps = ()) -> list[Problem]:
-    """Return the problems with their places in the given text, to which `steps` lead."""
+    """Return the problems with lines and columns in `text`, the original. `steps` lead from the
+    problems' pointers to those in the original."""
     return located(text, [moved(problem, steps) for problem in problems])[0]
 
 
 def moved(item: Located, steps: Steps) -> Located:
-    """Return a problem or note with pointers into the given text, to which `steps` lead."""
+    """Return a problem or remark with pointers into the original text, to which `steps` lead."""
 
     def lead(where: Where) -> Where:
         path = where.path
@@ -55,11 +56,9 @@ def moved(item: Located, steps: Steps) -> Located:
 def located(
     text: str, problems: Sequence[Problem], notes: Sequence[Note] = ()
 ) -> tuple[list[Problem], tuple[Note, ...]]:
-    """Return problems and notes whose pointers are into this text with lines and columns.
-
-    A value that is missing has the place of the value in which it would be. Without a text they
-    stay as they are.
-    """
+    """Return problems and remarks whose pointers are into this text with lines and columns. A value
+    that is missing has the place of the value in which it would be. With the text "" they stay as
+    they are."""
     every = [where for problem in problems for where in (problem.where, *problem.also)]
     every += [where for note in notes for where in (note.where, *note.also)]
     if not text or not every:

@@ -73,8 +73,8 @@ class Tree(msgspec.Struct, frozen=True):
 
 
 def read_tree(file: dict[str, Json]) -> Tree:
-    """Read the graph of a D3 file. Never fails: values that do not fit are kept in `extra` or
-    reported."""
+    """Read the graph of a D3 file. No file makes it fail: values that do not fit are stored in
+    `extra` of the graph or reported as problems."""
     return _Reader().read(file)
 
 
@@ -117,9 +117,9 @@ class _Reader:
     # The graph
 
     def read(self, file: dict[str, Json]) -> Tree:
-        """Read the file, and return its graph, the problems in it, the states of the graph and its
-        actions, and notes about the file. Never fails: a value that does not fit is kept or
-        reported."""
+        """Read the file, and return its graph, the problems in it, the run states of the graph and
+        its actions, and remarks. No file makes it fail: a value that does not fit is stored in
+        `extra` or reported."""
         extra: Extra = []
         if "graph_name" not in file:
             self.report("graph-name-missing", "", "The graph has no name; the engine refuses it.")
@@ -156,8 +156,9 @@ class _Reader:
         )
 
     def _state(self, item: dict[str, Json], field: str, path: str) -> str | None:
-        """Return a run state, or None if it says nothing. The engine refuses a file with a wrong
-        state."""
+        """Return the run state in this field of a graph or action, or None if it is missing,
+        UNINITIALIZED or wrong. A wrong state is reported: the engine refuses the file. `path`: the
+        JSON pointer of the item."""
         if field not in item:
             return None
         value = item[field]
@@ -188,7 +189,8 @@ class _Reader:
         return self.origins.get(path, path)
 
     def _came_from(self, canonical: str, path: str) -> None:
-        """Record that a value of the canonical text is at another place in the file."""
+        """Record that the value at the pointer `canonical` of the canonical text is at `path` in
+        the file, if that differs."""
         if canonical != path:
             self.origins[canonical] = path
 
@@ -270,8 +272,9 @@ class _Reader:
     def _items(
         self, owner: int, items: list[Json], path: str, place: str, kind: _Kind
     ) -> list[_Item]:
-        """Read a list of relations. `path`: its pointer in the file; `place`: its pointer in the
-        canonical text."""
+        """Read a list of relations. `owner`: the index of the action that has it, negative for an
+        end of the graph; `path`: its pointer in the file; `place`: its pointer in the canonical
+        text; `kind`: reads one side of a relation."""
         found: list[_Item] = []
         for index, item in enumerate(items):
             if not isinstance(item, dict) or not isinstance(item.get("name"), str):
@@ -327,7 +330,8 @@ class _Reader:
         return relations
 
     def _who_lists(self, sides: list[list[_Item]]) -> dict[tuple[_Name, _Name], int]:
-        """Return for (name, name listed) the first action of that name that lists it."""
+        """Return, for each pair of an action's name and a name that it lists, the index of the
+        first action of that name that lists it."""
         found: dict[tuple[_Name, _Name], int] = {}
         for item in chain.from_iterable(sides):
             owner = self.actions[item.owner]
@@ -386,11 +390,9 @@ class _Reader:
         return relations
 
     def _find(self, item: _Item, back: dict[tuple[_Name, _Name], int]) -> int:
-        """Return the index of the action that an item names: of twins the one that lists the owner
-        back, else the first.
-
-        If there is none, a ghost is added.
-        """
+        """Return the index of the action that an item names: of several with this name, the one
+        that also lists the owner (`back`: as `_who_lists` returns), else the first. If no action
+        has the name, a missing one (ghost) is added."""
         name = item.name, item.instance_id
         found = self.by_name.get(name)
         if found is None:

@@ -34,7 +34,7 @@ def waypoints_json(graph: Graph) -> list[Json]:
 
 def with_waypoints(graph: Graph, items: Json) -> Graph:
     """Return the graph with the waypoints of its arrows, as its file lists them in `items`.
-    Waypoints that fit no relation are left out, and so is everything if `items` is no list."""
+    Waypoints that fit no relation are dropped; if `items` is no list, all of them."""
     if not isinstance(items, list):
         return graph
     by_name: dict[_Name, dict[str, JsonText]] = defaultdict(dict)
@@ -65,7 +65,8 @@ def _name_in(item: dict[str, Json]) -> _Name:
 
 
 def _named(graph: Graph) -> Iterable[tuple[_Name, Relation]]:
-    """Yield relations with the names of their ends, in the order of the actions."""
+    """Yield the relations of a graph, each with the names of its ends and its number among those
+    between them, in the order of the actions."""
     names = {ENTRY: ENTRY, EXIT: EXIT} | {a.key: a.full_name for a in graph.actions}
     order = {key: place for place, key in enumerate(names)}
     known = [r for r in graph.relations if r.parent in names and r.child in names]

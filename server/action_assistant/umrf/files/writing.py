@@ -30,17 +30,18 @@ class Stamp(msgspec.Struct, frozen=True):
 
 
 def write(graph: Graph, stamp: Stamp | None = None) -> str:
-    """Return the canonical file of a graph. Never fails, whatever the graph says."""
+    """Return the canonical text of a graph's file; every graph can be written. `stamp`: ids of
+    graph, version and run to write into it, None for none."""
     return dump_indented(tree_of(graph, stamp)) + "\n"
 
 
 def tree_of(graph: Graph, stamp: Stamp | None = None) -> dict[str, Json]:
-    """Return the canonical file as nested values."""
+    """Return the canonical file of a graph as nested JSON values. `stamp`: as in `write`."""
     return _Writer(graph, stamp).graph()
 
 
 def name_order(relation: Relation) -> tuple[str, int]:
-    """Return the sort key of relations with equal order."""
+    """Return the sort key of relations that have the same order number: their keys."""
     return f"{relation.parent}>{relation.child}", relation.listing
 
 
@@ -60,7 +61,7 @@ class _Writer:
                 self.children.setdefault(relation.parent, []).append(relation)
 
     def _exists(self, key: Key) -> bool:
-        """Return whether a file can name this end of a relation."""
+        """Return whether a file can name this end of a relation: the action exists."""
         return key in self.actions
 
     def graph(self) -> dict[str, Json]:
@@ -145,8 +146,8 @@ def _point(position: Position) -> dict[str, Json]:
 def _with_extra(
     fields: dict[str, Json], extra: Iterable[tuple[str, str]], attributes: dict[str, Json]
 ) -> dict[str, Json]:
-    """Add the fields that the model does not know, which take precedence, and our part of
-    `gui_attributes`."""
+    """Add the unknown fields in `extra` (name, JSON text), which take precedence, and this
+    program's part of `gui_attributes` (`attributes`), and return the fields."""
     for field, text in extra:
         fields[field] = parse_small(text)
     if attributes:
@@ -174,5 +175,5 @@ def graph_file_name(graph: str, number: int = 1) -> str:
 
 
 def unmarked(name: str) -> str:
-    """Return the name without the marks that an engine looks for."""
+    """Return a file name without the part (`.json`) by which an engine recognises files to read."""
     return name.replace(".json", "_json")

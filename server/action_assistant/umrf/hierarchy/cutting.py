@@ -54,30 +54,30 @@ class Selection(NamedTuple):
     leading: Mapping[Key, Sequence[Relation]]
 
     def at(self, key: Key) -> tuple[HierarchyLevel, ...]:
-        """Return the place of a chosen action for a reason."""
+        """Return the path of levels to the chosen action `key`, for a FlatteningReason."""
         return (HierarchyLevel(self.graph.name, key, self.chosen[key].full_name),)
 
     def named(self, key: Key) -> str:
-        """Return the name of an action or of an end of the graph for a message."""
+        """Return the words for an action, or for an end of the graph ("the entry"), in a message."""
         if key in (ENTRY, EXIT):
             return f"the {key}"
         return next((a.full_name for a in self.graph.actions if a.key == key), key)
 
     def answers(self, key: Key, outcome: Precondition) -> dict[Key, Response]:
-        """Return the responses of actions outside to this outcome of a chosen action, without those
-        that ignore it."""
+        """Return the responses of actions outside to this outcome of the chosen action `key`, by
+        key; those that ignore it are missing."""
         ways = (r for r in self.leading.get(key, ()) if r.child not in self.chosen)
         found = ((r.child, r.conditions.answer(outcome)) for r in ways)
         return {child: answer for child, answer in found if answer != "ignore"}
 
     def goes_on(self, key: Key, outcome: Precondition) -> bool:
-        """Return whether another chosen action responds to this outcome."""
+        """Return whether another chosen action responds to this outcome of the action `key`."""
         ways = (r for r in self.leading.get(key, ()) if r.child in self.chosen)
         return any(r.conditions.answer(outcome) != "ignore" for r in ways)
 
 
 def selection_of(graph: Graph, chosen: Collection[Key]) -> Selection:
-    """Return the selection of these actions in a graph."""
+    """Return the selection of the actions with the keys `chosen` in a graph."""
     actions = {action.key: action for action in graph.actions if action.key in chosen}
     inside, ordered = actions.keys(), in_order(graph.relations, by_parent=False)
     into = tuple(r for r in ordered if r.child in inside and r.parent not in inside)
@@ -96,8 +96,8 @@ def selection_of(graph: Graph, chosen: Collection[Key]) -> Selection:
 
 
 def between(selection: Selection) -> Iterator[FlatteningReason]:
-    """Yield a reason for each action that lies on a path from chosen actions to chosen actions and
-    is not chosen."""
+    """Yield a reason for each action that is not chosen and lies on a path of arrows from chosen
+    actions to chosen actions."""
     ahead, back = dict[Key, list[Key]](), dict[Key, list[Key]]()
     for relation in selection.graph.relations:
         ahead.setdefault(relation.parent, []).append(relation.child)
@@ -123,10 +123,8 @@ def _reached(selection: Selection, ways: Mapping[Key, Sequence[Key]]) -> set[Key
 
 
 def ways_in_differ(selection: Selection) -> Iterator[FlatteningReason]:
-    """Yield the reasons for which the entries cannot be entries of one sub-graph.
-
-    The same actions have to lead to each of them, with the same conditions.
-    """
+    """Yield the reasons for which the entries of the selection cannot be entries of one sub-graph.
+    The same actions have to lead to each of them, with the same conditions."""
     if not selection.entries:
         message = "Each of these actions follows another of them, so none would begin."
         yield FlatteningReason("ways-in", message)
@@ -151,8 +149,8 @@ def ways_in_differ(selection: Selection) -> Iterator[FlatteningReason]:
 
 
 def _answers_into(selection: Selection, key: Key) -> dict[Key, tuple[Conditions | None, bool]]:
-    """Return the conditions of each arrow from outside to a chosen action, and whether it is
-    required, by parent."""
+    """Return, by the action it comes from, the conditions of each arrow from outside to the chosen
+    action `key`, and whether it is required; (None, True) for the entry."""
     ways = (r for r in selection.into if r.child == key)
     return {
         r.parent: (None, True) if r.parent == ENTRY else (r.conditions, r.required) for r in ways
@@ -160,8 +158,8 @@ def _answers_into(selection: Selection, key: Key) -> dict[Key, tuple[Conditions 
 
 
 def ways_out_differ(selection: Selection) -> Iterator[FlatteningReason]:
-    """Yield the reasons for which several ends cannot be ends of one sub-graph: actions outside see
-    its outcome only, not which action ended."""
+    """Yield the reasons for which several ends of the selection cannot be ends of one sub-graph:
+    actions outside see only its outcome, not which action ended."""
     differing: dict[tuple[Key, Key], list[Precondition]] = {}
     for outcome in PRECONDITIONS:
         known: tuple[Key, dict[Key, Response]] | None = None
@@ -197,11 +195,8 @@ def answers_of(selection: Selection, child: Key) -> Conditions:
 
 def ends_within(selection: Selection, *, closing: bool, gives: bool) -> dict[Key, Conditions]:
     """Return the chosen actions that end the sub-graph, with the conditions of their arrows to its
-    exit.
-
-    `closing`: an outcome that no action responds to also ends the sub-graph; otherwise it would
-    stay HALTED, which nobody would notice. `gives`: the exit waits for values.
-    """
+    exit. `closing`: an outcome to which no action responds also ends the sub-graph; otherwise it
+    would stay HALTED without a notice. `gives`: the exit waits for values."""
     free = [o for o in OUTCOMES if not any(selection.answers(key, o) for key in selection.chosen)]
     found: dict[Key, Conditions] = {}
     for key in selection.chosen:
@@ -237,8 +232,9 @@ class CutGraphs(NamedTuple):
 def cut(
     selection: Selection, name: str, key: Key, plan: CutPlan
 ) -> CutGraphs | tuple[FlatteningReason, ...]:
-    """Return the two graphs, or the reasons for which values cannot pass between them. `key`: the
-    key of the new action."""
+    """Return the graphs that the cut of a selection makes, or the reasons for which values cannot
+    pass between them. `name`: of the new graph; `key`: of the action that stands for it; `plan`:
+    the way to cut."""
     given = _given(selection)
     inner = _inner(selection, name, plan, given)
     action = replace(
@@ -260,11 +256,9 @@ def cut(
 
 
 def _given(selection: Selection) -> dict[tuple[Key, str], Parameter]:
-    """Return inputs of entry actions that have a value and can get another one from outside.
-
-    They belong to the action that stands for the sub-graph, since a value that is handed to it does
-    not reach an inner input that has a value.
-    """
+    """Return the inputs of entry actions that have a value and can get another one from outside, by
+    key and path. They must be inputs of the action that stands for the sub-graph, since a value
+    that is handed to it does not reach an inner input that has a value."""
     found: dict[tuple[Key, str], Parameter] = {}
     for relation in selection.into:
         inputs = slots_of(selection.chosen[relation.child].inputs)
@@ -325,8 +319,9 @@ def _entries(selection: Selection) -> Iterator[Relation]:
 
 
 def _exits(selection: Selection, plan: CutPlan, *, gives: bool) -> Iterator[Relation]:
-    """Yield the arrows to the exit. Actions that give values to actions outside come last, since
-    the graph gets their outputs."""
+    """Yield the arrows to the exit of the new graph. Actions that give values to actions outside
+    come last, since the graph gets their outputs. `plan`: the way to cut; `gives`: the exit waits
+    for values."""
     ends = ends_within(selection, closing=plan.closing, gives=gives)
     handing = {r.parent for r in selection.out if _gives(selection, r)}
     leading = {r.parent for r in selection.out}
@@ -362,7 +357,8 @@ def _open(parameter: Parameter) -> Parameter:
 
 
 def _labels(graph: Graph) -> Iterator[tuple[str, str]]:
-    """Yield the labels of the graph, which the new graph gets, too."""
+    """Yield the field of the file with the labels of the graph, by which people group it, if it has
+    any: the new graph gets the same."""
     attributes = parse_small(dict(graph.extra).get("gui_attributes", "null"))
     if isinstance(attributes, dict) and "labels" in attributes:
         yield "gui_attributes", dump({"labels": attributes["labels"]})
@@ -385,8 +381,8 @@ def _with_values(
 
 
 def middle_of(places: Iterator[Position | None]) -> Position | None:
-    """Return the middle of the smallest rectangle that holds all positions. Positions that are None
-    do not count; return None if all of them are."""
+    """Return the middle of the smallest rectangle around all positions. A position that is None
+    does not count; return None if none is left."""
     known = [place for place in places if place is not None]
     if not known:
         return None
@@ -397,7 +393,8 @@ def middle_of(places: Iterator[Position | None]) -> Position | None:
 def _into(
     selection: Selection, action: Action, against: list[FlatteningReason]
 ) -> Iterator[Relation]:
-    """Yield, for each action outside, one arrow that replaces its arrows to all entries."""
+    """Yield, for each action outside that leads to the selection, one arrow to `action` that
+    replaces its arrows to all entries. Reasons against it are added to `against`."""
     by_parent: dict[Key, list[Relation]] = {}
     for relation in selection.into:
         by_parent.setdefault(relation.parent, []).append(relation)
@@ -426,7 +423,8 @@ def _into(
 def _out(
     selection: Selection, action: Action, against: list[FlatteningReason]
 ) -> Iterator[Relation]:
-    """Yield, for each action outside, one arrow that replaces the arrows from all ends to it."""
+    """Yield, for each action outside to which the selection leads, one arrow from `action` that
+    replaces the arrows from all ends to it. Reasons against it are added to `against`."""
     by_child: dict[Key, list[Relation]] = {}
     for relation in selection.out:
         by_child.setdefault(relation.child, []).append(relation)
@@ -450,8 +448,9 @@ def _out(
 def _out_remap(
     selection: Selection, way: Relation, action: Action, against: list[FlatteningReason]
 ) -> tuple[Remap, ...]:
-    """Return the renamings of an arrow that goes out. Names stay, but the outputs are those of the
-    new graph."""
+    """Return the renamings of an arrow (`way`) that goes out, now that it begins at `action`, whose
+    outputs are those of the new graph. If there are none, add the reason to `against` and return
+    ()."""
     child = next(a for a in selection.graph.actions if a.key == way.child)
     outputs = names_of(action.outputs)
     try:

@@ -106,11 +106,9 @@ def _parameter(parameter: Parameter) -> tuple[str, object]:
 
 
 def _arrows(graph: Graph) -> dict[tuple[Key, Key], _ArrowMeaning]:
-    """Return the effects of arrows by parent and child.
-
-    An arrow that is not required and has no response has no effect; whether a child waits for its
-    only parent makes no difference.
-    """
+    """Return the effects of arrows by parent and child. An arrow that is not required and ignores
+    every outcome has no effect and is missing; whether a child waits for its only parent makes no
+    difference."""
     relations = [r for r in graph.relations if not _is_idle(r)]
     parents = Counter(r.child for r in relations)
     by_key = {action.key: action for action in graph.actions}
@@ -228,7 +226,7 @@ def _unfit(graph: Graph, chosen: Collection[Key]) -> Iterator[FlatteningReason]:
 
 
 def _plans(selection: Selection) -> Iterator[CutPlan]:
-    """Yield ways to cut, the most promising first."""
+    """Yield ways to cut the selection out, the most promising first."""
     waiting: dict[Key, int] = {}
     for relation in selection.out:
         waiting[relation.child] = waiting.get(relation.child, 0) + relation.required
@@ -241,7 +239,9 @@ def _plans(selection: Selection) -> Iterator[CutPlan]:
 def _differences(
     graph: Graph, found: CutGraphs, budget: int | None
 ) -> tuple[FlatteningReason, ...]:
-    """Return the ways in which both new graphs may behave differently from the old graph."""
+    """Return the ways in which the two new graphs (`found`) together may behave differently from
+    the old graph; () if none are possible. `budget`: the most states that are examined, None for
+    the default."""
     flat = flattened(found.outer, {found.inner.name: found.inner}, budget=budget)
     if not isinstance(flat, Flattened):
         return flat.reasons
@@ -337,7 +337,7 @@ def _prevents_unpacking(graph: Graph, action: Action, inside: Graph) -> Iterator
 
 
 def _unused(*graphs: Graph) -> str:
-    """Return a name that no action has."""
+    """Return a name that no action in these graphs has."""
     taken = "\n".join(action.name for graph in graphs for action in graph.actions)
     name = "Unpacked"
     while name in taken:

@@ -100,8 +100,8 @@ def _is_choosy(parent: Action, relation: Relation, child: Action) -> bool:
 
 
 def inputs_of(graph: Graph) -> frozenset[str]:
-    """Return the inputs of a graph as a sub-graph: those of its entry actions that have no
-    value."""
+    """Return the flat names of the inputs that a graph has as a sub-graph: the inputs of its entry
+    actions that have no value."""
     actions = {action.key: action for action in graph.actions}
     entries, _ = ends_of(graph)
     return frozenset(
@@ -114,8 +114,8 @@ def inputs_of(graph: Graph) -> frozenset[str]:
 
 
 def courses_graph(graph: Graph, given: Collection[str]) -> Graph:
-    """Return the graph as if its entry actions had the given values, without renamings on the way
-    to them."""
+    """Return the graph as if its entry actions had values for the inputs `given` (flat names),
+    without renamings on the arrows to them."""
     taken: dict[str, set[str]] = {}
     inputs = {action.key: slots_of(action.inputs) for action in graph.actions}
     for entry in ends_of(graph)[0]:
@@ -197,12 +197,9 @@ def flattened(
     budget: int | None = None,
 ) -> Flattening:
     """Return one graph without sub-graphs that runs the same actions in the same order with the
-    same values, and ends alike.
-
-    `graphs`: the graphs that the engine has indexed, by name. `known`: names of actions, which take
-    precedence over graphs of the same name. `budget`: the most states that are examined,
-    `BUDGET` without one.
-    """
+    same values, and ends in the same way; or the reasons why no such graph was found. `graphs`: the
+    graphs that the engine has indexed, by name. `known`: names of actions, which take precedence
+    over graphs of the same name. `budget`: the most states that are examined, None for `BUDGET`."""
     hierarchy = _Hierarchy(graphs, known, BUDGET if budget is None else budget)
     if not any(hierarchy.is_sub(action) for action in graph.actions):
         return Flattened(graph, tuple(_plain(graph)))
@@ -216,7 +213,7 @@ def flattened(
 
 
 def _unflattenable(reasons: Iterable[FlatteningReason]) -> Unflattenable:
-    """Return these reasons, each once."""
+    """Return the result for these reasons, each once."""
     return Unflattenable(tuple(dict.fromkeys(reasons)))
 
 
@@ -247,7 +244,8 @@ class _Hierarchy:
         self._found: dict[str, _Found] = {}
 
     def is_sub(self, action: Action) -> bool:
-        """Return whether an action has the name of an indexed graph, and not of a known action."""
+        """Return whether an action stands for a graph: it has the name of an indexed graph, and not
+        that of a library action (`known`)."""
         return not action.missing and action.name in self.graphs and action.name not in self.known
 
     def actions_of(self, graph: Graph) -> int:
@@ -298,7 +296,8 @@ class _Hierarchy:
         return self._together(graph, flats, seen, given, reasons)
 
     def _sub(self, action: Action, above: tuple[str, ...]) -> _Found:
-        """Flatten the sub-graph for which an action stands."""
+        """Flatten the sub-graph for which an action stands. `above`: the names of the graphs around
+        it."""
         graph = self.graphs[action.name]
         if graph.name in above or action.name in above:
             return _refused("recursion", "The sub-graph contains itself, or the graph it is in.")
@@ -323,8 +322,9 @@ class _Hierarchy:
         given: frozenset[str],
         reasons: list[FlatteningReason],
     ) -> _Found:
-        """Replace each action that stands for a sub-graph by the flat sub-graph, unless there is a
-        reason against it."""
+        """Replace each action that stands for a sub-graph by its flat graph (`flats`, by key),
+        unless there is a reason against it; these are in the result. `seen`: a summary of the
+        graph's courses; `given`: flat names of inputs that get values from outside."""
         kept = {a.full_name for a in graph.actions if a.key not in flats}
         flat = _Flat(graph, dict(_origins(graph, flats)), seen.results, _unknown(graph, flats))
         for key, inner in flats.items():
@@ -348,7 +348,8 @@ def _refused(code: FlatteningCode, message: str) -> _Found:
 
 
 def _troubles(graph: Graph, seen: LevelCourses, *, is_top: bool) -> Iterator[FlatteningReason]:
-    """Yield the troubles of a graph's courses that the flat graph would not have, as reasons."""
+    """Yield, as reasons, the troubles of a graph's courses (`seen`) that the flat graph would not
+    have. `is_top`: it is no sub-graph, so that some troubles do not matter."""
     names = {action.key: action.full_name for action in graph.actions}
     for trouble in seen.troubles:
         if is_top and trouble.kind in OF_INNER:
@@ -376,8 +377,8 @@ def _origins(graph: Graph, subs: Container[Key]) -> Iterator[tuple[Key, LevelPat
 
 
 def _unknown(graph: Graph, flats: Mapping[Key, _Flat]) -> tuple[LeftOut, ...]:
-    """Return the descriptions and unknown fields of the actions that were sub-graphs, and of those
-    graphs."""
+    """Return the descriptions and unknown fields, which a flat graph cannot have, of the actions
+    that were sub-graphs (`flats`, by key) and of these graphs."""
     found = []
     for action in graph.actions:
         if (flat := flats.get(action.key)) is not None:
@@ -395,7 +396,8 @@ def _plain(graph: Graph) -> Iterator[FlatOrigin]:
 
 
 def _named(flat: _Flat) -> Flattened:
-    """Give each action that comes from a sub-graph a key of twelve characters."""
+    """Return the flat graph with a key of twelve characters for each action that comes from a
+    sub-graph."""
     keys: dict[Key, Key] = {key: key for key, levels in flat.origins.items() if len(levels) == 1}
     for key, levels in flat.origins.items():
         if key not in keys:

@@ -72,7 +72,8 @@ class Drawing:
         return self._inner(place) if place is not None and self._at is not None else None
 
     def outer(self, position: Position | None) -> Position | None:
-        """Return the position of something around the sub-graph."""
+        """Return the position of a thing around the sub-graph, moved outwards to make room; None
+        for None."""
         if position is None or self._at is None:
             return position
         x, y = (
@@ -90,20 +91,20 @@ class Drawing:
         return x, y
 
     def inner_note(self, text: JsonText) -> JsonText:
-        """Return a note or frame of the sub-graph at its new position."""
+        """Return a note or frame of the sub-graph (JSON text) at its new position."""
         return _noted(text, self._shifted_inner)
 
     def outer_note(self, text: JsonText) -> JsonText:
-        """Return a note or frame around the sub-graph at its new position."""
+        """Return a note or frame around the sub-graph (JSON text) at its new position."""
         return _noted(text, self._shifted_outer)
 
     def inner_ways(self, ways: _Ways) -> _Ways:
-        """Return the waypoints of an arrow of the sub-graph at their new positions."""
+        """Return the waypoints (bends) of an arrow of the sub-graph at their new positions."""
         return tuple((each, _each_point(text, self._shifted_inner)) for each, text in ways)
 
     def outer_ways(self, ways: _Ways) -> _Ways:
-        """Return the waypoints of an arrow that lies outside of the sub-graph, moved outwards to
-        make room for the actions of the sub-graph."""
+        """Return the waypoints (bends) of an arrow that lies outside of the sub-graph, moved
+        outwards to make room for the actions of the sub-graph."""
         return tuple((each, _each_point(text, self._shifted_outer)) for each, text in ways)
 
     def _shifted_inner(self, point: Json) -> Json:
@@ -117,8 +118,8 @@ class Drawing:
 
 
 def _drawn(graph: Graph, *, right: bool) -> dict[Key, Position]:
-    """Return the positions of a graph's actions. If one has none, all are put in rows by their
-    distance from the entry."""
+    """Return the positions of a graph's actions. If any has none, all are put in rows by their
+    distance from the entry. `right`: the rows follow each other to the right, else downwards."""
     drawn = {a.key: a.position for a in graph.actions if a.position is not None}
     if len(drawn) == len(graph.actions):
         return drawn
@@ -138,7 +139,8 @@ def _drawn(graph: Graph, *, right: bool) -> dict[Key, Position]:
 
 
 def _box(places: Sequence[Position]) -> tuple[Position, Position]:
-    """Return the middle of these positions, and half of the width and height that they cover."""
+    """Return the middle of the positions, and half of the width and height that they cover; zeros
+    without positions."""
     if not places:
         return (0.0, 0.0), (0.0, 0.0)
     xs, ys = [x for x, _ in places], [y for _, y in places]
@@ -197,12 +199,10 @@ def inlined(
     kept: set[str],
     room: Room = "always",
 ) -> Inlined:
-    """Return the graph `around` with the actions of `inside` in place of the action `own`.
-
-    `kept`: full names that no moved action may get. `room`: move the actions of `around` away
-    always, or only if something would overlap. Actions of `inside` that name no actor get that of
-    `own`, which performed them.
-    """
+    """Return the graph `around` with the actions of `inside` in place of the action `own`. `found`:
+    the arrows that join it; `kept`: full names that no moved action may get. `room`: move the
+    actions of `around` away always, or only if something would overlap. Actions of `inside` that
+    name no actor get that of `own`, which performed them."""
     action = next(a for a in around.actions if a.key == own)
     taken = {a.key for a in around.actions}
     keys = {a.key: _fresh(taken, f"{own}/{a.key}") for a in inside.actions}
@@ -245,7 +245,8 @@ def under_keys(graph: Graph, keys: Mapping[Key, Key]) -> Graph:
 
 
 def identity(parts: Iterable[str], taken: Iterable[str]) -> str:
-    """Return twelve letters and digits that depend only on these texts and are not `taken`."""
+    """Return an id of twelve hexadecimal digits that depends only on the texts `parts` and is not
+    in `taken`."""
     used, text = set(taken), "\x1f".join(parts)
     while (found := sha256(text.encode()).hexdigest()[:12]) in used:
         text += "\x1f"
@@ -259,7 +260,8 @@ def _fresh(taken: set[Key], key: Key) -> Key:
 
 
 def _free(action: Action, kept: set[str]) -> int:
-    """Return the number of an action if its full name is free, else the lowest free number."""
+    """Return the number of an action if its full name is not in `kept`, else the lowest free
+    number; add the resulting full name to `kept`."""
     number = action.instance_id
     if action.full_name in kept:
         number = 0
@@ -320,8 +322,9 @@ def _instead(arrow: JoinedArrow, order: Callable[[Relation], _Order]) -> _Order:
 
 
 def _ranked(arrows: Iterable[_Arrow]) -> Iterator[Relation]:
-    """Yield the relations with new order numbers 0, 1, 2 …: among the relations of their parent in
-    the order of `by_parent`, among those of their child in the order of `by_child`."""
+    """Yield the relations of these arrows with new order numbers 0, 1, 2 …: among all relations of
+    their parent in the order of `by_parent`, and among all of their child in the order of
+    `by_child`."""
     listed = list(arrows)
     by_parent: dict[Key, list[_Arrow]] = {}
     by_child: dict[Key, list[_Arrow]] = {}

@@ -24,7 +24,7 @@ from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_
 
 
 class JoinRefused(Exception):
-    """Raised when no arrow does the same as one of the sub-graph's action."""
+    """Raised when no arrow in a flat graph does the same as one of the sub-graph's action."""
 
     def __init__(self, code: FlatteningCode, message: str) -> None:
         super().__init__(message)
@@ -33,7 +33,7 @@ class JoinRefused(Exception):
 
 
 def refuse(code: FlatteningCode, message: str) -> None:
-    """Raise `JoinRefused`: a flat graph would not do the same."""
+    """Raise `JoinRefused` with this code and message: a flat graph would not do the same."""
     raise JoinRefused(code, message)
 
 
@@ -79,7 +79,7 @@ def in_order(relations: Collection[Relation], *, by_parent: bool) -> list[Relati
 
 
 def ends_of(graph: Graph) -> tuple[list[Relation], list[Relation]]:
-    """Return the relations at the entry and at the exit, in order."""
+    """Return the relations of a graph at the entry, and those at the exit, in order."""
     entries = [r for r in graph.relations if r.parent == ENTRY]
     exits = [r for r in graph.relations if r.child == EXIT]
     return in_order(entries, by_parent=True), in_order(exits, by_parent=False)
@@ -91,12 +91,10 @@ def renaming(
     wanted: Mapping[str, str],
     usual: tuple[Remap, ...],
 ) -> tuple[Remap, ...]:
-    """Return renamings by which exactly these inputs get exactly the wanted outputs. Raise
-    `JoinRefused` if there are none.
-
-    The engine renames inside a sorted tree, so each candidate is tried (docs/umrf-and-the-engine.md
-    2.7).
-    """
+    """Return renamings by which exactly the inputs in `wanted` get exactly the outputs that it
+    names for them. `usual`: renamings to try first. Raise `JoinRefused` if no renamings do. The
+    engine renames inside a sorted tree, so each candidate is tried (docs/umrf-and-the-engine.md
+    2.7)."""
     least = tuple(Remap(source, name) for name, source in sorted(wanted.items()) if source != name)
     for remap in ((), usual, least):
         sources = {each.source for each in remap}
@@ -111,8 +109,8 @@ def renaming(
 def renamed_or_refused(
     outputs: Collection[str], remap: tuple[Remap, ...], inputs: Collection[str]
 ) -> dict[str, str]:
-    """Return the output that reaches each input (`values.renamed`). Raises `JoinRefused` for an
-    unknown output."""
+    """Return, by input, the output that reaches it through the renamings `remap`
+    (`values.renamed`). Raise `JoinRefused` for an unknown output."""
     try:
         return renamed(outputs, remap, inputs)
     except RemapUnknown as unknown:
@@ -136,8 +134,8 @@ def merged_extra(
 
 
 def leads_to(graph: Graph, start: Key, goal: Key) -> bool:
-    """Return whether a path of arrows leads from one action to another; to itself only by a
-    loop."""
+    """Return whether a path of arrows leads from the action `start` to the action `goal`; to itself
+    only by a loop."""
     children: dict[Key, list[Key]] = {}
     for relation in graph.relations:
         children.setdefault(relation.parent, []).append(relation.child)

@@ -47,8 +47,8 @@ _TO_EXIT: Final = frozenset({"run", "stop", "pause", "restart", "ignore"})
 
 
 def ways_out(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[JoinedArrow]:
-    """Yield the arrows from the ends of a sub-graph that replace the `relations` of its action.
-    Raise `JoinRefused` if a flat graph cannot do the same."""
+    """Yield the arrows from the ends of a sub-graph (`place`) that replace the arrows `relations`
+    of its action. Raise `JoinRefused` if a flat graph cannot do the same."""
     _, exits = ends_of(place.inside)
     kind = _kind(exits)
     _check_outputs(place, exits, kind, relations)
@@ -86,8 +86,10 @@ def _kind(exits: Sequence[Relation]) -> str:
 
 
 def _required(relation: Relation, exits: Sequence[Relation], kind: str, *, is_only: bool) -> bool:
-    """Return whether the child of a sub-graph waits for each of the actions that replace it. Raise
-    `JoinRefused` if a flat graph cannot express that."""
+    """Return whether an action after a sub-graph waits for each of the actions that end it.
+    `relation`: the arrow to that action; `exits`, `kind`: the arrows to the sub-graph's exit and
+    their kind (`_kind`); `is_only`: no other arrow leads to it. Raise `JoinRefused` if a flat graph
+    cannot express that."""
     answers = {relation.conditions.answer(end) for end in OUTCOMES}
     if kind == "any":
         if relation.required and not is_only:
@@ -148,8 +150,9 @@ def _check_outputs(
 
 
 def _check_end(inside: Graph, end: Relation, following: Sequence[Relation]) -> None:
-    """Refuse an end that is part of a loop, or that can come without the values of the exit (by a
-    bypass or an error) if a following action takes values. Raise `JoinRefused` then."""
+    """Raise `JoinRefused` if the action that ends a sub-graph (`end`: its arrow to the exit) is
+    part of a loop, or can end it without the values of the exit (by a bypass or an error) while a
+    following action takes values. `following`: the arrows after the sub-graph."""
     conditions = end.conditions
     empty: list[Precondition] = [o for o in OUTCOMES[:2] if conditions.answer(o) == "bypass"]
     empty += ["on_error"] if conditions.on_error not in ("bypass", "ignore") else []
@@ -185,7 +188,8 @@ _Part = TypeVar("_Part")
 
 
 def joined(place: SubGraphPlace) -> JoinedPlace | tuple[JoinRefused, ...]:
-    """Return the arrows into and out of a sub-graph's actions, or every reason against them."""
+    """Return the arrows into and out of a sub-graph's actions that replace those of its action, or
+    all reasons against them."""
     relations = place.around.relations
     own = place.action.key
     if any(r.parent == own == r.child for r in relations):
@@ -217,7 +221,8 @@ def _got(parts: Iterator[_Part], against: list[JoinRefused]) -> Iterator[_Part]:
 
 
 def _lets_through(inside: Graph, outcome: Precondition) -> bool:
-    """Return whether a bypass of the entry passes through to the exit by bypasses alone."""
+    """Return whether a bypass of the sub-graph with this outcome passes from its entry to its exit
+    by bypasses alone."""
     entries, exits = ends_of(inside)
     if len(entries) != 1 or (len(exits) > 1 and any(r.required for r in exits)):
         return False
@@ -265,8 +270,9 @@ def _into(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[Joine
 
 
 def _entry_actions(place: SubGraphPlace) -> Iterator[tuple[Key, Action]]:
-    """Yield the entry actions of the sub-graph, with the values that the file gives to its action.
-    Raise `JoinRefused` if an entry action would begin at another time or with other values."""
+    """Yield the entry actions of the sub-graph by key, with the values that the action which stands
+    for it has in the file. Raise `JoinRefused` if an entry action would begin at another time or
+    with other values."""
     actions = {action.key: action for action in place.inside.actions}
     own = slots_of(place.action.inputs)
     texts = {flat_name(p.path): p for p in place.action.inputs}
@@ -300,7 +306,8 @@ def _entry_actions(place: SubGraphPlace) -> Iterator[tuple[Key, Action]]:
 
 
 def _check_same(outer: Slot, inner: Slot, action: Action) -> None:
-    """Refuse two connected inputs that do not take the same values. Raise `JoinRefused` then."""
+    """Raise `JoinRefused` unless an input of the sub-graph's action (`outer`) and the input of the
+    entry action (`action`) that it reaches (`inner`) take the same values."""
     place = f"“{outer.name}” and “{inner.name}” of {action.full_name}"
     if inner.has_value():
         refuse("inputs", f"{place}: both have a value in their files.")

@@ -129,11 +129,9 @@ class _LevelInstant(Instant):
         self.crossing = self.crossing or len(self._tasks) > 1
 
     def after(self, before: _LevelState) -> _LevelState:
-        """Return the state that follows.
-
-        Times are dropped, since any order of ends is followed, and so are states of actions that no
-        running action can reach any more.
-        """
+        """Return the state of the graph after this instant; `before`: the state before it. Times
+        are dropped, since any order of ends is followed, and so are states of actions that no
+        running action can reach any more."""
         states = list(before.states)
         for index, state in self.states.items():
             states[index] = state._replace(due=0.0, waiting=False)
@@ -153,11 +151,9 @@ def level_courses(
     *,
     is_top: bool = False,
 ) -> LevelCourses:
-    """Follow all courses of a graph in which the actions of `inside` are sub-graphs with these
-    results.
-
-    `is_top`: the results of the graph itself need not be known.
-    """
+    """Follow all courses of a graph in which the actions with the keys of `inside` are sub-graphs
+    that can end with these results. `budget`: the most states of single actions that are examined;
+    `is_top`: it is no sub-graph, so that its own results do not matter."""
     search = _Courses(graph, inside, is_top=is_top)
     search.run(budget)
     return LevelCourses(
@@ -191,11 +187,9 @@ class _Courses:
     def _results_of(
         self, index: int, results: frozenset[Precondition], *, is_top: bool
     ) -> list[Precondition]:
-        """Return the results of an action that can make a difference.
-
-        A failed action gives no outputs and may begin again, and a bypass or an inner exit passes
-        the result itself on.
-        """
+        """Return those of the results of the action `index` that can make a difference. A failed
+        action gives no outputs and may begin again, and a bypass or an inner exit passes the result
+        itself on. `is_top`: the graph is no sub-graph."""
         edges = [edge for edge in self.net.edges[index] if edge is not None]
         ending = any(edge.child == self.net.exit for edge in edges) and not is_top
         if ending or any("bypass" in edge.responses.values() for edge in edges):
@@ -210,7 +204,7 @@ class _Courses:
 
     def run(self, budget: int) -> None:
         """Follow all courses from the start of the graph, and collect their results and troubles.
-        If more than `budget` states of single actions would be examined, note the trouble
+        If more than `budget` states of single actions would be examined, add the trouble
         `undecided` and end."""
         net = self.net
         first = _LevelState(tuple(State(has=has) for has in net.has), 0, 0, 0)
@@ -243,7 +237,9 @@ class _Courses:
     def _after(
         self, instant: _LevelInstant, before: _LevelState, index: int, result: str
     ) -> _LevelState | None:
-        """Record the events of an instant, and return the state after it if the graph continues."""
+        """Record the events of an instant, at which the action `index` (-1 for the entry) has ended
+        with `result`; return the state after it, None if the graph has ended. `before`: the state
+        before it."""
         by = self.net.names[index] if index >= 0 else ""
         for kind, child in instant.noted:
             self._note(Trouble(kind, self.key.get(child), by, result))

@@ -18,7 +18,8 @@ _BLANK: Final = re.compile(r"[ \t\r\n]*")
 
 
 def pointer(*keys: str | int) -> str:
-    """Return the JSON pointer (RFC 6901) that leads through these keys."""
+    """Return the JSON pointer (RFC 6901) that leads through `keys`: names of members and indices of
+    items."""
     path = ""
     for key in keys:
         if isinstance(key, str) and ("~" in key or "/" in key):
@@ -48,10 +49,8 @@ class _Wanted:
 
 
 def places_of(text: str, paths: Iterable[str]) -> dict[str, Place]:
-    """Return the place of each pointer. A pointer that leads nowhere has the place of the value in
-    which it ends.
-
-    `text` is JSON without double keys.
+    """Return the place in the JSON text of each pointer in `paths`. A pointer that leads nowhere
+    has the place of the value in which it ends. The text must not have a key twice in one object.
     """
     paths = set(paths)
     root = _Wanted()
@@ -81,7 +80,7 @@ def _place(root: _Wanted, path: str, lines: "_Lines") -> Place:
 
 
 def _find(text: str, root: _Wanted) -> None:
-    """Set the start of each value that is wanted."""
+    """Set `start` in each wanted value below `root` to the offset at which it begins in the text."""
     root.start = _after_blanks(text, 0)
     above: list[
         tuple[_Wanted, int | None]
@@ -118,7 +117,8 @@ def _find(text: str, root: _Wanted) -> None:
 
 
 def _after(text: str, at: int) -> int:
-    """Return the offset after the object or list that was opened before `at`."""
+    """Return the offset in the text after the object or list that was opened just before the offset
+    `at`."""
     depth = 1
     while depth and (bracket := _BRACKET.match(text, at)):
         depth += 1 if bracket[1] in "[{" else -1
@@ -139,13 +139,13 @@ def _item(node: _Wanted, index: int, text: str, at: int) -> _Wanted | None:
 
 
 def key_of(token: str) -> str:
-    """Return the text that a JSON string spells."""
+    """Return the text that a JSON string (`token`, with its quotes) spells."""
     return str(json.loads(token, strict=False)) if "\\" in token else token[1:-1]
 
 
 def doubled_in(text: str) -> tuple[str, int] | None:
     """Return the JSON pointer of the first key that occurs twice in one object of a JSON text, and
-    the offset in characters of its second occurrence; None if there is none."""
+    the offset in characters of its second occurrence; None if no key does."""
     for path, offset, fresh in _members(text):
         if not fresh:
             return path, offset
@@ -153,7 +153,8 @@ def doubled_in(text: str) -> tuple[str, int] | None:
 
 
 def path_at(text: str, offset: int) -> str:
-    """Return the pointer of the value that begins at an offset, or of the last one before it."""
+    """Return the JSON pointer of the value that begins at an offset (in characters) of a text, or
+    of the last one before it; "" without one."""
     last = ""
     for path, start, _ in _members(text):
         if start > offset:
@@ -196,7 +197,7 @@ def _members(text: str) -> Iterator[tuple[str, int, bool]]:
 
 
 def place_at(text: str, offset: int) -> tuple[int, int]:
-    """Return line and column of an offset, both from 1."""
+    """Return the line and the column, both from 1, of an offset (in characters) of a text."""
     return text.count("\n", 0, offset) + 1, offset - text.rfind("\n", 0, offset)
 
 

@@ -71,7 +71,7 @@ class Number(msgspec.Struct, frozen=True):
 
     @property
     def value(self) -> float:
-        """The double that the engine reads."""
+        """The value as the double that the engine reads."""
         return float(self.text)
 
 
@@ -104,7 +104,8 @@ def parse(text: str | bytes) -> Json:
 
 
 def parse_small(text: str) -> Json:
-    """Parse the text of one field. A text that is no JSON is returned as it is. Never raises."""
+    """Parse the JSON text of one field. A text that is no JSON is returned as it is, without an
+    error."""
     try:
         return parse(text)
     except Unreadable:
@@ -119,14 +120,14 @@ def dump(value: Json) -> str:
 
 
 def dump_indented(value: Json) -> str:
-    """Return JSON text with an indentation of two blanks for each level."""
+    """Return JSON text of a value, with an indentation of two blanks for each level."""
     out: list[str] = []
     _indented(value, "\n", out)
     return "".join(out)
 
 
 def number(value: float) -> Number:
-    """Return a number in its shortest spelling, whole numbers without a point."""
+    """Return a Number with the shortest spelling of a value; a whole number has no point."""
     return Number(str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value))
 
 

@@ -38,12 +38,10 @@ class GenerationBase(msgspec.Struct, frozen=True):
     unfinished: dict[str, UnfinishedFile] = {}
 
     def settled(self, there: Mapping[str, bytes]) -> dict[str, bytes]:
-        """Return the generated text on which each file is based, given the files that are `there`.
-
-        For an unfinished call this is the newer text if its file has arrived: to merge it again
-        could repeat lines. A file that was not there before came from that call, even if it was
-        edited since.
-        """
+        """Return the generated text on which each file is based, where `there` are the contents of
+        the present files. For an unfinished call this is the newer text if its file has arrived: to
+        merge it again could repeat lines. A file that was not there before came from that call,
+        even if it was edited since."""
         arrived = {
             path: each.text
             for path, each in self.unfinished.items()
@@ -71,7 +69,7 @@ def digest(content: bytes) -> str:
 
 
 def write_base(base: GenerationBase) -> bytes:
-    """Return the content of the base file."""
+    """Return the content of the base file, which stores the texts generated last."""
     stored = _StoredBase(
         about=_ABOUT,
         format=1,

@@ -42,11 +42,9 @@ class _BundledAction(msgspec.Struct, frozen=True):
 
 
 def bundle_files(package: str, actions: Sequence[Action]) -> dict[str, bytes]:
-    """Return the files of one package with all these actions: contents by path below its folder.
-    Raise `ImpossiblePackage` if a name or parameter cannot be one of C++ or ROS.
-
-    Files of a single action have the same paths as in its own package.
-    """
+    """Return the files of one package with all of these actions: contents by path below its folder.
+    Raise `ImpossiblePackage` if a name or parameter cannot be one of C++ or ROS. Files of a single
+    action have the same paths as in its own package."""
     refusals = [*_against(package, actions), *check_names(action.name for action in actions)]
     found: dict[str, bytes] = {}
     for action in actions:
@@ -75,7 +73,8 @@ def bundle_files(package: str, actions: Sequence[Action]) -> dict[str, bytes]:
 
 
 def is_of_bundle(path: str) -> bool:
-    """Return whether a package of several actions can have this file, whatever its actions are."""
+    """Return whether a package of several actions can have a file at this path, whatever its
+    actions are."""
     return path in _SHARED or _OF_ACTIONS.fullmatch(path) is not None
 
 

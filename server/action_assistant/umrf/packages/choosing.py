@@ -11,10 +11,8 @@ from action_assistant.umrf.signatures import signature_of
 
 
 def distinct_actions(graph: Graph) -> tuple[Action, ...]:
-    """Return the first action of each name, in the order of the graph, without values.
-
-    Each use gives its own values; in the file of an action they would apply to every graph.
-    """
+    """Return the first action of each name in a graph, in its order, without values: each use of an
+    action has its own values, which in the file of the action would apply to every graph."""
     found: dict[str, Action] = {}
     for action in graph.actions:
         if not action.missing:
@@ -23,8 +21,8 @@ def distinct_actions(graph: Graph) -> tuple[Action, ...]:
 
 
 def disagreements(graph: Graph) -> tuple[NameRefusal, ...]:
-    """Return refusals for actions of one name whose parameters differ: the engine would find the
-    package for some only."""
+    """Return a refusal for each name whose actions have different parameters: the engine would find
+    the package for some of them only."""
     return tuple(_disagreements(graph))
 
 

@@ -103,25 +103,22 @@ ACCEPTED: Final[dict[str, tuple[type[SafeText], ...]]] = {
 
 
 def cpp_name(text: str) -> CppName:
-    """Return an identifier. Raises ValueError for any other text."""
+    """Return the text as an identifier of C++. Raise ValueError for any other text."""
     if not all(_WORD.fullmatch(part) for part in text.split(".")):
         raise ValueError(f"no identifier: {text!r}")
     return CppName(text)
 
 
 def cpp_type(text: str) -> CppType:
-    """Return the type of a parameter. Raises ValueError for any other text."""
+    """Return the text as the C++ type of a parameter. Raise ValueError for any other text."""
     if not _TYPE.fullmatch(text):
         raise ValueError(f"no type of a parameter: {text!r}")
     return CppType(text)
 
 
 def cpp_string(text: str) -> CppString:
-    """Return a UTF-8 string literal.
-
-    Octal escapes end after three digits, whatever follows them. `?` is escaped, since it could be
-    part of a trigraph.
-    """
+    """Return a C++ string literal, in UTF-8, that has this text. Octal escapes end after three
+    digits, whatever follows them. `?` is escaped, since it could be part of a trigraph."""
 
     def octal(found: re.Match[str]) -> str:
         return "".join(f"\\{byte:03o}" for byte in found[0].encode("utf-8", "replace"))
@@ -131,8 +128,8 @@ def cpp_string(text: str) -> CppString:
 
 
 def cpp_initial(value: str | float | bool | tuple[str | float | bool, ...] | None) -> CppInitial:
-    """Return the initializer of a member; empty braces for None. Raises ValueError for a number
-    that is not finite."""
+    """Return the initial value of a member in C++, in braces; empty braces for None. Raise
+    ValueError for a number that is not finite."""
     values = () if value is None else value if isinstance(value, tuple) else (value,)
     return CppInitial(f"{{{', '.join(map(_literal, values))}}}")
 
@@ -159,30 +156,31 @@ def cpp_comment(text: str, indent: int = 0) -> CppComment:
 
 
 def package_name(text: str) -> PackageName:
-    """Return the name of a package. Raises ValueError for any other text."""
+    """Return the text as the name of a package. Raise ValueError for any other text."""
     if not _PACKAGE_NAME.fullmatch(text):
         raise ValueError(f"no name of a package: {text!r}")
     return PackageName(text)
 
 
 def cmake(text: str) -> CMakeString:
-    """Return a quoted argument in which CMake sees no variable, list or generator expression."""
+    """Return a quoted CMake argument with this text, in which CMake sees no variable, list or
+    generator expression."""
     return CMakeString(f'"{visible(text).translate(_CMAKE_ESCAPES)}"')
 
 
 def xml(text: str) -> XmlText:
-    """Return escaped text. Characters that XML cannot have are spelled out."""
+    """Return the text escaped for XML. Characters that XML cannot have are spelled out."""
     return XmlText(visible(text).translate(_XML_ESCAPES))
 
 
 def markdown(text: str) -> MarkdownText:
-    """Return one paragraph, also for a text with several: no line can begin a list, a heading or a
-    fence."""
+    """Return the text as one paragraph of Markdown, also if it has several: no line can begin a
+    list, a heading or a fence."""
     return MarkdownText(" ".join(visible(text).split()).translate(_MARKDOWN_ESCAPES))
 
 
 def blanks(depth: int) -> Blanks:
-    """Return an indentation of two blanks for each level."""
+    """Return the indentation of a line: two blanks for each level of `depth`."""
     return Blanks("  " * depth)
 
 
@@ -195,8 +193,8 @@ def visible(text: str) -> str:
 
 
 def only(language: str) -> Callable[[Any], SafeText]:
-    """Return the `finalize` function for templates of a language, which raises TypeError for values
-    of other types."""
+    """Return the function that templates of this language apply to each value: it returns safe
+    text, and raises TypeError for values of other types."""
     accepted = ACCEPTED[language]
 
     def finalize(value: Any) -> SafeText:

@@ -92,18 +92,15 @@ def _described(action: Action) -> Action:
 
 
 def rendered(template: str, language: str, known: dict[str, Any]) -> bytes:
-    """Render a template of a language."""
+    """Return the text of a template of a language, in UTF-8, with the variables `known`."""
     text = environment(language).get_template(f"{template}.jinja").render(known)
     return text.encode()
 
 
 @cache
 def environment(language: str) -> Environment:
-    """Return the environment that renders templates of a language.
-
-    A value of a type that is not in `escapes.ACCEPTED` raises TypeError, a missing value raises
-    UndefinedError.
-    """
+    """Return the environment of Jinja that renders templates of a language. A value of a type that
+    is not in `escapes.ACCEPTED` raises TypeError, a missing value raises UndefinedError."""
     made = Environment(
         loader=FileSystemLoader(_TEMPLATES),
         autoescape=False,

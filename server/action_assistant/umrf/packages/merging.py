@@ -43,18 +43,16 @@ class _LineChange(msgspec.Struct, frozen=True):
     lines: tuple[bytes, ...]
 
     def touches(self, other: "_LineChange") -> bool:
-        """Return whether the order or the result of two changes would be a guess.
-
-        Replaced lines may be adjacent; an insertion next to changed lines may belong to either of
-        them.
-        """
+        """Return whether the order or the joint result of two changes would be a guess. Replaced
+        lines may be adjacent; an insertion next to changed lines may belong to either of them."""
         if self.first == self.last or other.first == other.last:
             return self.first <= other.last and other.first <= self.last
         return self.first < other.last and other.first < self.last
 
 
 def merged(base: bytes, ours: bytes, theirs: bytes) -> MergedText:
-    """Return `ours` with the changes of `theirs` to `base`. A line ends with a line feed only."""
+    """Return the text `ours` with the changes that lead from `base` to `theirs` (a three-way
+    merge). Only a line feed ends a line."""
     if theirs in (base, ours):
         return MergedText(ours)
     if ours == base:
@@ -86,8 +84,8 @@ def merged(base: bytes, ours: bytes, theirs: bytes) -> MergedText:
 
 
 def _split(text: bytes) -> _Lines:
-    """Return the lines with their ends. `splitlines` would also end lines at single carriage
-    returns."""
+    """Return the lines of a text with their line feeds. `splitlines` would also end lines at single
+    carriage returns."""
     *lines, rest = text.split(b"\n")
     return (*(line + b"\n" for line in lines), *([rest] if rest else ()))
 
@@ -121,7 +119,7 @@ def _clusters(changes: Sequence[_LineChange]) -> Iterator[list[_LineChange]]:
 def _applied(
     base: _Lines, changes: Sequence[_LineChange], first: int, last: int
 ) -> tuple[bytes, ...]:
-    """Return lines `first` to `last` of the base with these changes."""
+    """Return lines `first` to `last` (exclusive) of the base with these changes made."""
     found: list[bytes] = []
     for change in changes:
         found += (*base[first : change.first], *change.lines)
@@ -130,8 +128,8 @@ def _applied(
 
 
 def _taken_over(base: _Lines, ours: _Lines, theirs: _Lines) -> bool:
-    """Return whether `ours` has everything that `theirs` changed and differs only elsewhere: a
-    person merged it by hand."""
+    """Return whether `ours` has everything by which `theirs` changed `base`, and differs only
+    elsewhere: a person merged it by hand."""
     new = [
         (_text_lines(base[start:end]) > _text_lines(theirs[first:last]), first, last)
         for _, start, end, first, last in _edits(base, theirs)
@@ -146,5 +144,5 @@ def _taken_over(base: _Lines, ours: _Lines, theirs: _Lines) -> bool:
 
 
 def _text_lines(lines: _Lines) -> int:
-    """Return how many lines are not blank."""
+    """Return how many of the lines are not blank."""
     return sum(1 for line in lines if line.strip())

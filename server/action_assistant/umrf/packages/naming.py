@@ -156,14 +156,14 @@ _LOWER: Final = {code: code + 32 for code in range(ord("A"), ord("Z") + 1)}
 
 
 def check_name(name: str) -> tuple[NameRefusal, ...]:
-    """Return the reason against a package of an action of this name; empty if it is possible."""
+    """Return the reasons against a package for an action of this name; empty if it is possible."""
     reason = next(_against(name), None)
     return () if reason is None else (NameRefusal(name, reason),)
 
 
 def check_names(names: Iterable[str]) -> tuple[NameRefusal, ...]:
-    """Return the reasons against packages of these names, including names that would give the same
-    package."""
+    """Return the reasons against packages for actions of these names, also if two names would give
+    the same package."""
     listed = list(dict.fromkeys(names))
     found = [refusal for name in listed for refusal in check_name(name)]
     taken: dict[str, str] = {}

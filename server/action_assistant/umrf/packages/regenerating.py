@@ -59,8 +59,8 @@ class _RegenerationBuilder:
         self.broken: dict[str, str] = {}
 
     def add_file(self, path: str, last: bytes | None, there: bytes | None, now: bytes) -> None:
-        """Decide about one file from the text generated last, the text that is there, and the text
-        generated now."""
+        """Decide what to do with the file at `path`. `last`: the text generated last time; `there`:
+        the present content; `now`: the text generated now; None if there is no such text."""
         if there == now:
             return
         if last is None:
@@ -77,8 +77,9 @@ class _RegenerationBuilder:
             self.merge(path, last, there, now)
 
     def merge(self, path: str, last: bytes, there: bytes, now: bytes) -> None:
-        """Merge the newly generated text into a file, unless there is a conflict or the result
-        could not be read."""
+        """Merge the changes from the text generated last to that generated now into the present
+        content (`there`). If there is a conflict, or the result could not be read, record that
+        instead."""
         found = merged(last, there, now)
         if found.conflicts:
             self.conflicts[path] = found.conflicts
@@ -96,10 +97,8 @@ def regenerated(
     package: str, now: Mapping[str, bytes], there: Mapping[str, bytes], base: GenerationBase | None
 ) -> Regeneration:
     """Return how a new generation changes a package: the three-way merge of its files. Nothing is
-    written.
-
-    `now`: the result of `package_files`; `there`: the contents of the package at these paths and at
-    those that the base names; `base`: the texts of the last generation, None if there are none.
+    written. `now`: the result of `package_files`; `there`: the present contents of these files and
+    of those that the base names; `base`: the texts of the last generation, None for the first one.
     """
     # Anybody may have written the base file, so paths that we never generate are ignored.
     settled = (base or GenerationBase()).settled(there)
@@ -135,27 +134,25 @@ def _announced(
 def readable_paths(
     package: str, now: Mapping[str, bytes], base: GenerationBase | None
 ) -> tuple[str, ...]:
-    """Return the paths whose contents `regenerated` has to know."""
+    """Return the paths of the files whose present contents `regenerated` needs. The parameters are
+    as there."""
     known = base or GenerationBase()
     named = (*known.files, *known.unfinished)
     return tuple(sorted({*now, *(path for path in named if _is_possible(package, now, path))}))
 
 
 def _is_possible(package: str, now: Mapping[str, bytes], path: str) -> bool:
-    """Return whether a generation for this package could have made a file.
-
-    A package of several actions may have files of actions that are no longer among them.
-    """
+    """Return whether a generation of this package could have made a file at `path`. `now`: the
+    files generated now. A package of several actions may have files of actions that are no longer
+    in it."""
     if f"{package}.umrf.json" in now:
         return path in possible_files(package)
     return is_of_bundle(path)
 
 
 def _against(path: str, before: bytes, content: bytes) -> str | None:
-    """Return the reason for which a merged file is invalid, unless it was invalid before.
-
-    Lines of two sides may each be valid alone and together be no JSON.
-    """
+    """Return the reason for which the merged `content` of a file is invalid; None if it is valid,
+    or was invalid before. Lines of two sides may each be valid alone and together be no JSON."""
     reason = _unreadable(path, content)
     return None if reason is None or _unreadable(path, before) else reason
 

@@ -43,7 +43,7 @@ class StructValue(msgspec.Struct, frozen=True):
 
     @property
     def cpp_type(self) -> str:
-        """The C++ type of the struct member."""
+        """The C++ type of the struct member for this parameter."""
         return CPP_TYPES.get(self.kind, OPAQUE)
 
     @property
@@ -98,7 +98,7 @@ class _StructReader:
         self.refusals.append(NameRefusal(f"{self.place}/{path}", reason))
 
     def add(self, parameter: Parameter) -> None:
-        """Add a parameter, or note the reason against it."""
+        """Add a parameter to the struct, or record the reason why it cannot be."""
         keys, leaf = keys_of(parameter.path), parse_small(parameter.text)
         if leaf == {}:
             return  # an empty group has no member
@@ -129,8 +129,8 @@ class _StructReader:
 
 
 def structure(action: Action, field: Field) -> tuple[ParameterStruct, tuple[NameRefusal, ...]]:
-    """Return one side of an action as a struct, with refusals of parameters that C++ or the engine
-    cannot represent."""
+    """Return one side of an action (`field`: inputs or outputs) as a C++ struct, and refusals of
+    parameters that C++ or the engine cannot represent."""
     reader = _StructReader(action, field)
     for parameter in action.inputs if field == "input_parameters" else action.outputs:
         reader.add(parameter)
@@ -149,8 +149,8 @@ def _lines(group: _StructGroup, kind: str, member: str, depth: int) -> Iterator[
 
 
 def _type_of(name: str, around: str, group: _StructGroup) -> str:
-    """Return the type of a nested struct: `pose_t` for `pose`, extended if the struct around or a
-    member has that name."""
+    """Return the name of the type of a nested struct: `pose_t` for `pose`, extended if the struct
+    `around` or a member of `group` has that name."""
     kind = f"{name}_t"
     others = {f"{each}_t" for each in group.members if each != name}
     while kind == around or kind in group.members or kind in others:
@@ -186,8 +186,8 @@ def _against(keys: tuple[str, ...], leaf: Json) -> str | None:
 
 
 def _against_output(leaf: Json) -> str | None:
-    """Return the reason against an output: engines compare only single values with allowed ones,
-    and no lists."""
+    """Return the reason why a parameter cannot be an output; None if it can: engines compare only
+    single values with allowed ones, and no lists."""
     assert isinstance(leaf, dict)
     if leaf["pvf_type"] in {"strings", "numbers", "bools"} and _allowed(leaf):
         return "The engine takes no list as an output that has allowed values."
@@ -200,11 +200,9 @@ def _allowed(leaf: dict[str, Json]) -> list[Json]:
 
 
 def _default(leaf: dict[str, Json]) -> Initial:
-    """Return the initial value of an output, as in simulations: the value of the file, else the
-    first allowed value that C++ can spell.
-
-    An engine aborts at the end of an action that leaves an output with allowed values empty.
-    """
+    """Return the initial value of an output (`leaf`: the parameter in the file), as in simulations:
+    its value, else the first allowed value that C++ can spell, else None. An engine aborts at the
+    end of an action that leaves an output with allowed values empty."""
     given = [leaf["pvf_value"]] if "pvf_value" in leaf else []
     return next(
         (said for each in (*given, *_allowed(leaf)) if (said := _spelled(each)) is not None), None

@@ -19,7 +19,8 @@ Task: TypeAlias = Callable[[], None]
 
 
 class Clock:
-    """Runs events in the order of their time, keeps counts of states, and collects the trace."""
+    """Runs the events of a simulated engine in the order of their time, counts the states of
+    actions, and collects the trace."""
 
     def __init__(self, facts: EngineFacts) -> None:
         self.facts = facts
@@ -54,7 +55,7 @@ class Clock:
         self.now = max(self.now, to_ms) if to_ms != inf else self.now
 
     def _settle(self) -> None:
-        """Run everything that happens at this instant."""
+        """Run all events of the present instant, also those that they cause."""
         while self._tasks:
             self._tasks.popleft()()
         for graph in self._touched:

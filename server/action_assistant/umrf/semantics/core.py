@@ -49,10 +49,8 @@ _OUTCOMES: dict[str, Outcome] = {outcome: outcome for outcome in OUTCOMES}
 
 
 class Core(Clock):
-    """Propagates results along the relations and runs the life of actions.
-
-    `Graphs` adds the life of graphs and sub-graphs, and `Engine` the commands.
-    """
+    """Simulates how results pass along the arrows and how actions begin and end. `Graphs` adds the
+    life of graphs and sub-graphs, and `Engine` the commands."""
 
     def __init__(
         self,
@@ -86,11 +84,9 @@ class Core(Clock):
     # Results
 
     def _inform(self, graph: Running, node: Node, result: Outcome) -> None:
-        """Ask every child what it does now that `node` has ended with `result` (the engine's
-        `startChildNodes`).
-
-        The graph is HALTED if every child ignores the result and no other action runs.
-        """
+        """Ask every child for its response, now that `node` has ended with `result` (the engine's
+        `startChildNodes`). The graph is HALTED if every child ignores the result and no other
+        action runs."""
         if graph.state != "RUNNING":
             return
         if graph.deadly:
@@ -119,10 +115,9 @@ class Core(Clock):
     def _ask(
         self, graph: Running, node: Node, edge: Edge, child: Node, link: NodeLink, result: Outcome
     ) -> str:
-        """Ask one child for its response to a result and carry the response out.
-
-        Return `done` if no further child is to be asked, `ignored` if the child ignores the result,
-        else an empty text.
+        """Ask one child of `node`, over the edge between them, for its response to a result, and
+        carry the response out. `link`: what the child stores of this parent. Return `done` if no
+        further child is to be asked, `ignored` if the child ignores the result, else an empty text.
         """
         child.receive(link)
         response = link.conditions.answer(result)
@@ -202,7 +197,8 @@ class Core(Clock):
         self._soon(partial(self._sub_ended, graph, result))
 
     def _left_loading(self, graph: Running, state: str) -> None:
-        """Report that actions which still load will run although their graph counts as ended."""
+        """Report (hazard H14) each action that still loads and will run although the graph has
+        ended in `state`."""
         for node in graph.nodes.values():
             if node.loading:
                 message = (
@@ -215,7 +211,7 @@ class Core(Clock):
     @staticmethod
     def _begins_again(node: Node) -> bool:
         """Return whether an action that has returned starts again by itself: a spontaneous one
-        does, also after an error."""
+        does, even after an error."""
         return node.type == "spontaneous" and node.state in ("RUNNING", "ERROR")
 
     def _run(self, graph: Running, node: Node) -> None:
@@ -253,7 +249,8 @@ class Core(Clock):
             self._begin(graph, node)
 
     def _loaded(self, graph: Running, node: Node) -> None:
-        """Begin an action that has finished loading, even if its graph has ended meanwhile."""
+        """Begin an action that has finished loading, even if its graph has ended meanwhile; do
+        nothing if another graph has taken the name of its graph."""
         node.loading = False
         graph.loading -= 1
         if self.graphs.get(graph.name) is graph and not node.loaded and self._load(graph, node):
@@ -298,11 +295,11 @@ class Core(Clock):
         self._let_run(graph, node, inf if node.call.never else duration)
 
     def _takes_ms(self, node: Node) -> float:
-        """Return how long the current call of an action takes."""
+        """Return how long the current call of an action takes, in ms."""
         return node.call.after_s * 1000
 
     def _stops_ms(self, node: Node) -> float:
-        """Return how long the action's code continues after a stop."""
+        """Return how long the action's code continues after a stop, in ms."""
         return node.call.stop_s * 1000
 
     def _let_run(self, graph: Running, node: Node, duration_ms: float) -> None:
@@ -317,7 +314,8 @@ class Core(Clock):
             self._ended(graph, node, _OUTCOMES[node.call.result])
 
     def _performed_returns(self, returned: Returned) -> None:
-        """End a call of a performer: none of its code runs any more."""
+        """End a call that a performer (not the script) carried out: none of its code runs any more.
+        `returned`: its result and outputs."""
         found = self._performed.take(returned.number)
         if found is None:
             return
@@ -339,7 +337,8 @@ class Core(Clock):
             self._ended(graph, node, _OUTCOMES[returned.result])
 
     def _ended(self, graph: Running, node: Node, result: Outcome) -> None:
-        """Handle the return of `onRun`, or the exception that it threw (`on_error`)."""
+        """Handle the return of an action's `onRun` with `result`, or the exception that it threw
+        (`on_error`): show its state, fill its outputs and inform its children."""
         if node.state in HELD:
             node.pending = result
             return
@@ -440,10 +439,8 @@ class Core(Clock):
 
     def _stop_failed(self, graph: Running, node: Node, token: int) -> None:
         """Show ERROR after `onStop` threw or the stop timeout passed, while the code of the action
-        continues.
-
-        When that code returns, the children are informed as of any other result.
-        """
+        continues. When that code returns, the children are informed as of any other result.
+        `token`: of the stop; do nothing if the action has changed since."""
         if node.token != token or node.state != "STOPPING":
             return
         node.token += 1
@@ -461,8 +458,8 @@ class Core(Clock):
             self._after(graph, node, _OUTCOMES[node.call.result], failed=True)
 
     def _stop_downstream(self, graph: Running, node: Node, then: Task) -> None:
-        """Stop every active action downstream of a spontaneous one, as the engine does before it
-        informs the children."""
+        """Stop every active action downstream of the spontaneous action `node`, as the engine does
+        before it informs the children; call `then` once they have stopped."""
         if graph.state != "RUNNING":
             then()
             return
@@ -496,8 +493,8 @@ class Core(Clock):
             self._hazard(graph, "H5", "goes on", message, node)
 
     def _pause_node(self, graph: Running, node: Node) -> bool:
-        """Pause an action. Return True if it is paused now or was not running, False if it handles
-        no pause."""
+        """Pause an action. Return True if it is paused now or was not running, False if it cannot
+        be paused."""
         if EFFECTS["pause"][node.activity(self.now)] == "nothing":
             return True
         self._state(graph, node, "PAUSE_REQUESTED")

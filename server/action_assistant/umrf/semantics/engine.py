@@ -143,24 +143,25 @@ class Engine(Graphs):
         return self._taken()
 
     def stop(self, graph_name: str, at_ms: float) -> list[Trace]:
-        """Stop the graph that runs as `graph_name`, and return the trace. Do nothing if no such
-        graph runs."""
+        """Stop, at `at_ms`, the graph that runs as `graph_name`, and return the trace up to then.
+        Do nothing if no such graph runs."""
         return self._on(graph_name, at_ms, self._stop_graph)
 
     def pause(self, graph_name: str, at_ms: float) -> list[Trace]:
-        """Pause the graph that runs as `graph_name` if it is RUNNING, and return the trace."""
+        """Pause, at `at_ms`, the graph that runs as `graph_name` if it is RUNNING, and return the
+        trace up to then."""
         return self._on(graph_name, at_ms, self._pause_graph)
 
     def resume(self, graph_name: str, at_ms: float, continue_from: str = "") -> list[Trace]:
-        """Resume the graph that runs as `graph_name` if it is PAUSED or HALTED, and return the
-        trace. `continue_from`: the full name of an action to run."""
+        """Resume, at `at_ms`, the graph that runs as `graph_name` if it is PAUSED or HALTED, and
+        return the trace up to then. `continue_from`: the full name of an action to run, "" for
+        none."""
         return self._on(graph_name, at_ms, partial(self._resume_graph, continue_from=continue_from))
 
     def modify(self, graph: Graph, at_ms: float, continue_from: str = "") -> list[Trace]:
-        """Give a running, paused or halted graph of this name a new structure and let it continue.
-
-        Raise `GraphRefused` as the engine does; a graph that was paused for the modify then stays
-        PAUSED.
+        """Give, at `at_ms`, a running, paused or halted graph of this name a new structure and let
+        it continue; return the trace up to then. `continue_from`: as for `resume`. Raise
+        `GraphRefused` as the engine does; a graph that was paused for the modify then stays PAUSED.
         """
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)
@@ -169,8 +170,8 @@ class Engine(Graphs):
         return self._taken()
 
     def returned(self, returned: Returned, at_ms: float) -> list[Trace]:
-        """Take the result of a call that the performer carried out and that has ended
-        completely."""
+        """Process, at `at_ms`, the result of a call that the performer carried out and that has
+        ended completely; return the trace up to then."""
         self._run_until(at_ms)
         if not self.crashed:
             self._performed_returns(returned)

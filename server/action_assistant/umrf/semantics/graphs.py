@@ -65,7 +65,7 @@ class Graphs(Core):
             command()
 
     def _free(self) -> None:
-        """Run the waiting commands, since the command that kept the engine busy is done."""
+        """Run the commands that have waited for another command, which has now ended."""
         self._busy = False
         while self._waiting and not self._busy and not self.crashed and not self.locked:
             try:
@@ -118,11 +118,9 @@ class Graphs(Core):
 
     def _not_built(self, graph: Running, *, matched: bool) -> tuple[Node, bool] | None:
         """Return the first action that the engine cannot build, and whether it is the first of all;
-        None if there is none.
-
-        The engine goes through a matched graph by full name and through others in file order. It
-        takes an action that it has not matched for one with a library of its own.
-        """
+        None if it can build all. `matched`: the engine has looked the actions up in its index. It
+        goes through a matched graph by full name and through others in file order. It takes an
+        action that it has not matched for one with a library of its own."""
         nodes = list(graph.nodes.values())
         if matched:
             nodes.sort(key=lambda node: node.full_name.encode())
@@ -135,11 +133,9 @@ class Graphs(Core):
         return None
 
     def _refuse_broken(self, graph: Running, *, matched: bool) -> None:
-        """Raise `GraphRefused` if an action of the graph cannot be built.
-
-        The graph then stays in the engine, without that action and those after it. If actions stand
-        before it, a get kills the engine.
-        """
+        """Raise `GraphRefused` if an action of the graph cannot be built. The graph then stays in
+        the engine, without that action and the following ones. If other actions stand before it, a
+        get kills the engine. `matched`: as in `_not_built`."""
         found = self._not_built(graph, matched=matched)
         if found is None:
             return
@@ -166,7 +162,8 @@ class Graphs(Core):
         self._graph_state(old, "UNINITIALIZED")
 
     def _again(self, old: Running, new: Running, *, matched: bool) -> None:
-        """Start a graph although the engine holds one of that name."""
+        """Start the graph `new` although the engine holds one of that name (`old`), which has
+        ended. `matched`: as in `_not_built`."""
         if any(node.holds_thread(self.now) for node in old.nodes.values()):
             self._command(partial(self._replace, old, new, matched))
             return
@@ -175,8 +172,8 @@ class Graphs(Core):
         self._begin_graph(new)
 
     def _replace(self, old: Running, new: Running, matched: bool) -> None:
-        """Start a graph again although actions of the finished one still run: they are stopped
-        first."""
+        """Start a graph again although actions of the finished one (`old`) still run: they are
+        stopped first. `matched`: as in `_not_built`."""
         self._graph_state(old, "CLEARING")
         left_over = [node for node in old.nodes.values() if node.holds_thread(self.now)]
         self._busy = True
@@ -352,8 +349,8 @@ class Graphs(Core):
             )
 
     def _built_names(self, changed: Running) -> set[str] | None:
-        """Return the actions of a modified graph up to the first that the engine cannot build; None
-        if it can build all."""
+        """Return the full names of the actions of a modified graph up to the first that the engine
+        cannot build; None if it can build all."""
         if self.facts.restart_matches:
             return None
         found = self._not_built(changed, matched=False)

@@ -41,8 +41,8 @@ class IndexedGraphs:
         self._known: dict[str, tuple[set[str], set[str]]] = {}
 
     def fitting(self, name: str, inputs: Collection[str], outputs: Collection[str]) -> Graph | None:
-        """Return the indexed graph with this name if its inputs and outputs are exactly these flat
-        names; None otherwise."""
+        """Return the indexed graph with this name if its inputs and outputs are exactly those with
+        the given flat names; None otherwise."""
         sub = self._library.get(name)
         if sub is None:
             return None
@@ -66,11 +66,9 @@ def unresolved(
     graph: Graph, library: Mapping[str, Graph], known: Container[str], actor: str = ""
 ) -> Iterator[Unresolved]:
     """Yield the sub-graphs for which an engine refuses this graph although it has indexed them.
-
-    `known`: names of plain actions, which take precedence over graphs. `actor`: the engine's name;
-    if it is empty, each actor of the graph has an engine, and each of these resolves its own
-    actions and those without an actor.
-    """
+    `library`: the indexed graphs by name. `known`: names of plain actions, which take precedence
+    over graphs. `actor`: the engine's name; if it is empty, each actor of the graph has an engine,
+    which resolves its own actions and the ones without an actor."""
     named = {action.actor for action in graph.actions if not action.missing} - {""}
     for each in [actor] if actor else sorted(named) or [""]:
         yield from _unresolved_by(("", each), graph, library, known)
@@ -79,14 +77,12 @@ def unresolved(
 def _unresolved_by(
     own: tuple[str, str], graph: Graph, library: Mapping[str, Graph], known: Container[str]
 ) -> Iterator[Unresolved]:
-    """Yield what the engine that resolves the actions of the actors `own` refuses.
-
-    The engine goes through the actions by full name. Once it has used a graph, it takes this graph
-    off its list for the later actions of the same graph and for all graphs inside, but not for
-    graphs beside it. So the engine refuses one sub-graph twice in one graph, and a sub-graph beside
-    a later one that contains it; it accepts the same sub-graph inside two different ones
-    (measured).
-    """
+    """Yield the sub-graphs that the engine which resolves the actions of the actors `own` refuses.
+    `library`, `known`: as in `unresolved`. The engine goes through the actions by full name. Once
+    it has used a graph, it takes this graph off its list for the later actions of the same graph
+    and for all graphs inside, but not for graphs beside it. So the engine refuses one sub-graph
+    twice in one graph, and a sub-graph beside a later one that contains it; it accepts the same
+    sub-graph inside two different ones (measured)."""
     indexed = IndexedGraphs(library)
     levels = [_Level(graph, frozenset(), frozenset())]
     top: Action | None = None
@@ -113,7 +109,8 @@ def _unresolved_by(
 
 
 def has_action(node: Node, known: Signature | None) -> bool:
-    """Return whether an indexed action has exactly the parameters of a node."""
+    """Return whether an indexed action (`known`: its signature, None without one) has exactly the
+    parameters of a node."""
     return (
         known is not None
         and set(node.inputs) == set(known.inputs)

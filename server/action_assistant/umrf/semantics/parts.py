@@ -155,13 +155,13 @@ class Node:
             self.waiting_links += link.required
 
     def receive(self, link: NodeLink) -> None:
-        """Mark a parent as reported; it stays so for the rest of the run."""
+        """Mark a parent (`link`) as having reported; it stays so until the run ends."""
         if not link.received:
             link.received = True
             self.waiting_links -= link.required
 
     def has_inputs(self) -> bool:
-        """Return whether every required input holds a value."""
+        """Return whether every required input of the action has a value."""
         return all(slot.has_value() or not slot.required for slot in self.inputs.values())
 
 
@@ -203,14 +203,14 @@ class Running:
 
     def actor_of(self, node: Node) -> str:
         """Return the actor that performs an action of this graph: its own, or else that of the
-        action for which this graph stands; "" if nobody is named."""
+        action for which this graph stands; "" if neither names one."""
         if node.actor or self.above is None or self.home is None:
             return node.actor
         return self.home.actor_of(self.above)
 
     def own_names(self) -> set[str]:
         """Return the names that sub-graphs of this graph cannot have: the names of this graph and
-        of all graphs around it, and of the actions that stand for these graphs."""
+        of all graphs around it, and of the actions that stand for them."""
         found, graph = set[str](), self
         while True:
             found.add(graph.own)
@@ -227,11 +227,8 @@ class Running:
 
 
 def build(running: Running, behaviours: Mapping[Key, tuple[Behaviour, ...]]) -> None:
-    """Fill an empty graph with the nodes and edges of its text. If two actions have the same full
-    name, the later one is lost.
-
-    `behaviours`: the behaviours of each action, by key.
-    """
+    """Fill an empty `running` graph with the nodes and edges of its text. If two actions have the
+    same full name, the later one is lost. `behaviours`: the behaviours of each action, by key."""
     graph = running.graph
     nodes = {a.key: Node(a, a.full_name, behaviours[a.key]) for a in graph.actions if not a.missing}
     for node in nodes.values():
@@ -338,18 +335,16 @@ def exit_owner(graph: Graph) -> Action | None:
 
 def exit_inputs(graph: Graph) -> dict[str, Slot]:
     """Return the inputs of the exit, which are also the outputs of the graph as a sub-graph, by
-    flat name.
-
-    The engine makes the outputs of each action of `graph_exit` inputs of the exit; those of the
-    last one that has any remain. They are required like any input: unless an action that leads to
-    the exit hands them over, the graph does not end.
-    """
+    flat name. The engine makes the outputs of each action of `graph_exit` inputs of the exit; the
+    outputs of the last one that has any remain. They are required like any input: unless an action
+    that leads to the exit hands them over, the graph does not end."""
     owner = exit_owner(graph)
     return slots_of(owner.outputs) if owner is not None else {}
 
 
 def linked_nodes(running: Running, node: Node) -> list[Node] | None:
-    """Return every action downstream of a node, or None if a path from it leads into a loop."""
+    """Return all actions of a running graph downstream of a node, or None if a path from it leads
+    into a loop."""
     if node not in running.linked:
         running.linked[node] = _downstream(running, node)
     return running.linked[node]

@@ -48,8 +48,9 @@ class Returned(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Performer(Protocol):
-    """Carries out calls beside the engine. No method waits. `takes_graphs`: it carries out also
-    actions that stand for graphs, each as one call."""
+    """Carries out calls of actions outside of the simulated engine, such as by Python code or by
+    robots. No method waits. `takes_graphs`: it carries out also actions that stand for graphs, each
+    as one call."""
 
     takes_graphs: bool
 
@@ -58,28 +59,26 @@ class Performer(Protocol):
         it is an action of a sub-graph."""
 
     def begin(self, call: Call) -> None:
-        """Begin to carry out a call."""
+        """Begin to carry out a call; do not wait for its end."""
 
     def stop(self, number: int) -> None:
         """Ask the call with this number to end soon."""
 
     def pause(self, number: int) -> None:
-        """Ask a call to pause."""
+        """Ask the call with this number to pause."""
 
     def resume(self, number: int) -> None:
-        """Let a paused call continue."""
+        """Let the paused call with this number continue."""
 
     def give_up(self, number: int) -> str | None:
-        """End the code of a call by force, since the engine's stop timeout has passed, and return a
-        message about it for people.
-
-        The end is then reported like any other return.
-        """
+        """End the code of the call with this number by force, since the engine's stop timeout has
+        passed, and return a message about it for people, None without one. The end is then reported
+        like any other return."""
 
 
 class PerformedCalls:
-    """Tracks the performed calls of one engine until all of their code has ended. Without a
-    performer there are none."""
+    """Tracks the calls that a performer carries out for one engine until all of their code has
+    ended. Without a performer there are none."""
 
     def __init__(self, performer: Performer | None) -> None:
         self._performer = performer
@@ -96,7 +95,8 @@ class PerformedCalls:
         return self._performer is not None and self._performer.takes_graphs
 
     def begin(self, graph: Running, node: Node) -> None:
-        """Begin a call of the action's code with its current inputs."""
+        """Have the performer begin a call of the code of an action (`node` in `graph`) with its
+        current inputs; does nothing if the script plays it."""
         if self._performer is None or node.execution is None:
             return
         self._newest += 1
@@ -119,23 +119,23 @@ class PerformedCalls:
         self._performer.begin(call)
 
     def stop(self, node: Node) -> None:
-        """Ask the action's call to end."""
+        """Ask the action's call to end; does nothing if it has no open call."""
         if self._performer is not None and (number := self._number(node)):
             self._performer.stop(number)
 
     def pause(self, node: Node) -> None:
-        """Ask the action's call to pause."""
+        """Ask the action's call to pause; does nothing if it has no open call."""
         if self._performer is not None and (number := self._number(node)):
             self._performer.pause(number)
 
     def resume(self, node: Node) -> None:
-        """Let the action's paused call continue."""
+        """Let the action's paused call continue; does nothing if it has no open call."""
         if self._performer is not None and (number := self._number(node)):
             self._performer.resume(number)
 
     def give_up(self, node: Node) -> str | None:
-        """End the action's call by force, and return the performer's message; None if the action
-        has no open call."""
+        """End the action's call by force, and return the performer's message, if it has one; None
+        if the action has no open call."""
         if self._performer is not None and (number := self._number(node)):
             return self._performer.give_up(number)
         return None
@@ -146,6 +146,6 @@ class PerformedCalls:
         return self._going.pop(number, None)
 
     def _number(self, node: Node) -> int:
-        """Return the number of the node's open call; 0 if there is none."""
+        """Return the number of the node's open call; 0 without one."""
         number = node.execution.number if node.execution is not None else 0
         return number if number in self._going else 0

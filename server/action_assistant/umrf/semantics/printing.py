@@ -57,8 +57,8 @@ class GraphPrinter:
         states: Mapping[str, str],
         messages: Mapping[str, Sequence[tuple[int, str]]],
     ) -> str:
-        """Return the text of the graph with these states. `messages`: texts of each action as (ms
-        since 1970, text)."""
+        """Return the text of the graph as the engine prints it, in this state and with these states
+        of its actions, by full name. `messages`: of each action as (ms since 1970, text)."""
         actions = ",".join(
             self._action(
                 node, states.get(node.full_name, "UNINITIALIZED"), messages.get(node.full_name, ())
@@ -149,8 +149,8 @@ def _child(label: str, remap: list[dict[str, str]]) -> dict[str, Any]:
 
 
 def _parameters(slots: Mapping[str, Slot], *, values: bool) -> dict[str, Any]:
-    """Return leaves nested by the `::` of their names. Only inputs have values, and only while they
-    hold one."""
+    """Return parameters as nested JSON values, by the `::` in their names. `values`: write the
+    value of each that holds one; the engine does so for inputs only."""
     root: dict[str, Any] = {}
     for flat, slot in slots.items():
         leaf: dict[str, Any] = {"pvf_type": slot.type}

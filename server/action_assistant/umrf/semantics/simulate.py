@@ -28,15 +28,16 @@ def simulate(
     actor: str = "",
     signatures: Mapping[str, Signature] | None = None,
 ) -> Iterator[Trace]:
-    """Simulate a graph from its start at 0 ms, and yield the trace events in order.
+    """Simulate a graph from its start at 0 ms, and yield the trace events in order. The trace ends
+    when nothing more will happen, at `until_ms`, or after `max_events` events; a trace that is cut
+    off by `max_events` ends with one more event, the hazard `events`. If the engine refuses the
+    start, the hazard `refused` is reported.
 
-    The trace ends when nothing more will happen, at `until_ms`, or after `max_events` events; a
-    trace that is cut off by `max_events` ends with one more event, the hazard `events`. If the
-    engine refuses the start, the hazard `refused` is reported. `script`: how the actions behave.
-    `library`: the graphs that can be sub-graphs, by name. `commands`: (time in ms, `stop` | `pause`
-    | `resume`, running name, or None for the top graph); commands reach the engine as direct calls,
-    so that a second stop during a stop kills it. `signatures`: the actions that the engine has;
-    without them it has every action.
+    `script`: how the actions behave. `library`: the graphs that can be sub-graphs, by name.
+    `facts`: the engine build. `commands`: (time in ms, `stop` | `pause` | `resume`, running name,
+    or None for the top graph); commands reach the engine as direct calls, so that a second stop
+    during a stop kills it. `states`: run states with which nodes begin, by key. `actor`: the
+    engine's name. `signatures`: the actions that the engine has; without them it has every action.
     """
     engine = Engine(
         facts=facts,
@@ -70,7 +71,8 @@ def simulate(
 
 
 def cut_off(engine: Engine, graph: Graph, max_events: int) -> Trace:
-    """Return the hazard that ends a trace which was cut off after `max_events` events."""
+    """Return the hazard event that ends the trace of a graph which was cut off after `max_events`
+    events."""
     message = (
         f"The simulation ends here, after {max_events:,} events; the graph does not. How it goes on is "
         "not known."
@@ -79,8 +81,9 @@ def cut_off(engine: Engine, graph: Graph, max_events: int) -> Trace:
 
 
 def started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> list[Trace]:
-    """Start a graph at 0 ms, and return the trace so far. If the engine refuses the start, the
-    trace ends in the hazard `refused`."""
+    """Start a graph at 0 ms, and return the trace so far. `states`: run states with which nodes
+    begin, by key, or None. If the engine refuses the start, the trace ends in the hazard `refused`.
+    """
     try:
         return engine.start(graph, 0.0, states)
     except GraphRefused as e:
@@ -89,8 +92,8 @@ def started(engine: Engine, graph: Graph, states: Mapping[Key, str] | None) -> l
 
 
 def commanded(engine: Engine, at_ms: float, verb: str, name: str) -> list[Trace]:
-    """Carry out `verb` (`stop`, `pause` or `resume`) at this time for the graph that runs as
-    `name`, and return the trace. Raises `ValueError` for any other verb."""
+    """Give the engine the command `verb` (`stop`, `pause` or `resume`) at this time for the graph
+    that runs as `name`, and return the trace up to then. Raise `ValueError` for any other verb."""
     match verb:
         case "stop":
             return engine.stop(name, at_ms)

@@ -60,7 +60,7 @@ def course(
 
 
 def steps_of(traces: Iterable[Trace]) -> tuple[ExpectedStep, ...]:
-    """Return the steps among trace events, in the same order; events that are no step are left out."""
+    """Return the steps of a course among trace events, in the same order; other events are dropped."""
     return tuple(step for trace in traces if (step := _step(trace)) is not None)
 
 

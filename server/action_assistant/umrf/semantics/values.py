@@ -56,7 +56,7 @@ class Slot:
         self.received = False
 
     def has_value(self) -> bool:
-        """Return whether the parameter holds a value."""
+        """Return whether the parameter holds a value now."""
         return self.value is not MISSING
 
     def default(self) -> Any:
@@ -97,7 +97,7 @@ class RemapUnknown(Exception):
 
 def slots_of(parameters: Iterable[Parameter]) -> dict[str, Slot]:
     """Return one slot for each of these parameters (inputs or outputs of an action), by flat name
-    and sorted as in the engine."""
+    and sorted as in the engine. Parameters without a `pvf_type` have none."""
     found: dict[str, Slot] = {}
     for parameter in parameters:
         leaf = parse_small(parameter.text)
@@ -108,8 +108,8 @@ def slots_of(parameters: Iterable[Parameter]) -> dict[str, Slot]:
 
 
 def fill_outputs(outputs: dict[str, Slot], given: dict[str, Any] | None) -> None:
-    """Fill the outputs of an action that has run. Each output gets its value in `given` (by flat
-    name), or its default if `given` has none."""
+    """Set the outputs of an action that has run. Each gets its value in `given` (by flat name), or
+    its default if `given` is None or has none."""
     for name, slot in outputs.items():
         value = (given or {}).get(name)
         if value is None:
@@ -132,13 +132,10 @@ def renamed(
     outputs: Collection[str], remap: Sequence[Remap], inputs: Collection[str]
 ) -> dict[str, str]:
     """Return which output of the parent each input of the child gets its value from: input name →
-    output name. Inputs that get no value are left out. The outputs are renamed by `remap`, one
-    rename after the other.
-
-    The result imitates a fault of the engine: it renames within a sorted tree without restoring the
-    order, and afterwards fails to find some of the other outputs. Raise `RemapUnknown` if the
-    output to be renamed is not found.
-    """
+    output name. Inputs that get no value are missing. The outputs are renamed by `remap`, one
+    rename after the other. The result imitates a fault of the engine: it renames within a sorted
+    tree without restoring the order, and afterwards fails to find some of the other outputs. Raise
+    `RemapUnknown` if the output to be renamed is not found."""
     if not remap:
         fewer, more = sorted((inputs, outputs), key=len)
         return {name: name for name in fewer if name in more}

@@ -36,16 +36,14 @@ class PairedTexts:
         self._add(kept)
 
     def all(self) -> list[PairedText]:
-        """Return all texts, grouped by client."""
+        """Return all stored texts, grouped by client."""
         return [each for found in self._by_client.values() for each in found]
 
     def check(self, update: bytes, read: UpdateOutline, known: Mapping[int, int]) -> None:
         """Raise Malformed for an update that would split a surrogate pair, or whose new texts with
-        surrogate pairs would need more memory, together with those of the document, than
-        `MOST_BYTES`.
-
-        `read`: the outline of the update. `known`: the next clock of each client in the document.
-        """
+        surrogate pairs would need more memory, together with the document's, than `MOST_BYTES`.
+        `read`: the outline of the update. `known`: the number of items (clock) of each Yjs client
+        in the document."""
         if not self._by_client and not read.paired:
             return
         news = _new(read, known)
@@ -62,8 +60,8 @@ class PairedTexts:
                 raise Malformed("a change within one character")
 
     def learn(self, read: UpdateOutline, known: Mapping[int, int]) -> None:
-        """Add the texts of an update that is applied. `known`: the next clock of each client before
-        that."""
+        """Add the texts in the outline (`read`) of an update that is applied. `known`: the number
+        of items (clock) of each Yjs client before that."""
         if read.paired:
             self._add(_new(read, known))
 
@@ -82,8 +80,8 @@ class PairedTexts:
 
 
 def has_paired_texts(bodies: Sequence[bytes]) -> bool:
-    """Return whether any of these stored updates has a text with surrogate pairs (characters of two
-    UTF-16 units). Raise Malformed if an update cannot be read."""
+    """Return whether any of these stored updates (`bodies`) has a text with surrogate pairs
+    (characters of two UTF-16 units). Raise Malformed if an update cannot be read."""
     text = b"\x00".join(bodies).translate(_CLASSES)
     starts: list[int] = []
     at = text.find(_AS_CLASSES)
@@ -97,8 +95,8 @@ def has_paired_texts(bodies: Sequence[bytes]) -> bool:
 
 
 def paired_texts_in(state: bytes) -> list[PairedText]:
-    """Search a document for texts with surrogate pairs, if its snapshot does not list them; return
-    an empty list if it is too large for that."""
+    """Search an encoded document for texts with surrogate pairs, if its snapshot does not list
+    them; return an empty list if it is too large for that."""
     if len(state) <= _MOST_SOUGHT and _OF_TWO.search(state):
         with suppress(Malformed):
             return list(scanned(state, stored=True).paired)

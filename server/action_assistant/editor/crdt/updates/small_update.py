@@ -26,12 +26,12 @@ _DEEPEST: Final = 8  # of arrays and objects in one value
 
 
 class _NotSmall(Exception):
-    """The update has a part that only the scanner can read"""
+    """The update has a part that only the scanner can read."""
 
 
 def small_outline(update: bytes) -> UpdateOutline | None:
-    """Return the outline of a small ordinary update, equal to the scanner's; None if only the
-    scanner can read it."""
+    """Return the outline (summary of contents) of a small ordinary update, equal to the scanner's;
+    None if only the scanner can read it."""
     if len(update) > _LARGEST:
         return None
     try:
@@ -41,8 +41,8 @@ def small_outline(update: bytes) -> UpdateOutline | None:
 
 
 def _outline(update: bytes) -> UpdateOutline:
-    """Return the outline of an update. Raise _NotSmall for an update that needs the scanner,
-    IndexError if it is too short."""
+    """Return the outline (summary of contents) of an update. Raise _NotSmall for an update that
+    needs the scanner, IndexError if it is too short."""
     needs: dict[int, int] = {}
     placed: list[Placed] = []
     brings: tuple[tuple[int, int, int], ...] = ()
@@ -81,7 +81,8 @@ def _outline(update: bytes) -> UpdateOutline:
 
 
 def _number(update: bytes, at: int) -> tuple[int, int]:
-    """Read a varUint of at most 56 bit; return it and the offset after it."""
+    """Read an unsigned number (varUint) of at most 56 bits at the offset `at`; return it and the
+    offset after it. Raise _NotSmall for a longer one."""
     byte = update[at]
     at += 1
     if byte < 128:
@@ -99,10 +100,10 @@ def _number(update: bytes, at: int) -> tuple[int, int]:
 def _beside(
     update: bytes, at: int, info: int, needs: dict[int, int]
 ) -> tuple[tuple[int, int], int]:
-    """Read the neighbours of a struct at the offset `at`; the bits of `info` say which of them are
-    written, at least one. Return the left neighbour (or else the right one) as client and clock,
-    and the offset after both. Raise the clocks in `needs` to include both, and raise _NotSmall if a
-    number is too large."""
+    """Read the neighbours of a struct (item) at the offset `at`; the bits of `info` say which of
+    them are written, at least one. Return the left neighbour (or else the right one) as Yjs client
+    and clock (number of an item), and the offset after both. Increase the clocks in `needs` to
+    include both; raise _NotSmall if a number is too large."""
     beside: tuple[int, int] | None = None
     for side in (0x80, 0x40):
         if info & side:
@@ -118,8 +119,8 @@ def _beside(
 
 
 def _root(update: bytes, at: int, info: int) -> tuple[bool, int]:
-    """Skip the name of a root and a key in it; return whether the key is one of an action, and the
-    offset."""
+    """Skip, at the offset `at`, the name of a root map and, if the bits of `info` say so, a key in
+    it. Return whether the key is that of an action, and the offset after it."""
     size = update[at + 1]
     if update[at] != 1 or size > 127:
         raise _NotSmall
@@ -135,7 +136,8 @@ def _root(update: bytes, at: int, info: int) -> tuple[bool, int]:
 
 
 def _content(update: bytes, at: int, kind: int) -> tuple[int, int]:
-    """Read the content of a struct. Return how many clocks it takes, and the offset behind it."""
+    """Skip the content of a struct, of this kind, at the offset `at`. Return how many clocks (item
+    numbers) it takes, and the offset after it. Raise _NotSmall for other kinds."""
     length, at = _number(update, at)
     if not 0 < length <= _LARGEST:
         raise _NotSmall
@@ -149,7 +151,8 @@ def _content(update: bytes, at: int, kind: int) -> tuple[int, int]:
 
 
 def _value(update: bytes, at: int, deepest: int) -> int:
-    """Skip one value; return the offset after it."""
+    """Skip one value at the offset `at`; return the offset after it. `deepest`: how many levels it
+    may have. Raise _NotSmall for an unusual value."""
     kind = update[at]
     at += 1
     if kind in {_TEXT, _BYTES}:

@@ -13,7 +13,8 @@ MOST_CLOCK: Final = 2**31 - 1
 
 
 class PairedText(msgspec.Struct, frozen=True, array_like=True):
-    """A text that begins at this clock of a client, with characters that take two clocks: as UTF-16."""
+    """A text in which some characters take two clocks (surrogate pairs). It begins at the clock
+    `start` (item number) of a Yjs client; `units`: the text as UTF-16."""
 
     client: int
     start: int
@@ -21,24 +22,23 @@ class PairedText(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def end(self) -> int:
-        """The first clock after the text."""
+        """The first clock (item number) of the client after the text."""
         return self.start + len(self.units) // 2
 
     def is_within(self, clock: int) -> bool:
-        """Return whether this clock is the second of a character of two."""
+        """Return whether this clock (item number) falls on the second half of a surrogate pair of
+        the text."""
         return (
             self.start < clock < self.end and self.units[2 * (clock - self.start) + 1] >> 2 == 0x37
         )
 
 
 class UpdateOutline(msgspec.Struct, frozen=True):
-    """The outline of an update.
-
-    `brings`: its structs, as `(client, from clock, to clock)`. `needs`: the next clock of each
-    client that a document must have before. `placed`: structs that may be nested. `fields`: keys
-    that may be new; `actions`: how many of these are actions. `structs`: the number of structs.
-    `paired`: texts with surrogate pairs, which must not be split.
-    """
+    """The outline (summary) of a Yjs update. A clock is the number of an item of a client.
+    `brings`: its structs (items), as `(client, from clock, to clock)`. `needs`: the next clock of
+    each client that a document must have before. `placed`: structs that may be nested. `fields`:
+    keys that may be new; `actions`: how many of these are actions. `structs`: the number of
+    structs. `paired`: texts with surrogate pairs, which must not be split."""
 
     brings: tuple[tuple[int, int, int], ...]
     needs: dict[int, int]
@@ -49,8 +49,8 @@ class UpdateOutline(msgspec.Struct, frozen=True):
     paired: tuple[PairedText, ...] = ()
 
     def ready(self, known: dict[int, int]) -> bool:
-        """Return whether a document with these next clocks of clients (`known`) has all that the
-        update builds on."""
+        """Return whether a document has all that the update builds on. `known`: the next clock
+        (item number) of each Yjs client in it."""
         ends: dict[int, int] = {}
         if len(self.brings) == 1:  # nearly always
             client, start, end = self.brings[0]

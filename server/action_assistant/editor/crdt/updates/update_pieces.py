@@ -15,8 +15,8 @@ _SKIP: Final = 10
 
 
 class _Structs:
-    """The structs of one client: `ends` in clocks, `offsets` in bytes, and the clocks that each
-    needs."""
+    """The structs (items) of one client: `ends` in clocks (item numbers), `offsets` in bytes, and
+    the clocks of other clients that each needs."""
 
     def __init__(self, start: int, offset: int) -> None:
         self.ends: Final = [start]
@@ -26,12 +26,12 @@ class _Structs:
 
     @property
     def reached(self) -> int:
-        """The clock up to which structs were given out."""
+        """The clock (item number) up to which structs are in earlier pieces."""
         return self.ends[self.given]
 
 
 class _Splitter(Scan):
-    """Records the offset of each struct of an update, and what it needs. Raises Malformed for an
+    """Records the offset of each struct of an update, and what it needs. Raise Malformed for an
     update with gaps."""
 
     def __init__(self, update: bytes) -> None:
@@ -79,7 +79,8 @@ def pieces_of(update: bytes, size: int = PIECE_BYTES) -> list[bytes]:
 
 
 def _packed(update: bytes, of: dict[int, _Structs], size: int) -> Iterator[bytes]:
-    """Yield pieces, each with a run of structs of every client that it brings something of."""
+    """Yield pieces of an update of about `size` bytes each, as updates of their own; a piece has
+    consecutive structs of each of its clients."""
     begun: dict[int, int] = {}  # the first struct of each client in this piece
     held = 0
     for client in _in_order(of):
@@ -95,8 +96,9 @@ def _packed(update: bytes, of: dict[int, _Structs], size: int) -> Iterator[bytes
 
 
 def _in_order(of: dict[int, _Structs]) -> Iterator[int]:
-    """Yield one client for each struct: it stands for the next struct of this client. Every struct
-    comes after those that it needs. Raise Malformed if structs need each other in a circle."""
+    """Yield a client for each struct, meaning the next struct of that client, in an order in which
+    every struct comes after the ones that it needs. Raise Malformed if structs need each other in a
+    circle."""
     for first in of:
         wanted = [(first, of[first].ends[-1])]  # clients, each up to a clock; the last one first
         while wanted:
@@ -114,8 +116,8 @@ def _in_order(of: dict[int, _Structs]) -> Iterator[int]:
 
 
 def _missing(of: dict[int, _Structs], client: int, structs: _Structs) -> tuple[int, int] | None:
-    """Return the client and clock that must come before the next of these structs; None if nothing
-    is missing."""
+    """Return the client and clock (item number) that must come before the next struct of `client`;
+    None if nothing is missing."""
     for other, clock in structs.needs[structs.given]:
         if other != client and other in of and of[other].reached < clock <= of[other].ends[-1]:
             return other, clock

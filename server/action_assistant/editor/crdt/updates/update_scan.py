@@ -40,46 +40,48 @@ _GC, _DELETED, _STRING, _SKIP = 0, 1, 4, 10
 
 
 def outline(update: bytes) -> UpdateOutline:
-    """Return the outline of an update. Raise Malformed if it cannot be read, exceeds the limits, or
-    would fail in a page."""
+    """Return the outline (summary of contents) of an update. Raise Malformed if it cannot be read,
+    exceeds the limits, or would fail in a page."""
     return small_outline(update) or scanned(update)
 
 
 def stored_outline(update: bytes) -> UpdateOutline:
-    """Return the outline of an update from the log, also of one that today's rules would refuse, so
-    that old graphs still open. Raise Malformed if it cannot be read."""
+    """Return the outline (summary of contents) of an update from the log, also of one that today's
+    rules would refuse, so that old graphs still open. Raise Malformed if it cannot be read."""
     return small_outline(update) or scanned(update, stored=True)
 
 
 def scanned(update: bytes, *, stored: bool = False) -> UpdateOutline:
-    """Return the outline of an update by reading all of it, without the short cut for small
-    updates. Raise Malformed if it cannot be read; with `stored`, an update that only today's
-    rules refuse is accepted."""
+    """Return the outline (summary of contents) of an update by reading all of it, without the short
+    cut for small updates. Raise Malformed if it cannot be read; with `stored`, an update that only
+    today's rules refuse is accepted."""
     scan = Scan(ByteReader(update), stored=stored)
     scan.whole()
     return scan.outline()
 
 
 def places_parted(update: bytes) -> list[tuple[int, int]]:
-    """Return the positions (client, clock) before which this update splits a text item. Raise
-    Malformed if it cannot be read."""
+    """Return the positions, as Yjs client and clock (item number), before which this update splits
+    a text item. Raise Malformed if it cannot be read."""
     scan = Scan(ByteReader(update), stored=True)
     scan.whole()
     return scan.parted
 
 
 def cut_items(update: bytes, known: Mapping[int, int]) -> list[int]:
-    """Return the client ids of which `known` (next clock by client) covers only the first part of
-    an item of this update. Raise Malformed if it cannot be read."""
+    """Return the Yjs client ids of which a document has only the first part of an item of this
+    update. `known`: the next clock (item number) of each client in the document. Raise Malformed if
+    the update cannot be read."""
     scan = Scan(ByteReader(update), stored=True)
     scan.whole()
     return [c for c, start, end in scan.items if start < known.get(c, 0) < end]
 
 
 class WrittenItem(NamedTuple):
-    """An item of an update, with the clocks from `start` to `end`. `place`: the name of a root and a key in it;
-    None where the item does not name them. Then they are those of the item `beside`, a client and a clock,
-    if there is one. `content`: the bytes after those."""
+    """An item of an update, with the clocks (item numbers of the client) from `start` to `end`.
+    `place`: the name of a root map and a key in it; None where the item does not name them. Then
+    they are those of the item `beside`, a client and a clock, if there is one. `content`: the bytes
+    after those."""
 
     client: int
     start: int
@@ -100,7 +102,8 @@ class WrittenUpdate(NamedTuple):
 
 
 def written(update: bytes) -> WrittenUpdate:
-    """Read the items of an update that a room took, or of a whole document. Raises Malformed."""
+    """Read the items of an update that a room accepted, or of a whole document. Raise Malformed if
+    it cannot be read."""
     scan = Scan(ByteReader(update), stored=True, collects=True)
     scan.whole()
     ends = {client: end for client, _, end in scan.outline().brings}
@@ -150,7 +153,7 @@ class Scan:
             raise Malformed("something follows the update")
 
     def outline(self) -> UpdateOutline:
-        """Return the outline of the update that was read."""
+        """Return the outline of the update that `whole` has read."""
         return UpdateOutline(
             tuple(self._brings),
             self._needs,
@@ -162,7 +165,7 @@ class Scan:
         )
 
     def _client_structs(self) -> None:
-        """Read all structs of the next client."""
+        """Read all structs of the next client in the update. Raise Malformed if they break a rule."""
         reader = self._reader
         count, client, clock = reader.number(), _client(reader), reader.number()
         if client in self._seen:
@@ -184,7 +187,9 @@ class Scan:
             self._needs[other] = max(end, self._needs.get(other, 0))
 
     def _one(self, client: int, start: int, info: int, needs: dict[int, int]) -> int:
-        """Read one struct; return the clock after it."""
+        """Read one struct of a client, whose first clock (item number) is `start`; return the clock
+        after it. `info`: its first byte; `needs`: is increased to the clocks that it needs. Raise
+        Malformed if it breaks a rule."""
         size, reference, fresh = self._struct(info, needs)
         if needs.get(client, 0) > start and not self._stored:
             raise Malformed("a struct that stands on itself or on a later one")
@@ -210,8 +215,10 @@ class Scan:
         return clock
 
     def _struct(self, info: int, needs: dict[int, int]) -> tuple[int, _Reference | None, _Fresh]:
-        """Read one struct. Return how many clocks it takes, the struct that gives its position, and
-        the kind of key that may be new."""
+        """Read one struct after its first byte, `info`. Return how many clocks (item numbers) it
+        takes, the struct that gives its position (None for a root), and the kind of key that may be
+        new. `needs`: is increased to the clocks that it needs. Raise Malformed if it breaks a rule.
+        """
         reader, kind = self._reader, info & 31
         if kind == _GC:
             return length(reader), None, _NONE
@@ -287,8 +294,8 @@ class ContentReader:
         self.paired = b""
 
     def content(self, kind: int) -> int:
-        """Read the content of one struct of this kind, and return how many clocks it takes. Raise
-        Malformed if it cannot be read."""
+        """Read the content of one struct of this kind, and return how many clocks (item numbers) it
+        takes. Raise Malformed if it cannot be read."""
         reader = self._reader
         self.paired = b""
         match kind:
@@ -319,8 +326,9 @@ class ContentReader:
         return 1
 
     def _texts_of_json(self) -> int:
-        """Read content that only the first versions of Yjs wrote, and return its clocks. It is
-        refused in new updates, since the library counts it otherwise than pages do."""
+        """Skip content that only the first versions of Yjs wrote, and return how many clocks (item
+        numbers) it takes. Raise Malformed for a new update, since the library counts such content
+        otherwise than pages do."""
         if not self._stored:
             raise Malformed("content that only the first Yjs wrote")
         count = length(self._reader)
@@ -371,7 +379,8 @@ class ContentReader:
             self._any()
 
     def _any(self) -> None:
-        """Skip one value, without recursion: a stack holds the number of members left."""
+        """Skip one value, without recursion: a stack holds the number of members left. Raise
+        Malformed if it breaks a rule."""
         reader = self._reader
         open_: list[tuple[int, bool]] = [(1, False)]
         while open_:
@@ -403,7 +412,7 @@ class ContentReader:
 
 
 def length(reader: ByteReader) -> int:
-    """Read the length of a struct in clocks. Raises Malformed for 0."""
+    """Read the length of a struct in clocks (item numbers). Raise Malformed for 0."""
     found = reader.number()
     if found == 0:
         raise Malformed("a struct of length 0")
@@ -417,5 +426,6 @@ def _counted(reader: ByteReader, count: int) -> int:
 
 
 def _no_constant(name: str) -> NoReturn:
-    """Refuse `NaN` and the infinities, which only Python's JSON knows. Raise ValueError always."""
+    """Raise ValueError for `NaN` and the infinities (`name`), which only Python's JSON parser
+    accepts."""
     raise ValueError(name)

@@ -92,8 +92,9 @@ class DraftMerges:
         self._checks = checks
 
     async def preview(self, draft: str, asked: AskedMerge) -> MergePreview:
-        """Compute a merge without storing anything. Raise NotFound for an unknown draft,
-        Unavailable if the journal cannot be read."""
+        """Compute the merge of a draft (`asked`: into which side, with which choices) without
+        storing anything. Raise NotFound for an unknown draft, Unavailable if the journal cannot be
+        read."""
         sides = (await self._drafts.pair(draft)).sides
         found = await self._index.value(previewed, await self._merge(sides, asked))
         return MergePreview(
@@ -110,9 +111,9 @@ class DraftMerges:
         )
 
     async def merge(self, draft: str, author: str, wanted: WantedMerge) -> MergedDraft:
-        """Merge the changes of the other side. Raise Conflict if a side has changed since the
-        preview or a conflict has no choice; NotFound for an unknown draft; Unavailable if the
-        journal cannot be written."""
+        """Merge a draft with its origin, as it was previewed (`wanted`), by one edit in the name of
+        `author`. Raise Conflict if a side has changed since the preview or a conflict has no
+        choice; NotFound for an unknown draft; Unavailable if the journal cannot be written."""
         row = (await self._drafts.pair(draft)).row
         target: str = row.draft_of if wanted.into == "origin" else draft
         async with self._rooms.enter(h.graph_stream(target)) as room:
@@ -136,21 +137,22 @@ class DraftMerges:
         return MergedDraft(target, now, seq > 0)
 
     async def _entered(self, graph: str, before: int, now: int, update: bytes) -> int:
-        """Return the change that this update became, among the changes after `before`; 0 if it
-        changed nothing."""
+        """Return the number of the change as which the log has this update, after the change
+        `before` and up to `now`; 0 if it has none, since it changed nothing."""
         events = await self._journal.read(h.graph_stream(graph), after=before, upto=now)
         return next((event.seq for event in events if event.body == update), 0)
 
     async def _merge(self, sides: DraftSides, asked: AskedMerge | WantedMerge) -> DraftMerge:
-        """Return the merge that is asked for, once the index knows the side that is brought in, for its
-        authors."""
+        """Return the merge to compute for a request, once the index has the side that is brought
+        in, for its authors."""
         source, target = sides.of(other_side(asked.into)), sides.of(asked.into)
         await bring_up(self._index, source.graph, source.seq)
         inside = await self._checks.inside(target, source)
         return DraftMerge(sides, asked.into, asked.choices, inside)
 
     async def _since(self, pair: DraftPair, source: str, target: str) -> int:
-        """Return the first change of one side that was not merged into the other."""
+        """Return the first change of the graph `source` (one side of a draft) that was not merged
+        into `target`, the other side."""
         if pair.row.base_graph == source:
             return int(pair.row.base_seq) + 1
         grafts = await self._index.value(grafts_of, source)
@@ -166,7 +168,7 @@ def _require_moments(sides: DraftSides, wanted: WantedMerge) -> None:
 
 
 def _require_choices(left: UnmadeChoices | None) -> None:
-    """Raise Conflict if a conflict has no choice."""
+    """Raise Conflict if there are conflicts without a choice (`left`; None: no conflict lacks one)."""
     if left is not None:
         things = "one thing" if left.count == 1 else f"{left.count} things"
         raise Conflict(

@@ -93,7 +93,8 @@ class DraftPair(msgspec.Struct, frozen=True):
 
 
 class Drafts:
-    """All drafts. Its methods raise NotFound for an id that is no draft or is deleted."""
+    """Makes, lists, proposes and answers drafts. Its methods raise NotFound for an id that is no
+    draft or is deleted. `author`: the id of the person for whom it acts."""
 
     def __init__(
         self,
@@ -111,9 +112,9 @@ class Drafts:
         self._distances: LruCache[_Moments, tuple[int, int]] = LruCache(_REMEMBERED)
 
     async def make(self, origin: str, author: str, new: NewDraft) -> DraftView:
-        """Make a draft of a graph. Raise BadInput for a bad name, NotFound for an unknown graph,
-        Conflict for a change that it does not have, Unavailable if the journal cannot be
-        written."""
+        """Make a draft of the graph `origin`. `new`: its name and the change to begin with. Raise
+        BadInput for a bad name, NotFound for an unknown graph, Conflict for a change that it does
+        not have, Unavailable if the journal cannot be written."""
         await self._catalogue.require(origin, "graph")
         name = " ".join(new.name.split())
         if len(name) > NAME_LIMIT:
@@ -126,7 +127,7 @@ class Drafts:
         return await self.get(made.id)
 
     async def of(self, origin: str) -> list[DraftView]:
-        """Return the drafts of a graph, the last changed first."""
+        """Return the drafts of the graph `origin` that are not deleted, the last changed first."""
         await self._catalogue.require(origin)
         there = graph_table.c.deleted_at.is_(None)
         rows = await self._rows(graph_table.c.draft_of == origin, there)
@@ -134,7 +135,7 @@ class Drafts:
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
     async def get(self, draft: str) -> DraftView:
-        """Return one draft. Raise NotFound if there is none with this id."""
+        """Return one draft. Raise NotFound if no draft has this id."""
         return await self._view(await self._row(draft))
 
     async def pair(self, draft: str) -> DraftPair:
@@ -150,7 +151,8 @@ class Drafts:
     # --- proposals --------------------------------------------------------------------------------
 
     async def propose(self, draft: str, author: str, note: str) -> DraftView:
-        """Propose a draft to be merged, with a note."""
+        """Propose that a draft, in its present state, be merged, with a note for others. Return the
+        draft."""
         await self._row(draft)
         seq = (await self._graph_reader.now(draft)).seq
         body = h.DraftProposed(note.strip(), seq, caller.device())
@@ -159,16 +161,17 @@ class Drafts:
         return await self.get(draft)
 
     async def withdraw(self, draft: str, author: str) -> DraftView:
-        """Withdraw a proposal. Raise Conflict if the draft is not proposed."""
+        """Withdraw the proposal of a draft, and return the draft. Raise Conflict if it is not
+        proposed."""
         if (await self._proposal(await self._row(draft)))[0] is None:
             raise Conflict("This draft is not proposed.")
         await self._journal.append(h.about_stream(draft), [h.draft(h.WITHDRAWN, author)])
         return await self.get(draft)
 
     async def answer(self, draft: str, author: str, body: h.DraftAnswered) -> DraftView:
-        """Answer another person's proposal with yes or no, about the draft's change that they have
-        seen. Raise BadInput for a malformed answer; Conflict if it is not proposed, has changed,
-        or the proposal is their own."""
+        """Answer another person's proposal with yes or no (`body`), about the draft's change that
+        `author` has seen; return the draft. Raise BadInput for a malformed answer; Conflict if it
+        is not proposed, has changed, or the proposal is their own."""
         row = await self._row(draft)
         proposal, device = await self._proposal(row)
         if proposal is None:
@@ -197,9 +200,9 @@ class Drafts:
         return await self.get(draft)
 
     async def _proposal(self, row: Row[Any]) -> tuple[DraftProposal | None, str]:
-        """Return the open proposal of a draft (None without one), and the browser it came from.
-        Answers that earlier versions stored to one's own proposal or to unknown changes do not
-        count."""
+        """Return the open proposal of a draft (None without one), and the id of the browser it came
+        from. Answers that earlier versions stored to one's own proposal or to unknown changes do
+        not count. `row`: of the draft."""
         found: DraftProposal | None = None
         device = ""
         answers: dict[str, DraftAnswer] = {}
@@ -227,7 +230,7 @@ class Drafts:
         return msgspec.structs.replace(found, answers=tuple(answers.values())), device
 
     async def _about(self, row: Row[Any]) -> Sequence[Row[Any]]:
-        """Return the events about a draft and its merges, in order of time."""
+        """Return the stored events about a draft (`row`) and its merges, in order of time."""
         event = editor_event.c
         streams = [h.about_stream(row.id), h.about_stream(row.draft_of)]
         return await self._journal.query(
@@ -267,7 +270,8 @@ class Drafts:
         self, row: Row[Any], origin: Row[Any]
     ) -> tuple[int | None, int | None, int]:
         """Return how many things the draft and the origin changed since they were equal (None if
-        the origin is deleted), and the last change of the origin."""
+        the origin is deleted), and the number of the last change of the origin. `row`, `origin`:
+        their rows."""
         newest = [await self._journal.newest(h.graph_stream(g)) for g in (origin.id, row.id)]
         if origin.deleted_at is not None:
             return None, None, newest[0]
@@ -291,6 +295,6 @@ class Drafts:
 
 
 def _ends_proposal(event: Row[Any], row: Row[Any]) -> bool:
-    """Return whether an event is the merge of the draft into its origin."""
+    """Return whether an event is the merge of the draft (`row`) into its origin."""
     merged = msgspec.json.decode(event.body, type=h.GraphMerged)
     return merged.draft == merged.source == str(row.id)

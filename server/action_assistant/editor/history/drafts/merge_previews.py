@@ -68,7 +68,7 @@ class DraftSides(msgspec.Struct, frozen=True):
     draft: GraphAtSeq
 
     def of(self, side: DraftSide) -> GraphAtSeq:
-        """Return the present state of one side."""
+        """Return the present state of one side, draft or origin."""
         return self.origin if side == "origin" else self.draft
 
 
@@ -83,12 +83,12 @@ class DraftMerge(msgspec.Struct, frozen=True):
 
     @property
     def target(self) -> GraphAtSeq:
-        """Return the side that is merged into."""
+        """Return the side of the draft that is merged into."""
         return self.sides.of(self.into)
 
     @property
     def source(self) -> GraphAtSeq:
-        """Return the side that is brought in."""
+        """Return the side of the draft whose changes are brought in."""
         return self.sides.of(other_side(self.into))
 
 
@@ -138,7 +138,7 @@ class WrittenPreview(msgspec.Struct, frozen=True):
 
 
 def previewed(connection: Connection, merge: DraftMerge) -> WrittenPreview:
-    """Preview a merge for the page, as JSON."""
+    """Compute a merge, and return its parts for the page as JSON."""
     found = merging(connection, merge)
     write_json = msgspec.json.encode
     return WrittenPreview(
@@ -153,7 +153,7 @@ def previewed(connection: Connection, merge: DraftMerge) -> WrittenPreview:
 
 
 def made_merge(connection: Connection, merge: DraftMerge) -> MadeMerge:
-    """Compute a merge with all that is needed to store it."""
+    """Compute a merge, and return the update to store and what is needed to check and record it."""
     found = merging(connection, merge)
     left = [conflict for conflict in found.conflicts if conflict.place not in merge.choices]
     unmade = UnmadeChoices(
@@ -168,7 +168,8 @@ def made_merge(connection: Connection, merge: DraftMerge) -> MadeMerge:
 def authors_of(
     connection: Connection, source: GraphAtSeq, places: Collection[Place]
 ) -> tuple[str, ...]:
-    """Return the authors of the present values of these keys, the last one first."""
+    """Return the ids of the authors of the present values of these places (root map and key) in
+    `source`, the last one first."""
     wanted = frozenset(places)
     owners = {owner_of(*place) for place in wanted}
     last = index_queries.latest(connection, source.graph, source.seq, owners)
@@ -179,19 +180,20 @@ def authors_of(
 
 
 def apart_since(connection: Connection, sides: DraftSides) -> tuple[int, int]:
-    """Return how many things the origin and the draft each changed since they were equal."""
+    """Return how many things the origin, and how many the draft, changed since they were equal."""
     maps: dict[DraftSide, Maps] = {side: read(sides.of(side)).moment.maps for side in DRAFT_SIDES}
     did = _did(_base_of(connection, sides), maps)
     return count(did["origin"]), count(did["draft"])
 
 
 def _base_of(connection: Connection, sides: DraftSides) -> Maps:
-    """Return the state in which both sides were last equal, as the index knows it."""
+    """Return, as root maps, the state in which both sides were last equal."""
     return maps_of(state_of(index_queries.at(connection, sides.base.graph, sides.base.seq)))
 
 
 def merging(connection: Connection, merge: DraftMerge) -> FoundMerge:
-    """Merge the source of a merge into its target. Nothing is stored."""
+    """Compute the merge of the source of `merge` into its target, with conflicts and new problems.
+    Nothing is stored."""
     was, into = _base_of(connection, merge.sides), merge.into
     maps_by_side = {side: read(merge.sides.of(side)).moment.maps for side in DRAFT_SIDES}
     ours, mine = merge.target, read(merge.target)
@@ -218,7 +220,7 @@ def merging(connection: Connection, merge: DraftMerge) -> FoundMerge:
 
 
 def count(changes: Changes) -> int:
-    """Count the things that were changed."""
+    """Return how many things were changed, those not listed included."""
     kinds = (changes.fields, changes.actions, changes.relations, changes.notes)
     return sum(map(len, kinds)) + changes.more
 
@@ -240,7 +242,8 @@ class _Teller:
         self.did: Final = _did(base, sides)
 
     def label(self, owner: str) -> str:
-        """Return the name of an action, arrow or note as people read it."""
+        """Return the name of an action or arrow for people; for other keys (`owner`) "the note" or
+        "the graph"."""
         ends = ends_of(owner)
         if ends is not None:
             return f"{self._name(ends.parent)} → {self._name(ends.child)}"
@@ -266,7 +269,8 @@ class _Teller:
         return self._names.get(key, key if key in {ENTRY, EXIT} else "an action that is gone")
 
     def _thing(self, conflict: FoundConflict, side: DraftSide) -> Changes:
-        """Return the changes of a side to an action and its arrows, or to an arrow."""
+        """Return the changes of one side to the action of a conflict and its arrows, or to its
+        arrow."""
         found = self._differences[side]
         owner, ends = conflict.owner, ends_of(conflict.owner)
 
@@ -298,8 +302,8 @@ class _Teller:
 
 
 def _words(root: str, key: str) -> str:
-    """Return the words for people that name a field of the document, given by its root map and key,
-    such as “input speed”."""
+    """Return the words for people that name a field of a document, such as “input speed”. `root`,
+    `key`: its root map and key."""
     field = key if root == "meta" else key.partition("|")[2]
     if root == "positions":
         return "text"
@@ -324,7 +328,7 @@ def _changes(before: Graph, after: Graph, owners: Iterable[str]) -> Changes:
 
 
 def other_side(side: DraftSide) -> DraftSide:
-    """Return the other one of origin and draft."""
+    """Return the other side: "draft" for "origin", and "origin" for "draft"."""
     return "draft" if side == "origin" else "origin"
 
 
@@ -337,7 +341,7 @@ def _named(side: Side, into: DraftSide) -> DraftSide:
 
 
 def _places(maps: Maps) -> dict[Place, Any]:
-    """Return the keys and values that a merge considers: all but comments."""
+    """Return the values that a merge considers, by root map and key: all but comments."""
     return {
         (root, key): value
         for root in ROOTS

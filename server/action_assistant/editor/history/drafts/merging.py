@@ -52,13 +52,14 @@ class KeyMerge(msgspec.Struct, frozen=True):
 
 
 def merged(base: Places, ours: Places, theirs: Places, choices: Choices) -> KeyMerge:
-    """Merge the changes of `theirs` into `ours`, key by key; `base` is their common origin."""
+    """Merge the changes of `theirs` into `ours`, key by key; `base` is their common origin.
+    `choices`: the side that counts for each conflict, by its place."""
     merge = _Merge(_plain(base), _plain(ours), _plain(theirs), choices)
     return merge.outcome()
 
 
 def _plain(places: Places) -> dict[Place, Any]:
-    """Return the values that are not None, without comments, which are not merged."""
+    """Return the entries that have a value, without comments, which are not merged."""
     return {p: value for p, value in places.items() if p[0] != "comments" and value is not None}
 
 
@@ -88,7 +89,7 @@ class _Merge:
         self._result: dict[Place, Any] = {}
 
     def outcome(self) -> KeyMerge:
-        """Merge all keys and return the result."""
+        """Merge all keys, and return the values to set and the conflicts."""
         actions = [owner for owner in sorted(self._owners) if is_aid(owner)]
         arrows = [owner for owner in sorted(self._owners) if ends_of(owner) is not None]
         self._take_whole(actions, self._is_used)
@@ -118,8 +119,9 @@ class _Merge:
     # --- what came or went ------------------------------------------------------------------------
 
     def _take_whole(self, owners: Iterable[str], matters: Callable[[str, Side], bool]) -> None:
-        """Choose the side of each thing that one side removed: that side, or after a conflict the
-        chosen side. All its keys come from that side."""
+        """Decide, for each thing (`owners`: keys) that one side removed, from which side all its
+        keys come: the one that removed it or, if `matters` says that the other side's changes to it
+        matter, after a conflict the chosen side."""
         for owner in owners:
             there: list[Side] = [side for side in self._there if owner in self._there[side]]
             if owner in self._whole or owner not in self._was or len(there) != 1:
@@ -141,7 +143,7 @@ class _Merge:
         )
 
     def _is_changed(self, owner: str, side: Side) -> bool:
-        """Return whether a side changed a thing other than its position."""
+        """Return whether a side changed a thing (`owner`: its key) in more than its position."""
         now = self._sides[side]
         return any(
             not is_same(self._base.get(place, UNSET), now.get(place, UNSET))
@@ -179,8 +181,8 @@ class _Merge:
         return self._choices.get(name, "ours")
 
     def _join(self, place: Place) -> None:
-        """Merge an ordered list of names: our list, without the names that they removed, and with
-        the names that they added at its end."""
+        """Merge an ordered list of names at `place` (root map and key): our list, without the names
+        that they removed, and with the names that they added at its end."""
         values = [side.get(place, UNSET) for side in (self._base, *self._sides.values())]
         if (side := chosen(*values)) is not None:
             self._take([place], side)

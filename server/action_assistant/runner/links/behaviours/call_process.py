@@ -26,7 +26,8 @@ _TEXT: Final = 500  # characters of each
 
 
 class BadOutput(Exception):
-    """Output of a behaviour that breaks the rules, for which it is killed; the message is a sentence for people."""
+    """Output of a behaviour (the Python file that plays an action in a simulation) that breaks the
+    rules, for which it is killed. The message is a sentence for people."""
 
 
 class OutputLine(msgspec.Struct, frozen=True, tag_field="kind", tag="output"):
@@ -53,8 +54,8 @@ _Line: TypeAlias = OutputLine | MessageLine | DoneLine
 
 
 class LineReader:
-    """Splits chunks of bytes into lines and passes each on. A line that is too long is cut (`cut`), or raises
-    BadOutput."""
+    """Splits chunks of bytes into lines and passes each on. With `cut`, a line that is too long is
+    cut; without, it raises BadOutput."""
 
     def __init__(self, hear: Callable[[bytes], None], *, cut: bool) -> None:
         self._hear = hear
@@ -63,7 +64,7 @@ class LineReader:
         self._drops = False
 
     def take(self, chunk: bytes) -> None:
-        """Take in the next chunk of bytes."""
+        """Process the next chunk of bytes: pass on the lines that it completes."""
         *whole, rest = chunk.split(b"\n")
         for each in whole:
             self._add(each)
@@ -74,7 +75,7 @@ class LineReader:
         self._add(rest)
 
     def end(self) -> None:
-        """Take in the end of the output: a last line without a line end counts as a line."""
+        """Process the end of the output: a last line without a line end counts as a line."""
         if self._rest and not self._drops:
             self._hear(bytes(self._rest))
         self._rest.clear()
@@ -94,7 +95,8 @@ class LineReader:
 
 
 class CallOutput:
-    """The checked output of one call. `types`: the types of the action's outputs, by flat name."""
+    """Collects and checks the output of one call of a behaviour. `types`: the types of the action's
+    outputs, by flat name."""
 
     def __init__(self, types: dict[str, str]) -> None:
         self._types = types
@@ -119,11 +121,12 @@ class CallOutput:
                 self.done = self.done or said
 
     def take_printed(self, line: bytes) -> None:
-        """Add one line that the behaviour has printed."""
+        """Add one line that the behaviour has printed; only the first ones are kept."""
         self._printed.add(line.decode(errors="replace"))
 
     def text(self, *more: str) -> str | None:
-        """Return the messages and printed lines, followed by `more`, as one text; None if there are none."""
+        """Return the messages and printed lines, followed by `more`, as one text; None if there is
+        no line at all."""
         lines = [*self._messages.lines("messages"), *self._printed.lines("printed lines"), *more]
         return "\n".join(lines) or None
 
@@ -158,8 +161,9 @@ class _Kept:
 
 
 def value_of(kind: str, value: Any) -> Any:
-    """Return a value as an engine holds it for this type, numbers as floats; any value for a type
-    that is not native. Raise ValueError or OverflowError if it does not have the type."""
+    """Return a value of an output as an engine holds it for the type `kind` (numbers as floats, a
+    type with a final `s` is a list); for a type that engines do not know, return it unchanged.
+    Raise ValueError or OverflowError if it does not have the type."""
     if kind.endswith("s") and (one := kind[:-1]) in _NATIVE:
         if not isinstance(value, list):
             raise ValueError
@@ -231,7 +235,8 @@ class CallProcess:
             self._wake()
 
     def kill(self, why: str) -> str | None:
-        """Kill the call; `ended` is called when that is done. Return its messages so far and `why`, as one text."""
+        """Kill the call, and return its messages so far and the reason `why` as one text. The call
+        does not wait: `ended` is called when the process has ended."""
         with self._lock:
             self._wrong = self._wrong or why
             self._wake()
@@ -316,8 +321,8 @@ class CallProcess:
             self._take(lines.end)
 
     def _write_on(self, supervisor: Supervisor, selector: selectors.BaseSelector) -> None:
-        """Write as much to the behaviour as it accepts, and let the selector report when it accepts
-        more."""
+        """Write as much of the waiting commands to the behaviour as it accepts without waiting, and
+        have the selector report when it accepts more."""
         if self._order:
             self._order = self._order[supervisor.write(self._order) :]
         with self._lock:
@@ -330,7 +335,8 @@ class CallProcess:
             selector.unregister(supervisor.commands)
 
     def _hear(self, number: int, lines: LineReader) -> bool:
-        """Read one chunk; return whether more may come."""
+        """Read one chunk from the descriptor `number` and pass it to `lines`. Return False at the
+        end of the output, or if none is there now."""
         try:
             chunk = os.read(number, _CHUNK)
         except BlockingIOError:
@@ -341,7 +347,8 @@ class CallProcess:
         return bool(chunk)
 
     def _take(self, said: Callable[[], None]) -> None:
-        """Take in output; output that breaks the rules is kept as the reason to kill the call."""
+        """Call `said`, which processes output. If it raises BadOutput, keep the reason, for which
+        the call is killed then; later output is ignored."""
         with self._lock:
             try:
                 if not self._wrong:

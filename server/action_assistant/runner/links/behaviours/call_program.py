@@ -45,12 +45,12 @@ class PerformedAction:
 
     @property
     def stopped(self) -> bool:
-        """True once the action was told to stop; five seconds later it is killed."""
+        """True once the action was asked to stop; five seconds later it is killed."""
         return self._stopped
 
     def sleep(self, seconds: float) -> bool:
-        """Wait for so many seconds, not counting a pause. Return False at once if the action is
-        told to stop; `run` should return soon then."""
+        """Wait for so many seconds, not counting a pause. Return True at the end, and False at once
+        if the action is asked to stop; `run` should return soon then."""
         left = float(seconds)
         with self._changed:
             while not self._stopped and (self._paused or left > 0):
@@ -62,7 +62,8 @@ class PerformedAction:
             return not self._stopped
 
     def message(self, text: object) -> None:
-        """Add a message to the run, which keeps the first 20 of a call."""
+        """Add a message (any object, as text of 10,000 characters at most) to the run, which keeps
+        the first 20 of a call."""
         self._say(kind="message", text=str(text)[:10_000])
 
     def _told(self, command: str) -> None:
@@ -227,7 +228,9 @@ def _obey(commands: TextIO, action: PerformedAction) -> None:
 
 
 def _result(file: str, source: str, action: PerformedAction) -> tuple[bool, str | None]:
-    """Run the behaviour; return its result and what went wrong, None for nothing."""
+    """Run the behaviour, the Python text `source` of the file `file`, with `action` as its
+    argument. Return its result and the error text, None without an error. The result is True unless
+    it returned False."""
     linecache.cache[file] = (len(source), None, source.splitlines(keepends=True), file)
     try:
         known: dict[str, Any] = {"__name__": file.removesuffix(".py"), "__file__": file}

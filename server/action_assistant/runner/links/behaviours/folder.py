@@ -21,7 +21,7 @@ _MOST: Final = 1_000  # names of a list
 
 
 class Unusable(Exception):
-    """The file of an action cannot be run; the message is a sentence for people."""
+    """The behaviour of an action cannot be run; the message is a sentence for people."""
 
 
 class BehaviourList(msgspec.Struct, frozen=True):
@@ -35,8 +35,8 @@ class BehaviourList(msgspec.Struct, frozen=True):
 
 
 class BehaviourFolder(msgspec.Struct, frozen=True):
-    """A folder with one Python file for each action that has a behaviour, named by the
-    administrator."""
+    """A folder of the administrator with behaviours: one Python file for each action that is played
+    by code in simulations."""
 
     path: Path
 
@@ -56,7 +56,7 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
         return found
 
     def has(self, name: str) -> bool:
-        """Return whether a file for actions of this name exists, usable or not."""
+        """Return whether a file for actions of this name exists, even if it could not be run."""
         if (file := file_of(name)) is None:
             return False
         try:
@@ -86,7 +86,9 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
             raise Unusable(f"The behaviour {file} cannot be read: {why}.") from error
 
     def listed(self, names: Iterable[str] | None = None) -> BehaviourList:
-        """List the behaviours in the folder, or only those for actions of these names."""
+        """List the behaviours in the folder, or only those for the actions in `names`; the first
+        ones if there are very many. A folder or file that cannot be used is reported in the result,
+        not raised."""
         try:
             with self._entered() as folder, os.scandir(folder) as entries:
                 found = [_FILE.fullmatch(each.name) for each in entries]

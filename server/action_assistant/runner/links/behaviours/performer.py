@@ -35,7 +35,8 @@ def bound_address_space() -> None:
 
 
 class BehaviourPerformer:
-    """The calls of one engine. `wake` is called on other threads when a call has ended."""
+    """Runs the calls of behaviours for one simulated engine, each in a process of its own. `wake`
+    is called on another thread when a call has ended. A call is named by its number."""
 
     takes_graphs = False
 
@@ -54,7 +55,8 @@ class BehaviourPerformer:
             return bool(self._given_up)
 
     def performs(self, action: Action, *, inside: bool) -> bool:
-        """Return whether a file for actions of this name exists, usable or not."""
+        """Return whether an action is played by a behaviour: a file for its name exists, even if it
+        could not be run. `inside`: the action is in a sub-graph, which makes no difference here."""
         return self._folder.has(action.name)
 
     def begin(self, call: Call) -> None:
@@ -74,19 +76,21 @@ class BehaviourPerformer:
         self._end(Returned(number=call.number, result="on_error", message=why))
 
     def stop(self, number: int) -> None:
-        """Tell a call to stop; it has the 5 s that the engine waits."""
+        """Ask the call `number` to stop, without waiting; it has the 5 s that the engine waits."""
         self._tell(number, "stop")
 
     def pause(self, number: int) -> None:
-        """Tell a call to pause: its `sleep` then lasts until it is resumed."""
+        """Ask the call `number` to pause, without waiting: its `sleep` then lasts until it is
+        resumed."""
         self._tell(number, "pause")
 
     def resume(self, number: int) -> None:
-        """Tell a paused call to go on."""
+        """Let the paused call `number` go on, without waiting."""
         self._tell(number, "resume")
 
     def give_up(self, number: int) -> str | None:
-        """Kill a call; return its messages so far, None if it has ended already."""
+        """Kill the call `number`, without waiting; return its messages so far, None if it has ended
+        already."""
         with self._lock:
             process = self._calls.get(number)
             if process is None:
@@ -103,17 +107,17 @@ class BehaviourPerformer:
 
     @property
     def is_busy(self) -> bool:
-        """True while a call runs, or `taken` has a result."""
+        """True while a call runs, or `taken` would return a result."""
         with self._lock:
             return bool(self._calls or self._returned)
 
     @property
     def has_returned(self) -> bool:
-        """True while `taken` has a result."""
+        """True while `taken` would return a result."""
         return bool(self._returned)
 
     def kill_all(self) -> list[CallProcess]:
-        """Kill all calls; return those that were running."""
+        """Kill all calls without waiting for their end; return the ones that were running."""
         with self._lock:
             going = list(self._calls.values())
         for process in going:
@@ -134,7 +138,8 @@ class BehaviourPerformer:
             process.tell(command)
 
     def _end(self, returned: Returned) -> None:
-        """Note that a call has ended; mostly called on the thread of that call."""
+        """Store the result of a call that has ended, and call `wake`. Mostly called on the thread
+        of that call."""
         with self._lock:
             self._calls.pop(returned.number, None)
             self._returned.append(returned)

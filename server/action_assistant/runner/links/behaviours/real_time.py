@@ -25,12 +25,12 @@ def simulate_in_real_time(
     states: Mapping[Key, str],
     signatures: Mapping[str, Signature] | None = None,
 ) -> Iterator[Trace]:
-    """Yield every event from the start of a graph until nothing is left to do, until `until_ms`, or for
-    `max_events` events.
-
-    `commands` are (ms, verb, graph name or None), as for `umrf.semantics.simulate`. Behaviours that still run
-    at the end are killed.
-    """
+    """Play a graph with the behaviours in `folder`, and yield every event from its start until
+    nothing is left to do, until `until_ms`, or for `max_events` events. It takes real time: the
+    generator waits between events. `script`: how actions without a behaviour act; `library`: the
+    sub-graphs by name; `commands`: (ms, verb, graph name or None), as for
+    `umrf.semantics.simulate`; `states`: those in which nodes begin; `signatures`: of actions, by
+    name. Behaviours that still run at the end are killed."""
     performer, news = BehaviourPerformer(folder), threading.Event()
     performer.wake = news.set
     engine = Engine(
@@ -73,7 +73,9 @@ def _next(
     now: float,
     graph: Graph,
 ) -> list[Trace]:
-    """Process what is due at `now` (ms): commands, results of behaviours, steps of the engine."""
+    """Process what is due at `now` (ms): commands, which are removed from `pending`, results of
+    behaviours, and steps of the engine. Return the events. `graph`: the one that a command without
+    a name is for."""
     traces: list[Trace] = []
     while pending and pending[0][0] <= now:
         at_ms, verb, name = pending.pop(0)

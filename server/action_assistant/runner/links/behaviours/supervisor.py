@@ -26,8 +26,8 @@ _KNOWN: Final = (
 
 
 class Supervisor:
-    """A process that starts a behaviour and kills all its descendants when the behaviour ends, when `let_go` is
-    called, or when the runner dies. Used on one thread."""
+    """A process that starts a behaviour and kills all its descendants when the behaviour ends, when
+    `let_go` is called, or when the runner dies. Must be used on one thread."""
 
     def __init__(self) -> None:
         """Start the process. Raise OSError if the system cannot start it."""
@@ -83,7 +83,8 @@ class Supervisor:
         return self._commands.fileno()
 
     def write(self, text: bytes) -> int:
-        """Write to the behaviour without waiting; return how many bytes were taken."""
+        """Write commands to the behaviour without waiting; return how many bytes were accepted.
+        After its end all bytes count as accepted."""
         try:
             return self._commands.send(text)
         except BlockingIOError:
@@ -118,8 +119,8 @@ class Supervisor:
         return False
 
     def ended(self) -> int:
-        """Return how the behaviour's process ended, as its exit code or minus its signal, once every descendant
-        has ended. Call it after the process has ended."""
+        """Return how the behaviour's process ended, as its exit code or minus its signal, once
+        every descendant has ended. Call it after `is_over` was true."""
         code: int = self._process.wait()
         if code >= 0:  # the supervisor has waited for all its descendants
             return code if code < 128 else 128 - code

@@ -19,12 +19,9 @@ _MAKE: Final = "`make ros` in a checkout, or `source` the ROS 2 workspace before
 def ros2_reach(
     clock_us: Callable[[], int], environ: Mapping[str, str] = os.environ
 ) -> "Reach | str":
-    """Return a reach over ROS 2, or one sentence why this process can have none. `clock_us`: gives
-    microseconds UTC.
-
-    rclpy is imported only here, since an editor's computer has none, and its wheels restart their
-    interpreter.
-    """
+    """Return the reach (maker of links) over ROS 2, or one sentence why this process can have none.
+    `clock_us`: returns microseconds UTC; `environ`: the environment variables. rclpy is imported
+    only here, since an editor's computer has none, and its wheels restart their interpreter."""
     missing = why_not(environ)
     if missing:
         return missing
@@ -37,7 +34,8 @@ def ros2_reach(
 
 
 def why_not(environ: Mapping[str, str] = os.environ) -> str:
-    """Return why this interpreter cannot speak ROS 2; "" when it can."""
+    """Return the sentence why this interpreter cannot use ROS 2 with the environment variables
+    `environ`; "" if it can."""
     version = f"{sys.version_info.major}.{sys.version_info.minor}"
     ros_workspace.offer(environ)
     if importlib.util.find_spec("rclpy") is None:
@@ -75,8 +73,8 @@ def why_not(environ: Mapping[str, str] = os.environ) -> str:
 
 
 def _survives(rmw: str, environ: Mapping[str, str]) -> bool:
-    """Return whether rclpy can be imported with this middleware. It is tried in a process of its own, which an
-    unknown middleware ends with code 102."""
+    """Return whether rclpy can be imported with the middleware `rmw`. That is tried in another
+    process, for which the call waits: an unknown middleware ends its process with code 102."""
     asked = {**environ, "RMW_IMPLEMENTATION": rmw}
     command = [
         *(sys.executable, "-c"),

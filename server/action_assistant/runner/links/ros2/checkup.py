@@ -43,8 +43,9 @@ async def look(
     clock_us: Callable[[], int],
     environ: Mapping[str, str] = os.environ,
 ) -> list[Diagnostic]:
-    """Return all findings, those about the environment first. This takes some seconds; a fault of
-    ROS 2 is a finding and not raised."""
+    """Examine the ROS 2 environment and the registered `robots`, and return all findings, first
+    those about the environment. `clock_us`: returns microseconds UTC; `environ`: the environment
+    variables. This takes some seconds; a fault of ROS 2 is a finding and not raised."""
     seen = [*_sourced(environ), *_domain(environ)]
     reach = ros2_reach(clock_us, environ)
     if isinstance(reach, str):
@@ -89,7 +90,8 @@ async def look(
 
 
 def _no_reach(why: str, robots: Sequence[Registration]) -> Diagnostic:
-    """Return the finding for a process that cannot reach robots. Without registered robots that is no fault."""
+    """Return the finding for a process that cannot reach robots, for the reason `why`. It is a
+    fault only if robots are registered or a setting is wrong."""
     if "ROS_DOMAIN_ID" in why:
         return found(
             "domain-wrong", "ROS_DOMAIN_ID", why, "Set it to the robot's domain, or unset it."
@@ -140,8 +142,9 @@ def _domain(environ: Mapping[str, str]) -> list[Diagnostic]:
 
 
 def shared_memory(environ: Mapping[str, str]) -> list[Diagnostic]:
-    """Return the reasons that keep nodes of this computer from sharing memory with this process.
-    Another check reports missing shared memory."""
+    """Return findings about what keeps the nodes of this computer from sharing memory with this
+    process: a private /dev/shm of a container, or another user. Missing shared memory is found by
+    another check."""
     if not sys.platform.startswith("linux") or _SAYS_FASTRTPS in environ:
         return []
     seen: list[Diagnostic] = []
@@ -189,7 +192,7 @@ def _owners() -> set[int]:
 
 
 def _origin(module: str) -> str:
-    """Return the folder that a package of ROS 2 was installed to, for people."""
+    """Return, for people, the folder in which the Python package `module` of ROS 2 is installed."""
     place = getattr(importlib.import_module(module), "__file__", None)
     return ros_workspace.prefix_of(place) if place else "an unknown place"
 
@@ -197,8 +200,9 @@ def _origin(module: str) -> str:
 async def _standings(
     reach: Reach, robots: Sequence[Registration], seen: list[Diagnostic]
 ) -> list[tuple[Registration, Standing]]:
-    """Return the standing of each registered robot, all asked at once; robots with a bad profile
-    are added to `seen` instead. Raise RuntimeError if a ROS domain cannot be joined."""
+    """Return the condition of the engine of each registered robot; the call waits up to some
+    seconds for all of them at once. A robot with a bad profile gets a finding in `seen` instead.
+    Raise RuntimeError if a ROS domain cannot be joined."""
     links: list[tuple[Registration, Link]] = []
     for each in robots:
         try:
@@ -218,7 +222,7 @@ async def _standings(
 
 
 async def _answering(link: Link) -> None:
-    """Wait until the engine of a link answers."""
+    """Wait until discovery shows that the engine of a link answers; without a timeout of its own."""
     answers = anyio.Event()
 
     def hear(report: Report) -> None:
@@ -234,7 +238,8 @@ def _likely(
     unseen: Sequence[Registration], strangers: Sequence[Candidate]
 ) -> dict[str, list[Candidate]]:
     """Return, by robot, the engines on other domains that may be the robot's: those with its name
-    and, if it is the only missing robot, those without a name."""
+    and, if it is the only missing robot, those whose name is unknown. `unseen`: robots whose engine
+    does not answer; `strangers`: engines that belong to no registered robot."""
     nameless = len(unseen) == 1
     found = {
         robot.name: [
@@ -249,8 +254,8 @@ def _likely(
 
 
 def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
-    """Return the finding about one robot. `standing` is what discovery shows of its engine;
-    `elsewhere` are engines on other domains that may be the engine of this robot."""
+    """Return the finding about one robot. `standing`: the condition of its engine, as discovery
+    shows it; `elsewhere`: engines on other domains that may be the engine of this robot."""
     if standing.generation == "older":
         return found(
             "robot-older",
@@ -274,8 +279,8 @@ def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidat
 
 
 def _silent(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
-    """Return the finding for a robot that does not answer, with the reason, if it is visible from
-    this computer."""
+    """Return the finding for a robot that does not answer, with the reason as far as it can be seen
+    from this computer. The parameters are those of `_robot`."""
     if "RMW_IMPLEMENTATION" in standing.why:
         return found(
             "robot-middleware",
@@ -314,9 +319,10 @@ def _engines(
     strangers: Sequence[Candidate],
     unseen: Sequence[Registration],
 ) -> list[Diagnostic]:
-    """Return findings for unregistered engines, and for faults of any engine. `unseen`: robots
-    whose engine is not seen; an engine without a name may be any of them, which the finding
-    says."""
+    """Return findings for engines that nobody registered, and for faults of any engine.
+    `candidates`: all engines in sight; `strangers`: those that belong to no registered robot;
+    `unseen`: robots whose engine does not answer; an engine without a name may be any of them,
+    which the finding says."""
     seen: list[Diagnostic] = []
     for each in candidates:
         place = f"{each.get_service}, domain {each.domain}"
@@ -342,7 +348,7 @@ def _engines(
 
 
 def _some(names: Sequence[str]) -> str:
-    """Return the first names, and how many more there are."""
+    """Return the first names, and how many more there are, as a text."""
     more = len(names) - _NAMED
     if more <= 0:
         return ", ".join(names)

@@ -63,13 +63,15 @@ Subscriber: TypeAlias = Callable[[RosValue], None]
 
 
 class Domain:
-    """The participation of this process in one domain."""
+    """The participation of this process in one ROS domain: its node, publishers, subscriptions, and
+    the thread that receives messages."""
 
     def __init__(
         self, number: int, topics: Topics, loop: asyncio.AbstractEventLoop, clock_us: Clock
     ) -> None:
-        """Join the domain. This takes up to some seconds, so it is called in a thread. Raise
-        RuntimeError if the middleware does not show this process to itself."""
+        """Join the domain `number` with these topics. `loop`: the event loop to which messages are
+        passed; `clock_us`: returns microseconds UTC. This blocks for up to some seconds, so call it
+        in a thread. Raise RuntimeError if the middleware does not show this process to itself."""
         self.number = number
         self.topics = topics
         self.actors: set[str] = set()  # names in feedback so far
@@ -98,7 +100,8 @@ class Domain:
         self._thread.start()
 
     def leave(self) -> None:
-        """End the thread, then destroy the node. Waits for both, so it is called in a thread."""
+        """End the thread, then destroy the node. Blocks until both have ended, so call it in a
+        thread."""
         self._leaving = True
         self._executor.create_task(
             lambda: None
@@ -117,11 +120,10 @@ class Domain:
     # --- the one question ---------------------------------------------------------------------
 
     async def ask(self, path: str) -> GetResult:
-        """Call the get service of the name `path` and return the server's answer. The call has no
-        timeout of its own. If the caller cancels it, an answer that comes later is dropped.
-
-        Raise NotAGraph if a graph in the answer cannot be read, RuntimeError if the call fails.
-        """
+        """Call the get service of the name `path`, wait for the server's answer and return it. The
+        call has no timeout of its own. If the caller cancels it, an answer that comes later is
+        dropped. Raise NotAGraph if a graph in the answer cannot be read, RuntimeError if the call
+        fails."""
         loop = asyncio.get_running_loop()
         answered: asyncio.Future[GetResult] = loop.create_future()
         client, asked_at = self.client(path), self._clock_us()
@@ -135,7 +137,8 @@ class Domain:
                 answered.set_result(got)
 
         def read(future: Future) -> None:
-            """Decode the answer, on the thread of this domain, so that megabytes do not block the event loop."""
+            """Decode the answer in a completed future, on the thread of this domain, so that
+            megabytes do not block the event loop, and hand it to the caller there."""
             if future.cancelled():
                 return
             try:
@@ -161,16 +164,16 @@ class Domain:
     # --- who is there -------------------------------------------------------------------------
 
     def servers(self, path: str) -> tuple[Endpoint, ...]:
-        """Return the servers of the get service on a path, without those of this process."""
+        """Return the servers of the get service on a path; those of this process are not included."""
         raw = self._node.get_subscriptions_info_by_topic(f"rq{_absolute(path)}Request", True)
         return self._others(raw)
 
     def listeners(self, topic: str) -> tuple[Endpoint, ...]:
-        """Return the subscriptions to a topic, without those of this process."""
+        """Return the subscriptions to a topic; those of this process are not included."""
         return self._others(self._node.get_subscriptions_info_by_topic(topic))
 
     def publishers(self, topic: str) -> tuple[Endpoint, ...]:
-        """Return the publishers on a topic, without those of this process."""
+        """Return the publishers on a topic; those of this process are not included."""
         return self._others(self._node.get_publishers_info_by_topic(topic))
 
     def is_emulated(self, path: str, server: Endpoint) -> bool:
@@ -179,7 +182,7 @@ class Domain:
         return any(each.process == server.process for each in marks)
 
     def paths(self) -> tuple[str, ...]:
-        """Return every path with a get service of the engines' type."""
+        """Return the names (paths) of all services of the type of an engine's get."""
         found = self._node.get_service_names_and_types()
         return tuple(name for name, kinds in found if _KIND in kinds and self.servers(name))
 
@@ -215,7 +218,8 @@ class Domain:
     # --- what comes by itself -----------------------------------------------------------------
 
     def hearing(self, subscriber: Subscriber) -> AbstractContextManager[None]:
-        """Call `subscriber` with every value that is heard until the end of the block, on the event loop."""
+        """Return a context during which `subscriber` is called with every message that this process
+        receives, on the event loop."""
         return self._subscribers.listening(subscriber)
 
     def _listen(self) -> None:
@@ -230,7 +234,8 @@ class Domain:
 
     def _overhear(self, command: Command, kind: type[M], topic: str, ours: Outlet[M]) -> None:
         def heard(message: M, info: dict[str, int | None]) -> None:
-            """Report a command unless this process has sent it."""
+            """Report a command that another program has published. `info`: of the middleware, with
+            the time of sending."""
             if ours.sent(message, info.get("source_timestamp")):
                 return
             graph, umrf = _named(message)
@@ -322,8 +327,8 @@ def _endpoint(info: TopicEndpointInfo) -> Endpoint:
 
 
 def _named(message: Message) -> tuple[str, str]:
-    """Return the name of the graph that a command concerns, as engines see it, and the text of the
-    graph. A name inside the text overrides the one beside it."""
+    """Return the name of the graph that a command message concerns, as engines see it, and the text
+    of the graph, "" if it carries none. A name inside the text overrides the name beside it."""
     match message:
         case UmrfGraphStart(umrf_graph_json=text) | UmrfGraphModify(modified_graph=text):
             return (
@@ -334,8 +339,9 @@ def _named(message: Message) -> tuple[str, str]:
 
 
 def _read(response: UmrfGraphGet.Response, asked_at: int, at: int) -> GetResult:
-    """Decode an answer. Raise NotAGraph if any graph in it cannot be read, since an answer that is
-    not completely understood proves nothing."""
+    """Decode the answer to a get, requested at `asked_at` and received at `at` (µs UTC). Raise
+    NotAGraph if any graph in it cannot be read, since an answer that is not completely understood
+    proves nothing."""
     texts, graphs = {}, []
     for text in response.graph_jsons_running:
         shown = snapshot(text, at=at, source="get", asked_at=asked_at)

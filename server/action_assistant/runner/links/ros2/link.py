@@ -63,7 +63,8 @@ Join: TypeAlias = Callable[[int, Topics], Awaitable[Domain]]
 
 
 class Ros2Link:
-    """The link to one robot. It hears and answers only while `run` is running."""
+    """The link to one robot over ROS 2. It receives reports and answers only while `run` is
+    running."""
 
     simulated: Final = False
 
@@ -99,13 +100,15 @@ class Ros2Link:
 
     @property
     def standing(self) -> Standing:
-        """The standing as of the last look, which is a second old at most, or of the last get."""
+        """The condition of the engine as of the last check of discovery, which is a second old at
+        most, or of the last get."""
         return self._standing
 
     # --- commands -----------------------------------------------------------------------------
 
     async def start(self, order: Order, leaves: Leaves = unwatched) -> None:
-        """Publish one start message, and call `leaves` right before it leaves. Raise NotSent if the
+        """Publish one start message for the graph in `order`, and call `leaves` right before it
+        leaves. The call may wait, for discovery and for an earlier start. Raise NotSent if the
         message has certainly not left."""
         domain = self._reachable("start", self._topics.start)
         message = UmrfGraphStart(
@@ -118,23 +121,26 @@ class Ros2Link:
         await domain.outlets.send_start(self._name, order.run, message, leaves)
 
     async def stop(self, graph_name: str) -> None:
-        """Publish one stop message, also if no listener is visible, since discovery lags behind.
-        Raise NotSent if it could not be sent, or, after it was sent, if no listener is known."""
+        """Publish one stop message for the graph of this name, even if no listener is visible,
+        since discovery is late. Raise NotSent if it could not be sent, or, after it was sent, if no
+        listener is visible."""
         domain = self._joined()
         with _sent_or_not():
             await domain.outlets.send_stop(graph_name, self._name)
         self._listened_to(domain, self._topics.stop)
 
     async def pause(self, graph_name: str) -> None:
-        """Publish one pause message. Raise NotSent if it could not be sent."""
+        """Publish one pause message for the graph of this name. Do not wait for its effect. Raise
+        NotSent if it could not be sent."""
         domain = self._reachable("pause", self._topics.pause)
         message = UmrfGraphPause(umrf_graph_name=graph_name, targets=[self._name])
         with _sent_or_not():
             await domain.outlets.pause.send(lambda: message)
 
     async def resume(self, graph_name: str, continue_from: str = "") -> None:
-        """Publish one resume message. Raise NotSent if it could not be sent, or if `continue_from`
-        names an action: over ROS 2 a graph only goes on where it was."""
+        """Publish one resume message for the graph of this name. Raise NotSent if it could not be
+        sent, or if `continue_from` names an action: over ROS 2 a graph only goes on where it was.
+        """
         if continue_from:
             raise NotSent("over ROS 2 a graph goes on where it was; no action can be named")
         domain = self._reachable("resume", self._topics.resume)
@@ -143,7 +149,9 @@ class Ros2Link:
             await domain.outlets.resume.send(lambda: message)
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
-        """Publish one modify message. Raise NotSent if it could not be sent."""
+        """Publish one modify message with the graph in `order`. `continue_from`: the full name of
+        an action that is started when the graph goes on, "" for none. Raise NotSent if it could not
+        be sent."""
         domain = self._reachable("modify", self._topics.modify)
         message = UmrfGraphModify(
             umrf_graph_name=order.graph.name,
@@ -159,8 +167,9 @@ class Ros2Link:
         return self._domain
 
     def _reachable(self, command: str, topic: str) -> Domain:
-        """Return the domain of this robot. Raise NotSent if nobody of this robot listens to
-        `topic`, or its engine has an older generation of messages."""
+        """Return the domain of this robot. `command`: for the message of the error. Raise NotSent
+        if no node of this robot listens to `topic`, or its engine has an older generation of
+        messages."""
         domain = self._joined()
         self._listened_to(domain, topic)
         if generation_of(domain, domain.servers(self._path)) == "older":
@@ -251,16 +260,16 @@ class Ros2Link:
         self._look()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
-        """Call `hear` with every report about this robot until the end of the block."""
+        """Return a context during which `hear` is called with every report about this robot."""
         return self._subscribers.listening(hear)
 
     async def aclose(self) -> None:
-        """Do nothing, since the domain is shared."""
+        """Do nothing: the domain is shared with other links."""
 
     # --- what is known ------------------------------------------------------------------------
 
     def _look(self) -> None:
-        """Update the standing from discovery, and report a change of it."""
+        """Update `standing` from what discovery shows, and report a change of the engine's state."""
         domain = self._domain
         if domain is None:
             return
@@ -341,7 +350,8 @@ class Ros2Link:
             )
 
     def _actor(self, domain: Domain) -> str:
-        """Return the name that this robot's feedback carries; "" if unknown."""
+        """Return the name in the feedback of this robot; "" if unknown. It is the robot's own, or
+        the only name on a domain where all feedback comes from one process."""
         if self._name in domain.actors:
             return self._name
         alone = len(domain.actors) == 1 and self._alone(domain)
@@ -379,8 +389,8 @@ class Ros2Link:
                 assert_never(value)
 
     def _hear_feedback(self, value: Feedback) -> None:
-        """Report feedback of this robot. On a domain with several engines the actor name decides;
-        snapshots with a run of this link are reported under any name."""
+        """Report feedback of this robot. On a domain with several engines the name in it (actor)
+        decides whose it is; snapshots with a run of this link are reported under any name."""
         domain = self._domain
         if domain is None:
             return
@@ -393,8 +403,8 @@ class Ros2Link:
         self._subscribers.tell(value)
 
     def _said(self, logger: str) -> bool:
-        """Return whether a log line certainly comes from this engine; nodes of equal names cannot
-        be distinguished."""
+        """Return whether a log line of this logger name certainly comes from this robot's engine:
+        nodes with the same name cannot be distinguished."""
         domain = self._domain
         if domain is None:
             return False
@@ -410,8 +420,8 @@ class Ros2Link:
 
 @contextmanager
 def _sent_or_not() -> Iterator[None]:
-    """Turn an error of the middleware into NotSent. Not for starts, since a failed one may have
-    been sent."""
+    """Return a context that turns an error of the middleware into NotSent. Do not use it for
+    starts: a failed start may have been sent."""
     try:
         yield
     except RuntimeError as error:

@@ -36,14 +36,12 @@ class Newcomers:
         others: Callable[[], frozenset[str]],
         at: float,
     ) -> tuple[str, ...]:
-        """Return the names of those nodes that may be a second engine of a path, as the class
-        describes, sorted. `listeners`: all that receive starts on this path.
-
-        `servers`: the engines that serve the get of this path; they are not returned. `others`:
-        returns the processes that serve another path, publish starts or receive feedback, which a
-        starting engine does not do; they are not returned either. It is called only if a listener
-        is not known yet. `at`: now, in seconds of a monotonic clock.
-        """
+        """Return the sorted names of those nodes that may be a second engine of a path, as the
+        class describes. `listeners`: all that receive starts on this path. `servers`: the engines
+        that serve the get of this path; they are not returned. `others`: returns the processes that
+        serve another path, publish starts or receive feedback, which a starting engine does not do;
+        their nodes are not returned either. It is called only if there is a listener that was not
+        dismissed before. `at`: now, in seconds of a monotonic clock."""
         present = {each.gid for each in listeners}
         self._known &= present
         self._since = {gid: since for gid, since in self._since.items() if gid in present}

@@ -36,7 +36,7 @@ M = TypeVar("M", bound=Message)
 
 
 class Topics(msgspec.Struct, frozen=True, kw_only=True):
-    """The absolute names of the topics of engines."""
+    """The absolute names of the ROS topics on which engines receive commands and send feedback."""
 
     start: str
     stop: str
@@ -47,7 +47,8 @@ class Topics(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def qos(depth: int) -> QoSProfile:
-    """Return the quality of service that engines use: reliable, with nothing kept for late joiners."""
+    """Return the quality of service that engines use: reliable, the last `depth` messages queued,
+    and none stored for subscribers that join later."""
     return QoSProfile(
         depth=depth,
         history=HistoryPolicy.KEEP_LAST,
@@ -57,8 +58,8 @@ def qos(depth: int) -> QoSProfile:
 
 
 class _SentMessage:
-    """A message of this process and the time in which it was published, in nanoseconds UTC. `sent_at`:
-    the same on a clock that does not jump, in seconds."""
+    """A message of this process and the period in which it was published, in nanoseconds UTC.
+    `sent_at`: the same in seconds of a clock that does not jump."""
 
     def __init__(self, message: Message) -> None:
         self.message = message
@@ -77,7 +78,8 @@ class Outlet(Generic[M]):
         self._free_at = 0.0
 
     async def send(self, make: Callable[[], M | None]) -> None:
-        """Wait for the turn, then publish the message that `make` returns, if any."""
+        """Wait for the turn, then publish the message that `make` returns; if it returns None,
+        publish none."""
         async with self._turn:
             await anyio.sleep(max(0.0, self._free_at - time.monotonic()))
             message = make()
@@ -108,7 +110,7 @@ class Outlet(Generic[M]):
 
 
 class Outlets:
-    """The command topics of one domain."""
+    """The publishers of all command topics of one domain."""
 
     def __init__(self, node: Node, topics: Topics) -> None:
         publish, each = node.create_publisher, qos(10)
@@ -124,8 +126,9 @@ class Outlets:
     async def send_start(
         self, robot: str, run: str, message: UmrfGraphStart, leaves: Callable[[], None]
     ) -> None:
-        """Publish the start of a run once its engine has taken in the start before, or `TAKEN_S` after that.
-        `leaves` is called right before the message leaves, and may hold it back by raising NotSent."""
+        """Publish the start of a run on a robot once the engine of the previous start has shown
+        that it received that one, or `TAKEN_S` seconds after it. `leaves` is called right before
+        the message leaves; if it raises NotSent, the message is not sent."""
 
         def leaving() -> UmrfGraphStart:
             leaves()
@@ -141,20 +144,23 @@ class Outlets:
             await self.start.send(leaving)
 
     def shown(self, graphs: Iterable[Snapshot]) -> None:
-        """Note the graphs that engines show: a start whose run is among them was received."""
+        """Take note of the graphs that engines show: a start whose run is among them was received,
+        so that the next one may be sent."""
         last = self._untaken
         if last is not None and any(each.run == last.run for each in graphs):
             last.taken.set()
 
     def said(self, robot: str, line: str) -> None:
-        """Note a line of a robot's log, which may report that a start was received."""
+        """Take note of a line of a robot's log: if it says that the last start was received, the
+        next one may be sent."""
         last = self._untaken
         if last is not None and (last.robot, last.receipt) == (robot, line.strip()):
             last.taken.set()
 
     async def send_stop(self, graph: str, target: str) -> None:
-        """Publish a stop. Waiting stops of one graph are sent as one message, with every robot as a
-        target; if it cannot be published, each call raises."""
+        """Publish a stop of a graph for one robot (`target`) when it is its turn. Waiting stops of
+        one graph are sent as one message, with every robot as a target; if it cannot be published,
+        each of the calls raises the error."""
         stops = self._stopping.setdefault(graph, _Stops())
         stops.targets.append(target)
 

@@ -17,7 +17,7 @@ _VENDORS: Final = {"010f": "Fast DDS", "0110": "Cyclone DDS", "0101": "Connext"}
 
 
 def topics_of(facts: EngineFacts) -> Topics:
-    """Return the topics of an engine with these facts."""
+    """Return the names of the topics of an engine build."""
     return Topics(
         start=facts.start_topic,
         stop=facts.stop_topic,
@@ -29,8 +29,9 @@ def topics_of(facts: EngineFacts) -> Topics:
 
 
 def generation_of(domain: Domain, servers: tuple[Endpoint, ...]) -> Generation:
-    """Return whether an engine reads a start as this process writes it, by the hash of the message type;
-    `unknown` with a middleware that gives no hash."""
+    """Return whether the engine behind these servers reads a start message as this process writes
+    it, by the hash of the message type: "current" if so, "older" if not, "unknown" with a
+    middleware that gives no hash."""
     hashes = {each.type_hash for each in belonging(servers, domain.listeners(domain.topics.start))}
     known = {each for each in hashes if not each.upper().startswith("INVALID")}
     if not known:
@@ -39,7 +40,8 @@ def generation_of(domain: Domain, servers: tuple[Endpoint, ...]) -> Generation:
 
 
 def two_servers(place: str, count: int) -> str:
-    """Return why answers on a path cannot prove a stop."""
+    """Return the sentence why answers prove no stop on a path (`place`) on which `count` engines
+    answer."""
     return (
         f"{count} engines answer on {place}. Nobody can tell which of them sent an answer, so no answer "
         "proves a stop. Start each engine with a ROS_DOMAIN_ID of its own. An engine that has just "
@@ -48,15 +50,15 @@ def two_servers(place: str, count: int) -> str:
 
 
 def belonging(servers: tuple[Endpoint, ...], ends: tuple[Endpoint, ...]) -> tuple[Endpoint, ...]:
-    """Return those of `ends` whose process is also the process of one of the `servers`."""
+    """Return those endpoints in `ends` that are in the same process as one of the `servers`."""
     processes = {each.process for each in servers}
     return tuple(each for each in ends if each.process in processes)
 
 
 def foreign_middleware(domain: Domain, server: Endpoint) -> str:
     """Return the name of a server's middleware if it differs from the middleware of this process,
-    and "" if both are the same. Discovery may show a server with a different middleware, but
-    that server never answers."""
+    else "". Discovery may show a server with a different middleware, but that server never answers.
+    """
     theirs = server.gid[:4]
     if theirs == domain.process[:4]:
         return ""

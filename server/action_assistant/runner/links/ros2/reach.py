@@ -32,12 +32,13 @@ class Ros2:
 
     @property
     def rmw(self) -> str:
-        """The name of the middleware of this process."""
+        """The name of the ROS middleware of this process."""
         return rclpy.get_rmw_implementation_identifier()
 
     def link(self, registration: Registration, facts: EngineFacts) -> Link:
-        """Return a link to a robot. If the robot uses another middleware than this process, every
-        command on the link is refused, and the refusal says why."""
+        """Return a link to a registered robot, whose engine build is described by `facts`. The call
+        does not wait. If the robot uses another middleware than this process, the link refuses
+        every command with the reason."""
         if registration.rmw not in {"", self.rmw}:
             return UnreachableLink(
                 f"{registration.name} is registered with {registration.rmw}, but this runner speaks "
@@ -47,7 +48,8 @@ class Ros2:
         return Ros2Link(self.domain, registration, facts, self._clock_us)
 
     async def domain(self, number: int, topics: Topics) -> Domain:
-        """Return a domain, which the first call joins. Raise RuntimeError if it cannot be joined."""
+        """Return the domain `number`, in which this process takes part with these topics. The first
+        call joins it, which takes up to some seconds. Raise RuntimeError if it cannot be joined."""
         async with self._joining:
             known = self._domains.get((number, topics))
             if known is None:
@@ -73,8 +75,8 @@ class Ros2:
         return Sighting(engines, max(0.0, youngest - time.monotonic()))
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Return the engines that are seen once discovery has had its time. Raise RuntimeError if
-        the domain of the environment cannot be joined."""
+        """Return the engines that discovery shows once it has had its time; the call waits for
+        that. Raise RuntimeError if the domain of the environment cannot be joined."""
         seen = await self.sighting()
         await anyio.sleep(seen.left_s)
         return (await self.sighting()).engines if seen.left_s else seen.engines
@@ -97,7 +99,7 @@ class Ros2:
         )
 
     async def aclose(self) -> None:
-        """Leave every domain, even when cancelled."""
+        """Leave every domain, also if the call is cancelled."""
         with anyio.CancelScope(shield=True):
             while self._domains:
                 _, domain = self._domains.popitem()

@@ -36,7 +36,8 @@ class Endpoint(msgspec.Struct, frozen=True):
 
 
 class OverheardCommand(msgspec.Struct, frozen=True, kw_only=True):
-    """A command that somebody else published. `graph`: the name that engines use."""
+    """A command that another program has published. `graph`: the name that engines use; `umrf`: the
+    graph text in it, "" for none."""
 
     command: Command
     graph: str
@@ -53,7 +54,7 @@ class LogLine(msgspec.Struct, frozen=True):
 
     @property
     def graph(self) -> str | None:
-        """The name of the graph that the line is about, if it says one."""
+        """The name of the graph that the line is about; None if it names none."""
         found = _GRAPH.search(self.text.strip())
         return found[found.lastgroup or 0] if found else None
 
