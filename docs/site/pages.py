@@ -17,7 +17,7 @@ SECTIONS: Final = (
         "Administration",
         (
             *("administration", "installing", "containers", "network"),
-            *("backups", "monitoring", "doctor"),
+            *("backups", "audit", "monitoring", "doctor"),
         ),
     ),
     ("For programs", ("api/editor", "api/runner", "contracts", "room-protocol")),

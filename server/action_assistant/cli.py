@@ -103,6 +103,12 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "simulate-robot": CommandEntry(
         "simulate_robot", "a robot that behaves like a real engine, on ROS 2, to practise with"
     ),
+    "audit": CommandEntry(
+        "audit",
+        "who did what, when and from where, in both logs; `audit verify` proves them",
+        described=True,
+        posix=True,
+    ),
     "service": CommandEntry(
         "services.service",
         "serve whenever the computer runs, by systemd: install, uninstall, status, upgrade",

@@ -10,6 +10,7 @@ import {
 } from "@mantine/core";
 import {
   IconDeviceDesktop,
+  IconFileSearch,
   IconHelp,
   IconLogout,
   IconMoon,
@@ -123,6 +124,17 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
             onClick={onClose}
           >
             Administration
+          </Button>
+        )}
+        {mayLook && (
+          <Button
+            component={Link}
+            to="/audit"
+            variant="default"
+            leftSection={<IconFileSearch size={15} aria-hidden />}
+            onClick={onClose}
+          >
+            Audit
           </Button>
         )}
         {!window.isSecureContext && (

@@ -21,6 +21,7 @@ import { NotFound } from "./page-frame";
 import {
   ActionsScreen,
   AdministrationScreen,
+  AuditScreen,
   CompareScreen,
   GraphScreen,
   HomeScreen,
@@ -95,6 +96,11 @@ function Screens() {
       <Route path="/admin">
         <Screen crumbs={[graphs, { label: "Administration" }]}>
           <AdministrationScreen />
+        </Screen>
+      </Route>
+      <Route path="/audit">
+        <Screen crumbs={[graphs, { label: "Audit" }]}>
+          <AuditScreen />
         </Screen>
       </Route>
       <Route path="/runs">

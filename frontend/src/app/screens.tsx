@@ -16,6 +16,9 @@ const RobotsPage = lazyPart(() => import("../robots/robots-page").then((part) =>
 const AdministrationPage = lazyPart(() =>
   import("../administration/administration-page").then((part) => part.AdministrationPage),
 );
+const AuditPage = lazyPart(() =>
+  import("../administration/audit-page").then((part) => part.AuditPage),
+);
 export const ActionsScreen = lazyPart(() =>
   import("./actions-screen").then((part) => part.ActionsScreen),
 );
@@ -31,6 +34,7 @@ const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "pr
   ["/robots", RobotsPage],
   ["/actions", ActionsScreen],
   ["/admin", AdministrationPage],
+  ["/audit", AuditPage],
   ["/", HomeScreen],
 ];
 
@@ -86,6 +90,16 @@ export function AdministrationScreen() {
     <PageFrame>
       <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Administration" }]} />
       <AdministrationPage />
+    </PageFrame>
+  );
+}
+
+export function AuditScreen() {
+  useTitle("Audit");
+  return (
+    <PageFrame>
+      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Audit" }]} />
+      <AuditPage />
     </PageFrame>
   );
 }

@@ -81,6 +81,21 @@ def _where(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def verify_with_head(data: Path, database: str | None, sign: Path | None) -> int:
+    """Do as `verify --head` does: check every journal of a data folder, and print the line to keep
+    elsewhere. Return 0 if all are sound, else 1."""
+    return _verify(
+        argparse.Namespace(
+            data=data,
+            database=database or settings.database(),
+            head=True,
+            sign=sign,
+            against=None,
+            key=None,
+        )
+    )
+
+
 def _verify(options: argparse.Namespace) -> int:
     data = options.data.resolve()
     makes_line = options.head or options.sign is not None

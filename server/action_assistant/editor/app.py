@@ -28,6 +28,7 @@ from action_assistant.editor.api import (
 )
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.people import audit_facts
 from action_assistant.editor.people.people import People
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import EditorWorkers
@@ -35,6 +36,9 @@ from action_assistant.errors import BadInput
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
+from action_assistant.web.audit.log import AuditLog
+from action_assistant.web.audit.routes import audit_routes
+from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.keys import Keys, ScrapeToken
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.session_files import SessionFiles
@@ -54,7 +58,9 @@ SMALL: Final = 100_000
 
 @asynccontextmanager
 async def open_services(
-    settings: EditorSettings, revoked: Revocations | None = None
+    settings: EditorSettings,
+    revoked: Revocations | None = None,
+    audit: AuditLog | None = None,
 ) -> AsyncIterator[EditorServices]:
     """Return a context with the services of the editor, without its HTTP side; they are closed at
     its end. `revoked`: the revoked sessions and links, None to read them. Raise CannotStart if the
@@ -75,12 +81,13 @@ async def open_services(
             epochs.living_in(journal, settings.data) as epoch,
         ):
             people = await People.known(journal)
-            services = EditorServices(settings, journal, people, epoch, revoked, workers)
+            services = EditorServices(settings, journal, people, epoch, revoked, workers, audit)
             try:
                 async with (
                     services.invitations.opened(),
                     services.change_index.kept_up(),
                     services.graph_checks.names.read_ahead(),
+                    services.audit.writing(journal),
                 ):
                     if new:
                         await _greet(services, paths.examples())
@@ -105,10 +112,12 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     browsers.every()  # forgets those that are over
     addresses = _addresses(settings)
     monitoring = Monitoring("editor", settings.data)
+    audit = AuditLog()
+    monitoring.requests.refused_stranger = audit.refused_stranger
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_services(settings, revoked) as services:
+        async with open_services(settings, revoked, audit) as services:
             app_state.open(services)
             async with monitoring.watching(WatchedEditor(services)):
                 yield
@@ -166,7 +175,14 @@ def _routes(
         *packages.routes(app_state),
         *library.routes(app_state),
         *room.routes(app_state),
+        *audit_routes(lambda wanted: _audit(app_state.services, wanted)),
     ]
+
+
+async def _audit(services: EditorServices, wanted: AuditFilter) -> bytes:
+    return await services.workers.graphs(
+        audit_facts.page_in_worker, services.journal.address, wanted
+    )
 
 
 async def _greet(services: EditorServices, folder: Path) -> None:

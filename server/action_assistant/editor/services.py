@@ -24,6 +24,7 @@ from action_assistant.editor.rooms.presence import PersonColours
 from action_assistant.editor.workers import EditorWorkers
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
+from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import person_of
 from action_assistant.web.auth.keys import Keys, Person
 from action_assistant.web.auth.revocations import Revocations
@@ -41,8 +42,10 @@ class EditorServices:
         epoch: str,
         revoked: Revocations,
         workers: EditorWorkers,
+        audit: AuditLog | None = None,
     ) -> None:
         self.settings = settings
+        self.audit = audit or AuditLog()
         self.journal = journal
         self.epoch = epoch
         self.people = people

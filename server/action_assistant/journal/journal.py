@@ -194,13 +194,24 @@ class Journal(JournalReader):
         )
 
     def append_then(
-        self, addition: Addition, done: Callable[[int | None, BaseException | None], None]
+        self,
+        addition: Addition,
+        done: Callable[[int | None, BaseException | None], None],
+        *also: Addition,
     ) -> None:
-        """Append events to one stream without waiting. `done` is called on the loop after COMMIT,
-        with the newest seq or with the exception that `append` would raise. It must not raise.
-        Raise Unavailable if the journal is closed."""
+        """Append events to one stream without waiting. `also`: additions for other streams, in the
+        same transaction. `done` is called on the loop after COMMIT, with the newest seq of the first
+        stream or with the exception that `append` would raise. It must not raise. Raise Unavailable
+        if the journal is closed."""
         is_brief = sum([len(draft.body) for draft in addition.drafts]) <= _BRIEF
-        self._queue(Job(lambda transaction: transaction.add(addition), done, is_brief=is_brief))
+
+        def add(transaction: Transaction) -> int:
+            newest = transaction.add(addition)
+            for each in also:
+                transaction.add(each)
+            return newest
+
+        self._queue(Job(add, done, is_brief=is_brief))
 
     def follow(self) -> AbstractAsyncContextManager[AsyncIterator[Event]]:
         """Return a context with an iterator over the events that are committed from now on, in

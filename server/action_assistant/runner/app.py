@@ -8,6 +8,7 @@ import logging
 import sys
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
 from typing import Final
 
@@ -40,9 +41,12 @@ from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.runs.events import Author
 from action_assistant.runner.start.index_writer import IndexWriter, folder_trouble
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
+from action_assistant.web.audit.events import StopPressed
+from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.keys import Keys, ScrapeToken
 from action_assistant.web.auth.revocations import Revocations
@@ -101,10 +105,16 @@ async def open_services(
                 tasks.start_soon(services.review_service.run)
                 tasks.start_soon(services.retention.run)
                 tasks.start_soon(index_words, journal)
-                yield services
+                control.idle_stop = partial(_note_idle_stop, services.audit)
+                async with services.audit.writing(journal):
+                    yield services
                 tasks.cancel_scope.cancel()
     finally:
         await journal.close()
+
+
+def _note_idle_stop(audit: AuditLog, author: Author, robot: str, run: str) -> None:
+    audit.note_repeated(StopPressed(robot, run), author.id)
 
 
 @asynccontextmanager
@@ -211,6 +221,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     services = RunnerServices()
     public = settings.reached.public
     monitoring = Monitoring("runner", settings.data)
+    monitoring.requests.refused_stranger = services.audit.refused_stranger
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:

@@ -101,6 +101,44 @@ export interface EditorApi {
         named_at?: number | null;
     };
     /**
+     * AuditPage
+     * @description Rows, the newest first. `before`: the cursor of the next page; null once the begin of the log is
+     *     reached. A page may be empty and have a cursor, since one answer looks at a part of the log.
+     *     `back_to`: the time of the oldest event that was looked at.
+     */
+    AuditPage: {
+        rows: EditorApi["AuditRow"][];
+        before: number | null;
+        back_to: string | null;
+    };
+    /**
+     * AuditRow
+     * @description One fact of the audit. `id`: `editor` or `runner`, and the position in its log. `person`: none
+     *     for strangers. `from`: the connection of the person; none where it was not recorded.
+     */
+    AuditRow: {
+        id: string;
+        position: number;
+        /** Format: date-time */
+        at: string;
+        /** @enum {string} */
+        kind: "edits" | "graphs" | "other" | "people" | "refused" | "robots" | "sessions" | "starts" | "stops" | "strangers";
+        event: string;
+        text: string;
+        person?: EditorApi["PersonRef"];
+        from?: EditorApi["Origin"];
+        /** @default  */
+        graph?: string;
+        /** @default  */
+        graph_name?: string;
+        seq?: number;
+        /** @default  */
+        run?: string;
+        run_number?: number;
+        /** @default [] */
+        robots?: string[];
+    };
+    /**
      * BackupsShown
      * @description The last backup and what it lacks, the failure since then, the last restore rehearsal, and
      *     when the next backup is due. Fields are null where there was none.
@@ -1164,6 +1202,24 @@ export interface EditorApi {
         invitation?: string;
     };
     /**
+     * Origin
+     * @description The connection by which a person acted, as an event keeps it.
+     *
+     *     `name`: of the person at that time. `session`: the id of the browser's session. `token`: the id of
+     *     a program's token, "server" for that of the owner. `address`: on the network, "" for the computer
+     *     of the server itself.
+     */
+    Origin: {
+        /** @default  */
+        name?: string;
+        /** @default  */
+        session?: string;
+        /** @default  */
+        token?: string;
+        /** @default  */
+        address?: string;
+    };
+    /**
      * PackageContents
      * @description All files of the package of an action.
      */
@@ -1930,6 +1986,9 @@ export interface EditorPaths {
     "/api/actions/{action_id}/build": {
         get: EditorOperations["getBuild"];
         put: EditorOperations["putBuild"];
+    };
+    "/api/audit": {
+        get: EditorOperations["listAudit"];
     };
     "/api/doctor": {
         get: EditorOperations["examine"];
@@ -3096,6 +3155,28 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["LastBuild"];
+                };
+            };
+        };
+    };
+    listAudit: {
+        parameters: {
+            query?: {
+                before?: number | null;
+                limit?: number;
+                person?: string;
+                robot?: string;
+                graph?: string;
+                kind?: string;
+                since?: string | null;
+                until?: string | null;
+                text?: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["AuditPage"];
                 };
             };
         };

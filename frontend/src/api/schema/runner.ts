@@ -188,6 +188,44 @@ export interface RunnerApi {
         how: string;
     };
     /**
+     * AuditPage
+     * @description Rows, the newest first. `before`: the cursor of the next page; null once the begin of the log is
+     *     reached. A page may be empty and have a cursor, since one answer looks at a part of the log.
+     *     `back_to`: the time of the oldest event that was looked at.
+     */
+    AuditPage: {
+        rows: RunnerApi["AuditRow"][];
+        before: number | null;
+        back_to: string | null;
+    };
+    /**
+     * AuditRow
+     * @description One fact of the audit. `id`: `editor` or `runner`, and the position in its log. `person`: none
+     *     for strangers. `from`: the connection of the person; none where it was not recorded.
+     */
+    AuditRow: {
+        id: string;
+        position: number;
+        /** Format: date-time */
+        at: string;
+        /** @enum {string} */
+        kind: "edits" | "graphs" | "other" | "people" | "refused" | "robots" | "sessions" | "starts" | "stops" | "strangers";
+        event: string;
+        text: string;
+        person?: RunnerApi["PersonRef"];
+        from?: RunnerApi["Origin"];
+        /** @default  */
+        graph?: string;
+        /** @default  */
+        graph_name?: string;
+        seq?: number;
+        /** @default  */
+        run?: string;
+        run_number?: number;
+        /** @default [] */
+        robots?: string[];
+    };
+    /**
      * Author
      * @description The person behind a command, and the origin of the command. `address`: on the network; "" for
      *     the runner's own computer. `by`: "" if it was not recorded.
@@ -829,6 +867,24 @@ export interface RunnerApi {
         moved: boolean;
     };
     /**
+     * Origin
+     * @description The connection by which a person acted, as an event keeps it.
+     *
+     *     `name`: of the person at that time. `session`: the id of the browser's session. `token`: the id of
+     *     a program's token, "server" for that of the owner. `address`: on the network, "" for the computer
+     *     of the server itself.
+     */
+    Origin: {
+        /** @default  */
+        name?: string;
+        /** @default  */
+        session?: string;
+        /** @default  */
+        token?: string;
+        /** @default  */
+        address?: string;
+    };
+    /**
      * OutcomeArrow
      * @description One arrow together with one outcome of its parent. `parent` and `child` are keys of actions,
      *     or `entry` and `exit`.
@@ -880,6 +936,14 @@ export interface RunnerApi {
         kind: string;
         run: number;
         text: string;
+    };
+    /**
+     * PersonRef
+     * @description A person who acted. `id` is opaque and stable for a browser; people choose `name` themselves.
+     */
+    PersonRef: {
+        id: string;
+        name: string;
     };
     /**
      * PlaceInside
@@ -1981,6 +2045,9 @@ export interface RunnerPaths {
     "/api/archive": {
         post: RunnerOperations["archiveRuns"];
     };
+    "/api/audit": {
+        get: RunnerOperations["listAudit"];
+    };
     "/api/revocations": {
         post: RunnerOperations["revokeSessions"];
     };
@@ -2798,6 +2865,28 @@ interface RunnerOperations {
             200: {
                 content: {
                     "application/json": RunnerApi["SweepResult"];
+                };
+            };
+        };
+    };
+    listAudit: {
+        parameters: {
+            query?: {
+                before?: number | null;
+                limit?: number;
+                person?: string;
+                robot?: string;
+                graph?: string;
+                kind?: string;
+                since?: string | null;
+                until?: string | null;
+                text?: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["AuditPage"];
                 };
             };
         };

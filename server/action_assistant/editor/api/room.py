@@ -20,6 +20,7 @@ from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
 from action_assistant.logs import about
 from action_assistant.web.auth.access import person_of, plain, refuse
+from action_assistant.web.auth.caller import origin_of
 from action_assistant.web.auth.roles import allowed
 from action_assistant.web.server.direct import DirectSocket, direct_socket
 
@@ -249,7 +250,10 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                     edits = allowed(person.role, "edit")
                     acks = _wants_acks(socket)
                     with services.colours.held(person.id) as colour:
-                        member = Member(person, edits=edits, acks=acks, colour=colour)
+                        origin = origin_of(person.id)
+                        member = Member(
+                            person, edits=edits, acks=acks, colour=colour, origin=origin
+                        )
                         member.post_epoch(services.epoch)
                         if services.rooms.is_deleted(stream):  # while this socket was let in
                             member.close(messages.NO_SUCH_GRAPH)

@@ -14,6 +14,7 @@ from sqlalchemy import Executable, delete, insert, update
 
 from action_assistant.journal.events import Draft, Event
 from action_assistant.schema import editor_tables
+from action_assistant.web.auth.caller import stamped
 from action_assistant.web.auth.roles import Role
 
 UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
@@ -236,8 +237,10 @@ def graph_of(stream: str) -> str | None:
 
 
 def draft(kind: str, author: str, body: msgspec.Struct | None = None) -> Draft:
-    """Return an event to be stored, with the JSON of `body` (None: without a body)."""
-    return Draft(kind, author, msgspec.json.encode(body) if body is not None else b"")
+    """Return an event to be stored, with the JSON of `body` (None: without a body), which holds the
+    origin of the author if that is known."""
+    encoded = msgspec.json.encode(body) if body is not None else b""
+    return Draft(kind, author, stamped(encoded, author))
 
 
 #: A NUL as JSON has it, after whole pairs of backslashes.

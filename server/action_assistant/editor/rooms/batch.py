@@ -20,7 +20,7 @@ from action_assistant.editor.crdt.updates.update_outline import UpdateOutline
 from action_assistant.editor.crdt.updates.update_scan import outline
 from action_assistant.editor.rooms.member import Member
 from action_assistant.errors import BadInput, Refused, TooLarge
-from action_assistant.web.auth.caller import acting_for
+from action_assistant.web.auth.caller import Origin, acting_for
 from action_assistant.web.workers.lanes import Crashed, OutOfTime, RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -114,13 +114,15 @@ class BatchWindow:
 
 class SubmittedEdit(msgspec.Struct, frozen=True):
     """An edit that waits in the queue of a room, from a socket (`member`) or from the server itself (`done`
-    gets the sequence number after the commit). `at`: when it was received, in seconds of `perf_counter`."""
+    gets the sequence number after the commit). `at`: when it was received, in seconds of `perf_counter`.
+    `origin`: the connection of the author, if it is known."""
 
     update: bytes
     author: str
     member: Member | None = None
     done: "asyncio.Future[int] | None" = None
     at: float = msgspec.field(default_factory=time.perf_counter)
+    origin: Origin | None = None
 
 
 class SyncRequest(msgspec.Struct, frozen=True):

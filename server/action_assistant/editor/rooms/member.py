@@ -10,6 +10,7 @@ from typing import Final
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.presence import NOBODYS, PresenceNews, PresenceOwner
 from action_assistant.kit.token_bucket import Clock, TokenBucket, TokenBuckets
+from action_assistant.web.auth.caller import Origin
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.server.direct import framed
 
@@ -63,8 +64,10 @@ class Member:
         edits: bool = True,
         acks: bool = False,
         colour: str = NOBODYS,
+        origin: Origin | None = None,
     ) -> None:
         self.person: Final = person
+        self.origin: Final = origin
         self.presence_owner: Final = PresenceOwner(person, colour)
         self.edits = edits
         self.acks: Final = acks

@@ -52,10 +52,12 @@ from action_assistant.editor.rooms.housekeeping import (
 )
 from action_assistant.editor.rooms.member import Member
 from action_assistant.editor.rooms.presence import PresenceNews, RoomPresence
+from action_assistant.editor.rooms.sittings import EditSittings
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.journal.events import Addition, Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.logs import about
+from action_assistant.web.auth.caller import origin_of
 from action_assistant.web.server.direct import framed
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
@@ -276,6 +278,7 @@ class Room:
         self.turn_end: Final = window.turn_end
         self._run_in_worker = run_in_worker
         self._tried = tried
+        self._sittings: Final = EditSittings()
         self._updates: Final = UpdateBroadcast(self.members, announcement_interval, self._metrics)
         self._presence_updates: Final = PresenceBroadcast(self.members, window)
         self.comparisons: Final = Comparisons(self, run_in_worker)
@@ -318,7 +321,7 @@ class Room:
                     self._metrics.refused["too_big"] += 1
                     member.refuse(messages.TOO_BIG)
                     return
-                self._enqueue(SubmittedEdit(update, member.person.id, member))
+                self._enqueue(SubmittedEdit(update, member.person.id, member, origin=member.origin))
             case messages.Presence(entries):
                 self._presence_updates.add(
                     self.presence.update(member.presence_owner, entries), member
@@ -344,7 +347,7 @@ class Room:
         if self._ended:
             raise Unavailable(_CLOSING)
         done: asyncio.Future[int] = self._loop.create_future()
-        self._enqueue(SubmittedEdit(update, author, None, done))
+        self._enqueue(SubmittedEdit(update, author, None, done, origin=origin_of(author)))
         return await done
 
     async def read(self, see: Callable[[Replica, int], T]) -> T:
@@ -413,7 +416,9 @@ class Room:
             return
         drafts = tuple([Draft(kind, edit.author, edit.update) for edit, kind in outcome.to_store])
         addition = Addition(self.stream, drafts, self.seq)
-        self._journal.append_then(addition, partial(self._stored, outcome))
+        edits = [edit for edit, _ in outcome.to_store]
+        also = self._sittings.begun(self._graph, edits, self.seq + 1)
+        self._journal.append_then(addition, partial(self._stored, outcome), *also)
 
     def _stored(self, outcome: BatchOutcome, seq: int | None, error: BaseException | None) -> None:
         """Continue with the batch `outcome` after its commit with the sequence number `seq`, or end

@@ -17,6 +17,7 @@ from action_assistant.runner.runs.durations import of_visit
 from action_assistant.runner.runs.events import Observed, PieceSeen
 from action_assistant.runner.runs.run import Run
 from action_assistant.version import VERSION
+from action_assistant.web.auth.caller import without_origin
 
 #: A spreadsheet takes a cell that begins with one of these for a formula.
 _FORMULA: Final = ("=", "+", "-", "@", "\t", "\r")
@@ -69,7 +70,8 @@ def lines(run: str, events: Iterable[Event]) -> Iterator[bytes]:
     """Yield each stored event of the run (`run`: its id) as a line of JSON."""
     for each in events:
         at = views.time(each.at).isoformat().replace("+00:00", "Z")
-        line = EventLine(run, each.seq, each.kind, each.author, at, msgspec.Raw(each.body))
+        body = msgspec.Raw(without_origin(each.body))
+        line = EventLine(run, each.seq, each.kind, each.author, at, body)
         yield msgspec.json.encode(line) + b"\n"
 
 

@@ -1,6 +1,5 @@
 """The caller of a route: the person, the address, and the body that they send."""
 
-import ipaddress
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any, Final
@@ -14,6 +13,7 @@ from action_assistant.errors import Unavailable
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.sent_graphs import MOST, counted
 from action_assistant.web.auth.access import person_of, session_of
+from action_assistant.web.auth.caller import network_address
 from action_assistant.web.http.problems import BODY_LIMIT_TOLD
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
 
@@ -34,7 +34,7 @@ def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
         person.id,
         person.name,
         by="program" if session_of(connection) is None else "browser",
-        address=_address(connection.client.host if connection.client else ""),
+        address=network_address(connection.client.host if connection.client else ""),
     )
 
 
@@ -68,13 +68,3 @@ async def start_of(request: Request[Any, Any, Any], most: int, seconds: float) -
             if len(found) >= most:
                 break
     return found
-
-
-def _address(host: str) -> str:
-    """Return the IP address of a client; "" for this computer itself, and for a `host` that is no
-    address."""
-    try:
-        address = ipaddress.ip_address(host)
-    except ValueError:
-        return ""
-    return "" if address.is_loopback else str(address)

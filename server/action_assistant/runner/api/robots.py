@@ -10,6 +10,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
+from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.links.behaviours.folder import BehaviourList
 from action_assistant.runner.links.port import Candidate, Registration, Sighting
@@ -326,12 +327,14 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="startGroup",
         opt=reads(GroupRequest) | COUNTED,
         responses={200: answer(GroupShown, text="It had been started before")},
-        guards=[Needs("operate")],
+        guards=[StartNeeds(services, "start", "operate")],
         request_max_body_size=GRAPH_BODY,
     )
     async def start(request: _Asking) -> Response[GroupShown]:
         async with body_of(request, services.body_limit) as body:
-            grouped = await services.control.start_group(read_group(body), author_of(request))
+            group = read_group(body)
+            with noted(services, request, refusal_of(group)):
+                grouped = await services.control.start_group(group, author_of(request))
         runs = [views.run_view(run) for run in grouped.runs]
         shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
         return Response(shown, status_code=201 if grouped.fresh else 200)

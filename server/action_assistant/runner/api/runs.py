@@ -31,10 +31,12 @@ from action_assistant.runner.api.live import (
     attend,
     prepare_view,
 )
+from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
 from action_assistant.runner.api.review import json_of
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import ModifyRequest, RestRequest
 from action_assistant.runner.execution.start_checks import engines_of
+from action_assistant.runner.review import audit_facts
 from action_assistant.runner.review.stored_runs import HistoryEvent, StoredRuns
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import Author
@@ -48,6 +50,9 @@ from action_assistant.runner.start.admission import (
 )
 from action_assistant.runner.start.approvals import ApprovalGiven, ApprovalRequest
 from action_assistant.umrf.semantics import Script
+from action_assistant.web.audit.events import StartRefused
+from action_assistant.web.audit.routes import audit_routes
+from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.access import Needs, person_of, refuse, require
 from action_assistant.web.server.openapi import answer, exchanges, reads
 
@@ -76,8 +81,15 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         *_expected_courses(services),
         *_course_checks(services),
         *review.routes(services),
+        *audit_routes(lambda wanted: _audit(services, wanted)),
         _live(services),
     ]
+
+
+async def _audit(services: RunnerServices, wanted: AuditFilter) -> bytes:
+    return await services.run_in_worker(
+        audit_facts.page_in_worker, services.journal.address, wanted
+    )
 
 
 def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
@@ -87,15 +99,16 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="startRun",
         opt=reads(StartRequest, Script=Script) | COUNTED,
         responses={200: answer(views.RunShown, text="It had been started before")},
-        guards=[Needs("simulate")],
+        guards=[StartNeeds(services, "start")],
         request_max_body_size=GRAPH_BODY,
     )
     async def start(request: _Asking) -> Response[views.RunShown]:
         async with body_of(request, services.body_limit) as body:
             start_request = read_request(body)
-            if engines_of(start_request):
-                require(request, "operate")
-            started = await services.control.start(start_request, author_of(request))
+            with noted(services, request, refusal_of(start_request)):
+                if engines_of(start_request):
+                    require(request, "operate")
+                started = await services.control.start(start_request, author_of(request))
         return Response(
             await _run_view(services, started.run),
             status_code=201 if started.fresh else 200,
@@ -160,11 +173,12 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="resumeRun",
         status_code=202,
         summary="Let a paused run go on",
-        guards=[Needs("simulate")],
+        guards=[StartNeeds(services, "go_on")],
     )
     async def resume(run: str, request: _Asking) -> views.RunShown:
-        await _require_command_role(services, run, request)
-        return views.run_view(await services.control.resume(run, author_of(request)))
+        with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
+            await _require_command_role(services, run, request)
+            return views.run_view(await services.control.resume(run, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/modify",
@@ -172,13 +186,14 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=202,
         summary="Change a running graph, where its engine makes that safe",
         opt=reads(ModifyRequest) | COUNTED,
-        guards=[Needs("simulate")],
+        guards=[StartNeeds(services, "change")],
         request_max_body_size=GRAPH_BODY,
     )
     async def modify(run: str, request: _Asking) -> views.RunShown:
-        await _require_command_role(services, run, request)
-        async with body_of(request, services.body_limit) as body:
-            return views.run_view(await services.control.modify(run, body, author_of(request)))
+        with noted(services, request, StartRefused(what="change", why="", run=run[:100])):
+            await _require_command_role(services, run, request)
+            async with body_of(request, services.body_limit) as body:
+                return views.run_view(await services.control.modify(run, body, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/at_rest",
@@ -198,11 +213,12 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=202,
         summary="Let a held run go on: its robots may begin to move",
         opt=reads(GoOnRequest),
-        guards=[Needs("operate")],
+        guards=[StartNeeds(services, "go_on", "operate")],
     )
     async def go_on(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), GoOnRequest)
-        return views.run_view(await services.control.go_on(run, asked, author_of(request)))
+        with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
+            return views.run_view(await services.control.go_on(run, asked, author_of(request)))
 
     @post(
         "/api/runs/{run:str}/outcome",

@@ -15,6 +15,7 @@ from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_graphs import Sent
 from action_assistant.runner.start.index_writer import IndexWriter
+from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
 from action_assistant.web.workers.lanes import Lane, RunInWorker
 
@@ -44,3 +45,4 @@ class RunnerServices:
         self.index_folders = {}
         self.sent = WeakKeyDictionary()
         self.body_limit = ConcurrencyLimit(_BODIES)
+        self.audit = AuditLog()

@@ -14,6 +14,7 @@ import msgspec
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Draft, Event
 from action_assistant.runner.runs.events import Requested, decode, draft_of
+from action_assistant.web.auth.caller import without_origin
 
 ENDING: Final = ".run.jsonl"
 #: The label that examples carry.
@@ -29,7 +30,8 @@ class _Line(msgspec.Struct, frozen=True):
 
 def written(events: Iterable[Event]) -> bytes:
     """Return the events of a stream as the contents of a file: lines of JSON, as `read` reads them."""
-    lines = (_Line(each.kind, each.author, each.at, msgspec.Raw(each.body)) for each in events)
+    bodies = ((each, msgspec.Raw(without_origin(each.body))) for each in events)
+    lines = (_Line(each.kind, each.author, each.at, body) for each, body in bodies)
     return b"".join(msgspec.json.encode(line) + b"\n" for line in lines)
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Awaitable, Callable
 from functools import partial
 from math import inf
-from typing import Final
+from typing import Final, Protocol
 
 import anyio
 import msgspec
@@ -16,6 +16,7 @@ from action_assistant.runner.links.port import GraphOutline, Order
 from action_assistant.runner.runs.events import (
     Author,
     Held,
+    PieceEnded,
     PieceOf,
     PieceRest,
     PieceSeen,
@@ -31,6 +32,7 @@ from action_assistant.umrf.led_subgraphs import StatesInside, outcome_of_subgrap
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.semantics import Call
+from action_assistant.web.auth.caller import Origin, acting_for
 
 #: Facts of the engine that plays the whole graph: only a proof ends what a robot does.
 CONDUCTED_FACTS: Final = msgspec.structs.replace(
@@ -48,6 +50,13 @@ _TICK_S: Final = 0.5
 _STALL_S: Final = 3.0  # for which nothing may have stood still before a piece leaves
 
 
+class Tell(Protocol):
+    """Shows and records an event of a run."""
+
+    def __call__(self, event: RunEvent, author: str = "", /) -> None:
+        """Show and record an event. `author`: the id of a person, or "" for the engine."""
+
+
 class Leading(msgspec.Struct, frozen=True, kw_only=True):
     """The callbacks by which a conductor reaches the run that it leads (a run whose actions are
     carried out by several robots, step by step). `tell` shows an event to people and records it,
@@ -55,7 +64,7 @@ class Leading(msgspec.Struct, frozen=True, kw_only=True):
     run, `rests` ends the whole run for the reason for which the given piece ended, where a person's
     statement or the end of its code showed that at rest and no answer did."""
 
-    tell: Callable[[RunEvent], None]
+    tell: "Tell"
     stored: Callable[[], Awaitable[None]]
     stop: Callable[[Author], None]
     rests: Callable[[Run], None]
@@ -64,12 +73,13 @@ class Leading(msgspec.Struct, frozen=True, kw_only=True):
 class Word(msgspec.Struct, frozen=True, kw_only=True):
     """The outcome of an action as a person has stated it, because the states of the robot do not
     show it. `by`: the person; `piece`: the id of the run that carried the action out, "" for the
-    newest one."""
+    newest one; `origin`: the connection by which the person stated it, None if it is not known."""
 
     outcome: Precondition
     by: Author
     reason: str
     piece: str = ""
+    origin: Origin | None = None
 
 
 class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
@@ -145,6 +155,15 @@ class Step:
         self.is_stopped = True
         self.decided.set()
         self._waiting.cancel()
+
+    def tell_end(self, tell: Tell, ended: PieceEnded) -> None:
+        """Show and record the outcome of the step; if it is the word of a person, as theirs, who gave it
+        in another task."""
+        if self.word is None:
+            tell(ended)
+        else:
+            with acting_for(self.word.by.id, self.word.origin):
+                tell(ended, self.word.by.id)
 
     def renew(self) -> None:
         """Forget a piece that was not sent, so that another one can be sent for the same step."""

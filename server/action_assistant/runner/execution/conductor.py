@@ -584,7 +584,7 @@ class Conductor:
         self._steps.pop(step.call.number, None)
         self._over.add(step.call.number)
         ended = self._values.ended(step, outcome, how, self._clock_us())
-        self._run.tell(ended)
+        step.tell_end(self._run.tell, ended)
         if lacking := self._values.lacking(ended):
             self._alarm("led_unset", f"{step.node} on {step.engine} {lacking}")
         returned = returned_of(ended)
@@ -652,7 +652,7 @@ class Conductor:
             raise Conflict("The run has gone on, or was stopped, meanwhile.")
         for step in self._steps.values():
             step.troubles &= {"ended"}
-        self._run.tell(Released(at=self._clock_us(), author=author))
+        self._run.tell(Released(at=self._clock_us(), author=author), author.id)
         self._gate.release()
 
     def give_word(self, node: str, word: Word) -> None:

@@ -50,7 +50,7 @@ from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.umrf.files.codec import Unreadable
 from action_assistant.umrf.model import Precondition
-from action_assistant.web.auth.caller import BackgroundTasks
+from action_assistant.web.auth.caller import BackgroundTasks, origin_of
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -86,6 +86,8 @@ class ExecutionService:
         self.approvals: Final = Approvals(runtime.journal, runtime.clock_us)
         self._runtime = runtime
         self._robot_watchers: list[Callable[[], None]] = []
+        #: Called with each Stop that found nothing to stop: who pressed it, and for which robot and run.
+        self.idle_stop: Callable[[Author, str, str], None] = _ignore_stop
         self._stops = StopOrder()
         self.foreign_stops: Final = ForeignStopLoop(robots, runtime, self._robots_changed)
         self._runs = OpenRuns(robots, self.history, runtime)
@@ -189,7 +191,8 @@ class ExecutionService:
         self._stops.note("", author, stop_id)
         stopped = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
         runs = [run for run in stopped if not self.open[run].is_led]
-        self.foreign_stops.stop(author, self._runs.on)
+        if not self.foreign_stops.stop(author, self._runs.on) and not stopped:
+            self.idle_stop(author, "", "")
         return StoppedAll(runs, self.foreign_stops.graphs(), self.robots.unheard())
 
     def stop_robot(self, name: str, author: Author) -> tuple[list[str], list[str]]:
@@ -199,6 +202,8 @@ class ExecutionService:
         graphs = self.foreign_stops.stop(author, self._runs.on, name)
         self._stops.note(name, author)
         stopped = [run for run in self._runs.on(name) if self._stop(run, author, "")]
+        if not graphs and not stopped:
+            self.idle_stop(author, name, "")
         return [run for run in stopped if not self.open[run].is_led], graphs
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
@@ -216,6 +221,7 @@ class ExecutionService:
             return [each for each in parts if self._stop(each, author, stop_id)]
         if run not in self.open:
             await self._over(run)
+        self.idle_stop(author, "", run)
         return []
 
     def _stop(self, run: str, author: Author, stop_id: str) -> bool:
@@ -274,7 +280,11 @@ class ExecutionService:
         asked for."""
         opened = await self._movable(run)
         word = Word(
-            outcome=_OUTCOMES[asked.outcome], by=author, reason=asked.reason, piece=asked.piece
+            outcome=_OUTCOMES[asked.outcome],
+            by=author,
+            reason=asked.reason,
+            piece=asked.piece,
+            origin=origin_of(author.id),
         )
         self._conductors.give_word(run, asked.action, word)
         return opened.run
@@ -443,6 +453,10 @@ class ExecutionService:
             log.error("run %s: some of its events cannot be read", run.id)
             opened.lose("Some of what was recorded of this run cannot be read.")
         self._runs.drive(opened)
+
+
+def _ignore_stop(_author: Author, _robot: str, _run: str) -> None:
+    """Ignore a Stop that found nothing to stop."""
 
 
 def _wholes_of(run: Run) -> set[str]:

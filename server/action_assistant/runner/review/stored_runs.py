@@ -33,6 +33,7 @@ from action_assistant.runner.runs.sent_graphs import Sent, SentSubgraph, read_se
 from action_assistant.schema.runner_tables import expectation, runner_event
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
+from action_assistant.web.auth.caller import without_origin
 
 _LAST: Final = 1_000  # runs in one statistics
 _CAUSES: Final = 10  # in one answer
@@ -85,7 +86,7 @@ async def numbers_with(
 
 
 def _event_json(event: Event) -> bytes:
-    at, body = views.time(event.at), msgspec.Raw(event.body)
+    at, body = views.time(event.at), msgspec.Raw(without_origin(event.body))
     return msgspec.json.encode(HistoryEvent(event.seq, event.kind, event.author, at, body))
 
 

@@ -16,6 +16,7 @@ from action_assistant.runner.links.observations import Seen
 from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.model import Precondition
+from action_assistant.web.auth.caller import stamped
 
 End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
 
@@ -478,8 +479,8 @@ class StoredKind(Protocol):
 
 def draft_of(event: StoredKind, author: str = "") -> Draft:
     """Encode an event for the journal. `author` is the id of a person or the name of a robot, "" for
-    the runner itself."""
-    return Draft(event.kind, author, msgspec.json.encode(event))
+    the runner itself. The body holds the origin of a person by whose request the task works."""
+    return Draft(event.kind, author, stamped(msgspec.json.encode(event), author))
 
 
 def decode_all(usual: str, events: Iterable[BareEvent]) -> list[RunEvent]:

@@ -25,7 +25,7 @@ from action_assistant.errors import (
     WrongOrigin,
 )
 from action_assistant.logs import request_id
-from action_assistant.web.auth.caller import Caller, set_caller
+from action_assistant.web.auth.caller import Caller, Origin, network_address, set_caller
 from action_assistant.web.auth.keys import Keys, Person, ScrapeToken, Session
 from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
 from action_assistant.web.auth.roles import OWNER, Permission, allowed, may
@@ -185,7 +185,7 @@ class Access:
         asked = receive if scope["type"] == ScopeType.HTTP else None
         if known is not None:
             scope["state"].get(KNOWN, _nobody)(known.id)
-        set_caller(None if known is None else Caller(known.id, asked, scope["state"]["device"]))
+        set_caller(None if known is None else _caller(known, scope, asked))
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return
@@ -334,6 +334,19 @@ class Access:
             await send(message)
 
         return dressed
+
+
+def _caller(person: Person, scope: HTTPScope | WebSocketScope, receive: Receive | None) -> Caller:
+    """Return the client of a request, with the connection by which its person acts."""
+    session: Session | None = scope["state"].get("session")
+    client = scope.get("client")
+    origin = Origin(
+        name=person.name,
+        session="" if session is None else session.id,
+        token="server" if session is None else "",
+        address=network_address(client[0] if client else ""),
+    )
+    return Caller(person.id, receive, scope["state"]["device"], origin)
 
 
 def _nobody(_: str) -> None:

@@ -3,12 +3,15 @@
 Imported by workers too, so it imports little.
 """
 
+import ipaddress
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from functools import lru_cache
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeVarTuple, Unpack
 
 import anyio
+import msgspec
 from anyio.abc import TaskGroup
 
 from action_assistant.errors import Refused
@@ -17,15 +20,55 @@ if TYPE_CHECKING:
     from litestar.types import Receive
 
 
+#: The field of an event's body that holds its `Origin`.
+_FIELD: Final = "from"
+
+
+class Origin(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The connection by which a person acted, as an event keeps it.
+
+    `name`: of the person at that time. `session`: the id of the browser's session. `token`: the id of
+    a program's token, "server" for that of the owner. `address`: on the network, "" for the computer
+    of the server itself.
+    """
+
+    name: str = ""
+    session: str = ""
+    token: str = ""
+    address: str = ""
+
+
+class _Stamped(msgspec.Struct, rename={"origin": _FIELD}):
+    origin: Origin | None = None
+
+
+def network_address(host: str) -> str:
+    """Return an address on the network; "" for this computer itself, and for text that is no
+    address."""
+    try:
+        address = ipaddress.ip_address(host)
+    except ValueError:
+        return ""
+    return "" if address.is_loopback else str(address)
+
+
+@lru_cache(1024)
+def _end_of_body(origin: Origin) -> bytes:
+    """Return the field with an origin, and the brace that ends the body."""
+    return msgspec.json.encode(_Stamped(origin))[1:]
+
+
 class Caller(NamedTuple):
     """Identifies the client for whom a request works, so that abandoned work can be cancelled.
 
-    `device`: the id of the browser, whoever is signed in; "" if unknown.
+    `device`: the id of the browser, whoever is signed in; "" if unknown. `origin`: None where it is
+    not known by which connection the person acts.
     """
 
     person: str
     receive: "Receive | None" = None  # a socket's messages are not ours to read
     device: str = ""
+    origin: Origin | None = None
 
     async def gone(self) -> None:
         """Wait until the client has disconnected. Call it only after the request body was read."""
@@ -55,6 +98,42 @@ def device() -> str:
     return "" if asking is None else asking.device
 
 
+def origin_of(author: str) -> Origin | None:
+    """Return the connection by which this person acts in this task; None if the task works for
+    somebody else or for no client."""
+    asking = _CALLER.get()
+    return None if asking is None or asking.person != author else asking.origin
+
+
+def stamped(body: bytes, author: str) -> bytes:
+    """Return the JSON body of an event, an object or nothing, with the origin of its author as the
+    field `from`. The body stays as it is if the task does not work for this person."""
+    origin = origin_of(author)
+    if origin is None or (body and not body.endswith(b"}")):
+        return body
+    start = b"{" if body in {b"", b"{}"} else body[:-1] + b","
+    return start + _end_of_body(origin)
+
+
+def origin_in(body: bytes) -> Origin | None:
+    """Return the origin in the body of a stored event; None if the body has none."""
+    if b'"from":' not in body:
+        return None
+    try:
+        return msgspec.json.decode(body, type=_Stamped).origin
+    except msgspec.DecodeError:  # a body of another form
+        return None
+
+
+def without_origin(body: bytes) -> bytes:
+    """Return the body of a stored event without its origin, which only owners see."""
+    if origin_in(body) is None:
+        return body
+    fields = msgspec.json.decode(body, type=dict[str, msgspec.Raw])
+    del fields[_FIELD]
+    return msgspec.json.encode(fields)
+
+
 def set_caller(asking: Caller | None) -> None:
     """Set the client for whom this task works from now on."""
     _CALLER.set(asking)
@@ -68,9 +147,10 @@ def outlive_connection() -> None:
 
 
 @contextmanager
-def acting_for(person: str) -> Iterator[None]:
-    """Set the person for whom the work inside the block is done."""
-    token = _CALLER.set(Caller(person))
+def acting_for(person: str, origin: Origin | None = None) -> Iterator[None]:
+    """Set the person for whom the work inside the block is done, and the connection by which that
+    person asked for it."""
+    token = _CALLER.set(Caller(person, origin=origin))
     try:
         yield
     finally:

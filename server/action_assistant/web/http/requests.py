@@ -5,6 +5,7 @@ import re
 import secrets
 import time
 from collections import Counter
+from collections.abc import Callable
 from typing import Any, Final
 
 from litestar.enums import ScopeType
@@ -19,6 +20,10 @@ PROXIED: Final = "proxied"
 HEADER: Final = b"x-request-id"
 
 _CALLS: Final = frozenset({"http", "websocket"})
+#: Statuses of refusals for lack of credentials, of another host or origin, and of too many tries.
+_REFUSALS: Final = frozenset({401, 403, 429})
+#: The state of a request has one of these if it is known who sent it.
+_KNOWN: Final = frozenset({"person", "identity"})
 _ID: Final = re.compile(rb"[\w.:/+=-]{1,64}", re.ASCII)
 #: The kind of thing that a path names.
 _SUBJECT: Final = re.compile(r"/api/(run|graph)s/([^/]{1,64})(?=/|$)")
@@ -30,6 +35,12 @@ class RequestCounts:
     def __init__(self) -> None:
         self.answered: Final[Counter[int]] = Counter()  # requests, by status
         self.open: Final[Counter[str]] = Counter()  # connections that are busy, by kind
+        #: Called with the address, and method and path, of each refused request of a stranger.
+        self.refused_stranger: Callable[[str, str], None] = _ignore_stranger
+
+
+def _ignore_stranger(_address: str, _what: str) -> None:
+    """Ignore a refused request of a stranger."""
 
 
 class Requests:
@@ -54,8 +65,9 @@ class Requests:
         try:
             if kind == ScopeType.HTTP:
                 await self._answer(scope, receive, send)
-            else:
+            else:  # its messages go the shortest way
                 await self._app(scope, receive, send)
+                self._count_stranger(scope)
         finally:
             self._counts.open[kind] -= 1
 
@@ -67,12 +79,21 @@ class Requests:
             if message["type"] == "http.response.start":
                 status = message["status"]
                 self._counts.answered[status] += 1
+                if status in _REFUSALS:
+                    self._count_stranger(scope)
             await send(message)
 
         await self._app(scope, receive, sent)
         if log.isEnabledFor(logging.DEBUG):
             took = 1e3 * (time.perf_counter() - begun)
             log.debug("%s %s: %d in %.1f ms", scope["method"], scope["path"], status, took)
+
+    def _count_stranger(self, scope: Any) -> None:
+        """Count a refused request, unless it is known who sent it."""
+        if not _KNOWN & scope.get("state", {}).keys():
+            client = scope.get("client")
+            what = f"{scope.get('method', 'WEBSOCKET')} {scope['path']}"
+            self._counts.refused_stranger(client[0] if client else "", what)
 
 
 def _id_of(scope: Any) -> str:

@@ -1,0 +1,110 @@
+"""The events of the stream `audit`: facts about people that no other stream holds.
+
+Each process has one such stream in its own log. All other facts of the audit are events of other
+streams, whose bodies hold the origin of their author (`web/auth/caller.py`).
+"""
+
+from typing import ClassVar, Final, Literal, Protocol, TypeAlias
+
+import msgspec
+
+from action_assistant.journal.events import Draft
+from action_assistant.web.auth.caller import stamped
+
+#: The stream of the audit in the log of a process.
+STREAM: Final = "audit"
+
+#: The means by which somebody signed in.
+SignInMeans: TypeAlias = Literal["token", "link", "personal", "device"]
+
+
+class EditingBegan(msgspec.Struct, frozen=True):
+    """The author began to edit the document of a graph by a connection; `seq` is the first edit.
+    Later edits of the author are by the same connection, up to the next event of this kind."""
+
+    kind: ClassVar[str] = "audit.edited.v1"
+
+    graph: str
+    seq: int
+
+
+class SignedIn(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The author signed in. `invitation`: the id of the link, if it was by one."""
+
+    kind: ClassVar[str] = "audit.signed_in.v1"
+
+    how: SignInMeans
+    role: str
+    name: str
+    session: str
+    invitation: str = ""
+
+
+class SessionEnded(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A session was ended. `own`: its person signed out; otherwise the author ended the session of
+    somebody else."""
+
+    kind: ClassVar[str] = "audit.session_ended.v1"
+
+    session: str
+    own: bool = False
+
+
+class StartRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """The author asked for a start, a change or a go-on that was refused, with the reason `why`.
+    `engines`: the robots, or the simulator; `times`: how often within a minute."""
+
+    kind: ClassVar[str] = "audit.start_refused.v1"
+
+    what: Literal["start", "change", "go_on"]
+    why: str
+    engines: tuple[str, ...] = ()
+    graph: str = ""
+    graph_name: str = ""
+    version: str = ""
+    run: str = ""
+    times: int = 1
+
+
+class StopPressed(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The author pressed Stop where nothing of this program's was going on: there is no run that
+    could hold it. `robot`, `run`: what the Stop was for; everything, where both are empty. `times`:
+    how often within a minute."""
+
+    kind: ClassVar[str] = "audit.stop_pressed.v1"
+
+    robot: str = ""
+    run: str = ""
+    times: int = 1
+
+
+class StrangersRefused(msgspec.Struct, frozen=True):
+    """Requests without valid credentials from one address were refused in one minute. `minute`: its
+    begin, in microseconds UTC; `first`: method and path of the first request."""
+
+    kind: ClassVar[str] = "audit.strangers_refused.v1"
+
+    address: str
+    minute: int
+    count: int
+    first: str
+
+
+class Unlisted(msgspec.Struct, frozen=True):
+    """Further facts of one kind that have no row of their own, since there were too many that day."""
+
+    kind: ClassVar[str] = "audit.unlisted.v1"
+
+    what: Literal["strangers_refused", "repeated", "lost"]
+    count: int
+
+
+class AuditEvent(Protocol):
+    """An event of the stream `audit`."""
+
+    kind: ClassVar[str]
+
+
+def draft_of(event: AuditEvent, author: str = "") -> Draft:
+    """Encode an event of the audit for the journal. `author`: the id of a person; "" for strangers."""
+    return Draft(event.kind, author, stamped(msgspec.json.encode(event), author))

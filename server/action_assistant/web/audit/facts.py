@@ -1,0 +1,93 @@
+"""The events of the stream `audit` in words, for the logs of both processes."""
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+import msgspec
+
+from action_assistant.journal.events import Event
+from action_assistant.web.audit import events
+from action_assistant.web.audit.rows import AuditKind, Fact
+from action_assistant.web.auth.keys import PersonRef
+
+_HOW: Final[Mapping[str, str]] = {
+    "token": "by the link of the owner",
+    "link": "by a link",
+    "personal": "by a personal link",
+    "device": "on another device",
+}
+_REFUSED: Final[Mapping[str, str]] = {
+    "start": "was refused a start",
+    "change": "was refused a change of a run",
+    "go_on": "was refused to let a run go on",
+}
+_UNLISTED: Final[Mapping[str, str]] = {
+    "strangers_refused": "minutes with refused strangers have no row: there were too many that day",
+    "repeated": "refused starts and Stops without effect have no row: there were too many that day",
+    "lost": "facts of the audit could not be stored in time",
+}
+_EVENTS: Final = {
+    each.kind: each
+    for each in (
+        events.EditingBegan,
+        events.SignedIn,
+        events.SessionEnded,
+        events.StartRefused,
+        events.StopPressed,
+        events.StrangersRefused,
+        events.Unlisted,
+    )
+}
+
+
+def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | None:
+    """Return an event of the stream `audit` in words; None for a kind of a newer version. Raise
+    msgspec.DecodeError for a body that cannot be read."""
+    known = _EVENTS.get(event.kind)
+    found = None if known is None else msgspec.json.decode(event.body, type=known)
+    match found:
+        case events.EditingBegan(graph=graph, seq=seq):
+            name = graph_name(graph)
+            text = f"edited {name}, from change {seq} on"
+            return Fact(kind="edits", text=text, graph=graph, graph_name=name, seq=seq)
+        case events.SignedIn() as came:
+            text = f"signed in {_HOW.get(came.how, came.how)} as {came.role}"
+            person = PersonRef(event.author, came.name)
+            return Fact(kind="sessions", text=text, person=person)
+        case events.SessionEnded(session=session, own=own):
+            text = "signed out" if own else f"ended the session {session}"
+            return Fact(kind="sessions", text=text)
+        case events.StartRefused() as refused:
+            return _refused(refused)
+        case events.StopPressed(robot=robot, run=run, times=times):
+            what = f"on {robot}" if robot else "of a run" if run else "of everything"
+            robots = (robot,) if robot else ()
+            text = f"pressed Stop {what}{_again(times)}; nothing of this program was going on"
+            return Fact(kind="stops", text=text, run=run, robots=robots)
+        case events.StrangersRefused() as strangers:
+            noun = "request" if strangers.count == 1 else "requests"
+            whence = strangers.address or "this computer"
+            text = f"{strangers.count} {noun} from {whence} without a sign-in: {strangers.first}"
+            return Fact(kind="strangers", text=text, at=strangers.minute)
+        case events.Unlisted(what=what, count=count):
+            kind: AuditKind = "strangers" if what == "strangers_refused" else "other"
+            return Fact(kind=kind, text=f"{count} {_UNLISTED[what]}")
+    return None
+
+
+def _again(times: int) -> str:
+    return f" ({times} times in that minute)" if times > 1 else ""
+
+
+def _refused(refused: events.StartRefused) -> Fact:
+    what = _REFUSED[refused.what]
+    of = f" of {refused.graph_name}" if refused.graph_name else ""
+    on = f" on {', '.join(refused.engines)}" if refused.engines else ""
+    return Fact(
+        kind="refused",
+        text=f"{what}{of}{on}{_again(refused.times)}: {refused.why}",
+        graph=refused.graph,
+        graph_name=refused.graph_name,
+        run=refused.run,
+        robots=refused.engines,
+    )

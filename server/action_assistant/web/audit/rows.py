@@ -1,0 +1,237 @@
+"""Pages of the audit: rows that are read from the log of one process, the newest first."""
+
+from collections.abc import Callable, Collection, Iterable, Iterator
+from datetime import UTC, datetime
+from typing import Annotated, Any, Final, Literal, TypeAlias, get_args
+
+import msgspec
+from sqlalchemy import Connection, Select, func, select
+
+from action_assistant.journal.database import Branch
+from action_assistant.journal.events import Event
+from action_assistant.schema.editor_tables import editor_event
+from action_assistant.web.auth.caller import Origin, origin_in
+from action_assistant.web.auth.keys import PersonRef
+
+#: The kinds of rows, by which they are filtered.
+AuditKind: TypeAlias = Literal[
+    "edits",  # changes of documents: graphs and actions of the library
+    "graphs",  # made, renamed, deleted, published, drafts, proposals
+    "starts",  # and pause, resume, change, go on, words of people about runs
+    "refused",  # starts that were refused
+    "stops",
+    "robots",  # registrations, rights, batons, words about engines, drills
+    "sessions",  # sign-ins, ended sessions
+    "people",  # links, persons, groups, tokens, names
+    "strangers",  # refused requests without valid credentials
+    "other",
+]
+AUDIT_KINDS: Final = get_args(AuditKind)
+
+_SLICE: Final = 2_000  # positions that are looked at in one query
+_MOST: Final = 50_000  # positions for one page; then the reader asks on
+_DAY_US: Final = 24 * 3600 * 1_000_000  # by which the clock may have gone back
+_event: Final = editor_event.c
+_EVENTS: Final = select(*(_event[name] for name in Event.__struct_fields__))
+
+
+class AuditFilter(msgspec.Struct, frozen=True, kw_only=True):
+    """The rows that are asked for. `before`: only events of the log before this position. `since`,
+    `until`: microseconds UTC. `text`: a part of the row in any case."""
+
+    before: int | None = None
+    limit: Annotated[int, msgspec.Meta(ge=1, le=1000)] = 100
+    person: str = ""
+    robot: str = ""
+    graph: str = ""
+    kinds: tuple[AuditKind, ...] = ()
+    since: int | None = None
+    until: int | None = None
+    text: str = ""
+
+
+class Fact(msgspec.Struct, frozen=True, kw_only=True):
+    """An event in words. `text` follows the name of the person. `seq`: the moment of the graph.
+    `person`: the name that the event itself gives its author; `origin`: where an older event has it."""
+
+    kind: AuditKind
+    text: str
+    graph: str = ""
+    graph_name: str = ""
+    seq: int | None = None
+    run: str = ""
+    run_number: int | None = None
+    robots: tuple[str, ...] = ()
+    person: PersonRef | None = None
+    origin: Origin | None = None
+    at: int | None = None  # where it differs from the time of the event
+
+
+class AuditRow(
+    msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True, rename={"origin": "from"}
+):
+    """One fact of the audit. `id`: `editor` or `runner`, and the position in its log. `person`: none
+    for strangers. `from`: the connection of the person; none where it was not recorded."""
+
+    id: str
+    position: int
+    at: datetime
+    kind: AuditKind
+    event: str
+    text: str
+    person: PersonRef | None = None
+    origin: Origin | None = None
+    graph: str = ""
+    graph_name: str = ""
+    seq: int | None = None
+    run: str = ""
+    run_number: int | None = None
+    robots: tuple[str, ...] = ()
+
+
+class AuditPage(msgspec.Struct, frozen=True):
+    """Rows, the newest first. `before`: the cursor of the next page; null once the begin of the log is
+    reached. A page may be empty and have a cursor, since one answer looks at a part of the log.
+    `back_to`: the time of the oldest event that was looked at."""
+
+    rows: tuple[AuditRow, ...]
+    before: int | None
+    back_to: datetime | None
+
+
+#: Says an event in words; None for events that are no facts about people.
+Describe: TypeAlias = Callable[[Event], Fact | None]
+
+
+def audit_page(
+    connection: Connection,
+    branch: Branch,
+    wanted: AuditFilter,
+    describe: Describe,
+    never: Collection[str],
+) -> AuditPage:
+    """Return a page of the audit of one log. `never`: kinds of events that are no facts about people,
+    most of a log."""
+    end: int = connection.execute(select(func.max(_event.position))).scalar() or 0
+    cursor = end + 1 if wanted.before is None else min(wanted.before, end + 1)
+    last = max(1, cursor - _MOST)
+    rows: list[AuditRow] = []
+    back_to: int | None = None
+    while cursor > last and len(rows) < wanted.limit:
+        low = max(last, cursor - _SLICE)
+        for event in _events(connection, wanted, never, low, cursor):
+            cursor = event.position
+            row = _row(branch, event, wanted, describe)
+            if row is not None:
+                rows.append(row)
+                back_to = event.at
+                if len(rows) == wanted.limit:
+                    break
+        else:
+            cursor = low
+            newest, oldest = _times(connection, low)
+            back_to = oldest if oldest is not None else back_to
+            if wanted.since is not None and newest is not None and newest < wanted.since - _DAY_US:
+                return AuditPage(tuple(rows), None, _when(back_to))
+    return AuditPage(tuple(rows), cursor if cursor > 1 else None, _when(back_to))
+
+
+def _events(
+    connection: Connection, wanted: AuditFilter, never: Collection[str], low: int, high: int
+) -> Iterator[Event]:
+    chosen: Select[Any] = _EVENTS.where(
+        _event.position >= low, _event.position < high, _event.kind.not_in(never)
+    )
+    if wanted.person:
+        chosen = chosen.where(_event.author == wanted.person)
+    if wanted.since is not None:
+        chosen = chosen.where(_event.at >= wanted.since)
+    if wanted.until is not None:
+        chosen = chosen.where(_event.at < wanted.until)
+    for row in connection.execute(chosen.order_by(_event.position.desc())):
+        yield Event(*row)
+
+
+def _times(connection: Connection, position: int) -> tuple[int | None, int | None]:
+    """Return the time of the newest events up to a position, and of the event there."""
+    chosen = select(_event.at).where(_event.position <= position)
+    times = list(connection.scalars(chosen.order_by(_event.position.desc()).limit(_SLICE)))
+    return (max(times), times[0]) if times else (None, None)
+
+
+def _row(branch: Branch, event: Event, wanted: AuditFilter, describe: Describe) -> AuditRow | None:
+    origin = origin_in(event.body)
+    fact = _described(event, describe, origin)
+    if fact is None or (wanted.kinds and fact.kind not in wanted.kinds):
+        return None
+    if wanted.robot and wanted.robot not in fact.robots:
+        return None
+    if wanted.graph and wanted.graph not in {fact.graph, fact.graph_name}:
+        return None
+    person = fact.person or _person(event, origin)
+    found = AuditRow(
+        id=f"{branch}:{event.position}",
+        position=event.position,
+        at=_utc(event.at if fact.at is None else fact.at),
+        kind=fact.kind,
+        event=event.kind,
+        text=fact.text,
+        person=person,
+        origin=origin or fact.origin,
+        graph=fact.graph,
+        graph_name=fact.graph_name,
+        seq=fact.seq,
+        run=fact.run,
+        run_number=fact.run_number,
+        robots=fact.robots,
+    )
+    return found if not wanted.text or _holds(found, wanted.text) else None
+
+
+def _described(event: Event, describe: Describe, origin: Origin | None) -> Fact | None:
+    """Return an event in words. An event of an unknown kind that has the origin of a person is shown by
+    its kind, so that no newer kind is left out."""
+    try:
+        fact = describe(event)
+    except (msgspec.DecodeError, TypeError):
+        return Fact(kind="other", text=f"{event.kind} (it cannot be read)")
+    if fact is None and origin is not None:
+        return Fact(kind="other", text=event.kind)
+    return fact
+
+
+def _person(event: Event, origin: Origin | None) -> PersonRef | None:
+    if not event.author:
+        return None
+    return PersonRef(event.author, origin.name if origin is not None else "")
+
+
+def _holds(row: AuditRow, text: str) -> bool:
+    """Return whether a row has each word of a text somewhere, in any case."""
+    parts = [row.text, row.event, row.graph_name, row.run, *row.robots]
+    if row.person is not None:
+        parts += [row.person.name, row.person.id]
+    if row.origin is not None:
+        parts += [row.origin.address, row.origin.session, row.origin.token]
+    whole = "\n".join(parts).casefold()
+    return all(word in whole for word in text.casefold().split())
+
+
+def _when(at: int | None) -> datetime | None:
+    return None if at is None else _utc(at)
+
+
+def _utc(at: int) -> datetime:
+    return datetime.fromtimestamp(at / 1_000_000, UTC)
+
+
+def kinds_of(names: Iterable[str]) -> tuple[AuditKind, ...]:
+    """Return the kinds of these names. Raise ValueError for an unknown one."""
+    found: list[AuditKind] = []
+    for name in names:
+        if name not in AUDIT_KINDS:
+            raise ValueError(
+                f"{name!r} is no kind of the audit; there are {', '.join(AUDIT_KINDS)}"
+            )
+        found.append(name)  # type: ignore[arg-type]
+    return tuple(found)
