@@ -9,11 +9,9 @@ import sys
 
 
 def _stay_out_of_the_working_folder() -> None:
-    """Keep Python from importing modules of the working folder, here and in all processes that we
-    start.
-
-    `python -m` and an empty entry of PYTHONPATH put that folder before Python's own modules, so
-    this runs before any import of ours. `python -P -m` is safe from the start.
+    """Keep Python from importing modules of the working folder, in this process and all that it
+    starts. `python -m` and an empty entry of PYTHONPATH put that folder before Python's own
+    modules, so this runs before any import of this program. `python -P -m` is safe from the start.
     """
     os.environ["PYTHONSAFEPATH"] = "1"
     try:
@@ -31,8 +29,9 @@ _stay_out_of_the_working_folder()
 
 
 def main() -> int:
-    """Run one command and return its exit code. PYTHONPATH is removed before anything of ours is
-    imported; the runner gets back the parts that belong to ROS 2."""
+    """Run the command that the command line names, and return its exit code. PYTHONPATH is removed
+    before any module of this program is imported; the runner gets back the parts that belong to ROS
+    2."""
     from action_assistant import ros_workspace
 
     ros_workspace.hide()

@@ -204,8 +204,8 @@ def _complete(name: str, parser: argparse.ArgumentParser) -> None:
 
 
 def _with_ids_last(arguments: Sequence[str]) -> list[str]:
-    """Move ids of runs that begin with a dash behind `--`, so that argparse does not refuse a Stop
-    as an unknown option. Earlier versions made such ids."""
+    """Return the words of a command line with ids of runs that begin with a dash moved behind `--`,
+    so that argparse does not refuse a Stop as an unknown option. Earlier versions made such ids."""
     ids = [each for each in arguments if _DASHED_ID.fullmatch(each)]
     if not ids or "--" in arguments:
         return [*arguments]
@@ -213,8 +213,8 @@ def _with_ids_last(arguments: Sequence[str]) -> list[str]:
 
 
 def _check(entry: CommandEntry, name: str) -> None:
-    """Check that a command can run on this system, and load secrets from files. Raise CannotStart
-    if it cannot run or the environment has an error."""
+    """Raise CannotStart if the command `name` cannot run on this system or the environment has an
+    error; load secrets from the files that variables name."""
     if entry.posix and sys.platform == "win32":
         raise CannotStart(
             f"`{name}` needs Linux or macOS: on Windows use WSL, or a server elsewhere. Files can be "
@@ -227,7 +227,8 @@ def _check(entry: CommandEntry, name: str) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command and return its exit code."""
+    """Run the command that `arguments` name, and return its exit code, 2 if it cannot start.
+    Without `arguments` it takes the words of the command line, and hides passwords in them."""
     make_streams_printable()
     if arguments is None:
         hide_password()

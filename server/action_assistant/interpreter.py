@@ -43,13 +43,11 @@ class Interpreter(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def for_runner(environ: Mapping[str, str] = os.environ) -> Interpreter:
-    """Choose the Python interpreter for the runner, the first of these that there is: the program
-    that the variable `VARIABLE` names; the interpreter that runs this code, if it finds an rclpy
-    that fits; the interpreter that `make ros` made, if it is up to date. If there is none of them,
-    return the interpreter that runs this code, with a remark that says what does not fit.
-
-    Raise CannotStart if `VARIABLE` names something that is not a program.
-    """
+    """Return the Python interpreter for the runner, the first that exists of these: the program
+    that the variable `VARIABLE` names; the running interpreter, if it finds an rclpy that fits; the
+    one that `make ros` made, if it is up to date. If there is none, return the running interpreter
+    with a remark that says what does not fit. Raise CannotStart if `VARIABLE` names something that
+    is not a program."""
     named = environ.get(VARIABLE)
     if named:
         path = Path(named)
@@ -72,10 +70,8 @@ def for_runner(environ: Mapping[str, str] = os.environ) -> Interpreter:
 
 
 def rclpy_fits(environ: Mapping[str, str] = os.environ) -> bool:
-    """Return whether this interpreter finds an rclpy that was built for it.
-
-    The rclpy may be its own or that of the sourced workspace. Nothing is imported.
-    """
+    """Return whether this interpreter finds an rclpy that was built for it: its own, or that of the
+    ROS workspace that `environ` names. The call imports nothing."""
     own = importlib.util.find_spec("rclpy")
     if own is not None and ros_workspace.rclpy_fits(own):
         return True
@@ -83,10 +79,8 @@ def rclpy_fits(environ: Mapping[str, str] = os.environ) -> bool:
 
 
 def is_current(wheels: Path) -> bool:
-    """Return whether the environment of `make ros` has the packages that this checkout asks for.
-
-    An outdated environment may lack a package and would not even start.
-    """
+    """Return whether the environment of `make ros` (the folder `wheels`) has the packages that this
+    checkout asks for. An outdated environment may lack a package and would not even start."""
     try:
         made_for = (wheels / ".done").read_text().strip()
         asked = (wheels.parent / "requirements" / "ros.txt").read_bytes()

@@ -37,18 +37,20 @@ def request_id() -> str | None:
 
 
 def begin(ids: Mapping[str, str]) -> None:
-    """Let log lines of this task, and of tasks that it starts, carry exactly these ids."""
+    """Let log lines of this task, and of tasks that it starts, carry exactly the given ids, by kind
+    of subject."""
     _SUBJECTS.set(ids)
 
 
 def is_about(subject: Subject, id_of_it: str) -> None:
-    """Add an id to those that log lines of this task, and of tasks that it starts, carry."""
+    """Add an id to the ids that log lines of this task, and of tasks that it starts, carry.
+    `subject`: its kind, for example a run."""
     _SUBJECTS.set({**_SUBJECTS.get(), subject: id_of_it})
 
 
 @contextmanager
 def about(subject: Subject, id_of_it: str) -> Iterator[None]:
-    """Add a subject and its id to every log line that is written inside the block."""
+    """Return a context that adds a subject and its id to every log line written inside it."""
     token = _SUBJECTS.set({**_SUBJECTS.get(), subject: id_of_it})
     try:
         yield
@@ -77,7 +79,7 @@ class JsonLog(PrintableLog):
         self._process = process
 
     def format(self, record: logging.LogRecord) -> str:
-        """Return a record as one line of JSON."""
+        """Return a log record as one line of JSON."""
         at = time.strftime("%Y-%m-%dT%H:%M:%S", time.gmtime(record.created))
         line: dict[str, Any] = {
             "time": f"{at}.{int(record.msecs):03}Z",
@@ -121,8 +123,8 @@ class LogSettings(msgspec.Struct, frozen=True):
 def log_settings(
     form: str | None = None, level: str | None = None, environ: Mapping[str, str] = os.environ
 ) -> LogSettings:
-    """Return the log settings of the command line, or else of the environment. Raise CannotStart
-    for unknown values."""
+    """Return the settings of the log: `form` and `level` as the command line gives them, or else
+    from the environment, or else console and info. Raise CannotStart for unknown values."""
     given = {
         "form": (form or environ.get(_FORM, "")).strip().lower() or "console",
         "level": (level or environ.get(_LEVEL, "")).strip().lower() or "info",
@@ -136,12 +138,13 @@ def log_settings(
 
 
 def hand_on(chosen: LogSettings) -> None:
-    """Pass the log settings on to processes that this one starts."""
+    """Pass the settings of the log on to processes that this one starts, through the environment."""
     os.environ[_FORM], os.environ[_LEVEL] = chosen.form, chosen.level
 
 
 def set_up(process: str, chosen: LogSettings, *secrets: str) -> None:
-    """Write log lines to stderr from now on; `secrets` are never written."""
+    """Write log lines to stderr from now on. `process`: the name that lines of JSON carry;
+    `secrets` are replaced wherever they occur."""
     handler = logging.StreamHandler(sys.stderr)
     known = tuple(each for each in secrets if each)
     is_json = chosen.form == "json"
@@ -159,7 +162,7 @@ def set_up(process: str, chosen: LogSettings, *secrets: str) -> None:
 
 
 def set_up_worker(name: str) -> None:
-    """Set up the log of a worker process that was forked from this one."""
+    """Set up the log of a worker process named `name`, with the settings in its environment."""
     try:
         chosen = log_settings()
     except CannotStart:  # then its parent did not start either
@@ -168,13 +171,13 @@ def set_up_worker(name: str) -> None:
 
 
 def writes_json() -> bool:
-    """Return whether the log is written for programs."""
+    """Return whether the log is written as JSON, for programs."""
     return any(isinstance(each.formatter, JsonLog) for each in logging.getLogger().handlers)
 
 
 def say(text: str, level: Level = "info") -> None:
-    """Tell the person who started a command how it goes: in plain words, or as a log line if
-    programs read the log."""
+    """Write a sentence for the person who started a command to stderr; as a log line of `level` if
+    the log is written as JSON."""
     if writes_json():
         log.log(logging.getLevelName(level.upper()), "%s", text)
         return
@@ -183,5 +186,5 @@ def say(text: str, level: Level = "info") -> None:
 
 
 def _failed(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """Log an exception that nothing caught."""
+    """Log an exception that was caught nowhere; the parameters are those of `sys.excepthook`."""
     log.critical("failed", exc_info=(kind, error, trace))

@@ -14,7 +14,7 @@ def _carried(name: str, in_checkout: Path) -> Path:
 
 
 def migrations() -> Path:
-    """Return the folder of the Alembic scripts."""
+    """Return the folder of the Alembic scripts, which change the tables of a database."""
     return _carried("migrations", _CHECKOUT / "migrations")
 
 

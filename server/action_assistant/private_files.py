@@ -19,14 +19,14 @@ _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
 
 def opener(path: str, flags: int) -> int:
-    """Open a file so that only this user may read and write it if it is new. Pass this function to
-    `open(…, opener=opener)`."""
+    """Open the file `path` with the flags of `os.open`, and return its descriptor. A new file can
+    be read and written by this user only. Use it as `open(…, opener=opener)`."""
     return os.open(path, flags, 0o600)
 
 
 def make_folder(path: Path) -> None:
-    """Create a folder and its missing parents, readable only by this user. Raise OSError if that
-    fails."""
+    """Create the folder `path` and its missing parents, open to this user only. Raise OSError if
+    that fails."""
     if not path.is_dir():
         make_folder(path.parent)
         path.mkdir(mode=0o700, exist_ok=True)
@@ -52,7 +52,8 @@ def replace_file(
 
 
 def sync(path: Path) -> None:
-    """Flush a file or folder to disk, so that its content or a rename survives a power cut."""
+    """Flush the file or folder `path` to disk, so that its content or a rename survives a power
+    cut. The call waits for the disk."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
         os.fsync(descriptor)
@@ -61,9 +62,9 @@ def sync(path: Path) -> None:
 
 
 def own_folder(data: Path) -> Path:
-    """Make the data folder if it is missing, check that it is writable, close our files in it to
-    other users, and return its path. The folder itself stays open to other users if it also
-    holds files that are not ours. Raise CannotStart if it cannot be written."""
+    """Make the data folder if it is missing, check that it is writable, close the files of this
+    program in it to other users, and return its path. The folder itself stays open to other users
+    if it also holds foreign files. Raise CannotStart if it cannot be written."""
     prove_writable(data)
     for path in open_to_others(data):
         if path != data or holds_nothing_else(data):
@@ -84,24 +85,23 @@ def prove_writable(data: Path) -> None:
 
 
 def open_to_others(data: Path) -> list[Path]:
-    """Return the paths that other users of this computer may read or enter: the folder first, then
-    our files in it.
-
-    The list is empty on Windows, where modes say nothing about rights.
-    """
+    """Return the paths that other users of this computer may read or enter: the data folder first,
+    then files of this program in it. The list is empty on Windows, where modes say nothing about
+    rights."""
     if not hasattr(os, "geteuid"):
         return []  # Windows keeps rights in lists of its own, of which modes tell nothing
     return [path for path in (data, *_ours_in(data)) if _is_open(path)]
 
 
 def holds_nothing_else(data: Path) -> bool:
-    """Return whether the data folder holds only our files. If it holds others, the permissions of
-    the folder are left as they are."""
+    """Return whether the data folder holds only files of this program. If it holds others, the
+    permissions of the folder are left as they are."""
     return all(_OURS.fullmatch(entry.name) for entry in data.iterdir())
 
 
 def _ours_in(data: Path) -> Iterator[Path]:
-    """Yield our files and folders, each folder before its content; symbolic links are skipped."""
+    """Yield the files and folders of this program in a data folder, each folder before its content;
+    symbolic links are skipped."""
     for entry in sorted(data.iterdir()):
         if not _OURS.fullmatch(entry.name) or entry.is_symlink():
             continue
@@ -127,7 +127,8 @@ def _close(path: Path) -> None:
 
 
 def of_others(data: Path) -> list[Path]:
-    """Return our files in a data folder that belong to another user than the folder does."""
+    """Return the files of this program in a data folder that belong to another user than the folder
+    does."""
     owner = data.stat().st_uid
     found: list[Path] = []
     for path in _ours_in(data):

@@ -55,7 +55,7 @@ class PublicUrl(msgspec.Struct, frozen=True):
 
     @property
     def origin(self) -> str:
-        """Return the origin as browsers send it."""
+        """Return the origin (scheme, host and port) as browsers send it."""
         return f"{self.scheme}://{self.authority}"
 
     @property
@@ -74,12 +74,14 @@ class PublicUrl(msgspec.Struct, frozen=True):
         return self.scheme == "https"
 
     def is_named(self, name: str, port: int | None) -> bool:
-        """Return whether a Host header names this address. Proxies may leave the port out."""
+        """Return whether a Host header with this name and port (None: without one) names the
+        address. Proxies may leave the port out."""
         return name == self.host and port in {None, self.port}
 
 
 def public_url(text: str) -> PublicUrl:
-    """Parse the public address that somebody configured. Raise CannotStart if it cannot be used."""
+    """Parse the public address in the settings, for example `https://robots.example.org/temoto/`.
+    Raise CannotStart if it cannot be used."""
     try:
         parts = urlsplit(text.strip())
         port = parts.port
@@ -114,8 +116,8 @@ def public_url(text: str) -> PublicUrl:
 
 
 def proxies(text: str) -> tuple[Network, ...]:
-    """Parse a list of addresses and networks that are separated by commas. Raise CannotStart if an
-    entry is neither."""
+    """Parse IP addresses and networks that are separated by commas. Raise CannotStart if an entry
+    is neither."""
     try:
         return tuple(ipaddress.ip_network(each.strip()) for each in text.split(",") if each.strip())
     except ValueError as error:

@@ -37,11 +37,9 @@ _EXTENSION: Final = "_rclpy_pybind11"
 
 
 def hide() -> None:
-    """Remove from this process, and all that it starts, the folders that PYTHONPATH put before our
-    own packages.
-
-    Folders that Python searches anyway stay, after the others; so does the folder of this program.
-    """
+    """Remove from this process, and all that it starts, the folders that PYTHONPATH put before this
+    program's packages. Folders that Python searches anyway stay, after the others; so does the
+    folder of this program."""
     named = os.environ.pop("PYTHONPATH", "")
     listed = {_real(each) for each in named.split(os.pathsep) if named}  # "" is where we are
     program = Path(__file__).resolve().parents[1]
@@ -53,15 +51,17 @@ def hide() -> None:
 
 
 def offer(environ: Mapping[str, str] = os.environ) -> None:
-    """Let this process import rclpy and messages of the sourced workspace, if there is one."""
+    """Let this process import rclpy and messages of the ROS workspace that `environ` names, if
+    there is one."""
     workspace = Workspace.of(environ)
     if workspace.prefixes and workspace not in sys.meta_path:
         sys.meta_path.append(workspace)
 
 
 class Workspace:
-    """The prefixes of a sourced ROS 2, nearest first; empty if none is sourced. It finds modules by
-    duck typing, since importing `importlib.abc` takes longer than everything here."""
+    """The install folders (prefixes) of a sourced ROS 2, nearest first; empty if none is sourced.
+    It finds modules by duck typing, since importing `importlib.abc` takes longer than all else in
+    this module."""
 
     def __init__(self, prefixes: tuple[Path, ...], system: tuple[Path, ...]) -> None:
         self.prefixes = prefixes
@@ -73,11 +73,9 @@ class Workspace:
         environ: Mapping[str, str],
         system: tuple[Path, ...] = (Path("/usr"), Path(sys.base_prefix)),
     ) -> "Workspace":
-        """Return the workspace that an environment names.
-
-        `system` lists the folders where numpy may be. The distribution's folder comes first, since
-        the messages were compiled against its version.
-        """
+        """Return the workspace that an environment names. `system` lists folders where numpy of the
+        distribution may be; it is preferred to other copies, since the messages were compiled
+        against it."""
         named = environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep)
         prefixes = tuple(each for each in map(Path, named) if each.is_absolute())
         return cls(prefixes, system)
@@ -91,10 +89,9 @@ class Workspace:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None = None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        """Return the spec of a module in the workspace, as the protocol of import finders asks.
-
-        Names with a dot are left to the finder of their package.
-        """
+        """Return the spec of the module `fullname` in the workspace, or None if it is not there or
+        has a dot in its name, which is left to the finder of its package. The other parameters are
+        those of import finders and are not used."""
         if "." in fullname or not self.prefixes:
             return None
         prefixes = [each for each in self.prefixes if (each / _INDEX / fullname).exists()]
@@ -112,10 +109,8 @@ class Workspace:
         return found if found is not None and rclpy_fits(found) else None
 
     def other_python(self) -> str:
-        """Return a sentence that says why the workspace's rclpy does not fit this Python.
-
-        The sentence is empty where rclpy fits, or where there is none.
-        """
+        """Return a sentence that says why the workspace's rclpy does not fit this Python; "" if it
+        fits or the workspace has no rclpy."""
         if self.rclpy() is not None:
             return ""
         for prefix in self.prefixes:
@@ -138,7 +133,8 @@ def rclpy_fits(rclpy: ModuleSpec) -> bool:
 
 
 def prefix_of(file: str) -> str:
-    """Return the prefix that holds a module of a workspace, for messages."""
+    """Return, for messages to people, the prefix of the workspace that holds the file of a module;
+    the folder of the file if no prefix does."""
     for each in Path(file).parents:
         if (each / _INDEX).is_dir():
             return str(each)
@@ -146,11 +142,8 @@ def prefix_of(file: str) -> str:
 
 
 def source_of(build: Path) -> Path | None:
-    """Return the source folder of the package that colcon built in this folder, from the cache of
-    CMake.
-
-    Return None where the cache does not name it.
-    """
+    """Return the source folder of the package that colcon built in the folder `build`, read from
+    the cache of CMake; None if the cache cannot be read or does not name it."""
     try:
         with (build / "CMakeCache.txt").open("rb") as file:
             cache = file.read(_CACHE).decode(errors="replace")
@@ -169,7 +162,8 @@ def _for_another(prefix: Path, version: str) -> str:
 
 
 def _fits(found: ModuleSpec) -> bool:
-    """Return whether the compiled parts of a package beside ROS, if it has any, fit this Python."""
+    """Return whether the compiled parts of a found package that is not of ROS itself, such as
+    numpy, fit this Python. A package without such parts fits."""
     built = _BESIDE.get(found.name, ())
     return not built or any(
         Path(folder, f"{name}{suffix}").exists()

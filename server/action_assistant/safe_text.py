@@ -52,26 +52,23 @@ def printable(text: str) -> str:
 
 
 def told(text: str) -> str:
-    """Return sentences for a terminal, in an order that no name in them reverses.
-
+    """Return text for a terminal: printable, and in an order that no name in it reverses.
     Right-to-left words stand between marks (U+200E), not in isolates, which some terminals show as
-    boxes.
-    """
+    boxes."""
     return printable(_ISOLATED.sub("\u200e\\1\u200e", sentence(text)))
 
 
 def one_line(text: str) -> str:
-    """Return the text as `told` does, in one line, so that it cannot imitate another line."""
+    """Return the text as `told` does, but in one line, so that a name in it cannot imitate another
+    line."""
     return told(text).replace("\n", "\\n")
 
 
 def sentence(text: str) -> str:
-    """Return a sentence in an order that no name in it reverses.
-
-    A direction control is shown as JSON writes it, since nobody knows where the name ends;
-    right-to-left words become isolates (U+2068 to U+2069). Other text, and a result of this
-    function, stays unchanged.
-    """
+    """Return a sentence in an order that no name in it reverses. A character that controls the
+    direction is shown as its JSON escape, since it is not known where the name ends; right-to-left
+    words become isolates (U+2068 to U+2069). Other text, and a result of this function, stays
+    unchanged."""
     return _TURNED.sub(_in_order, text) if _TURNING.search(text) else text
 
 
@@ -82,8 +79,8 @@ def _in_order(found: re.Match[str]) -> str:
 
 
 def hold_names(told: msgspec.Struct, *fields: str) -> None:
-    """Apply `sentence` to these fields of a struct; for the `__post_init__` of structs that people
-    read."""
+    """Replace the named text fields of a struct by their `sentence`. Structs that people read call
+    this in `__post_init__`."""
     for field in fields:
         text = getattr(told, field)
         if text and _TURNING.search(text):
@@ -91,8 +88,8 @@ def hold_names(told: msgspec.Struct, *fields: str) -> None:
 
 
 def redacted(text: str, secrets: tuple[str, ...] = ()) -> str:
-    """Return the text without secrets: each of `secrets`, and each pattern that looks like a
-    secret, is replaced."""
+    """Return the text with each of `secrets`, and all that has the form of a password or token,
+    replaced."""
     for secret in secrets:
         text = text.replace(secret, "…")
     for pattern, shown in _SECRETS:
@@ -133,7 +130,7 @@ class PrintableLog(logging.Formatter):
         self._secrets = secrets
 
     def format(self, record: logging.LogRecord) -> str:
-        """Format a record, with the secrets replaced."""
+        """Return a record as text, with the secrets replaced."""
         return redacted(super().format(record), self._secrets)
 
     def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 - as `logging` asks

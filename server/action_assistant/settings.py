@@ -129,7 +129,8 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
-    """Raise CannotStart for an unknown variable of ours: a misspelt setting must not be ignored."""
+    """Raise CannotStart if `environ` has an unknown variable that begins with ACTION_ASSISTANT_: a
+    misspelt setting must not be ignored."""
     unknown = sorted(
         name for name in environ if name.startswith("ACTION_ASSISTANT_") and name not in VARIABLES
     )
@@ -139,8 +140,9 @@ def check_environment(environ: Mapping[str, str] = os.environ) -> None:
 
 
 def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> None:
-    """Read the secrets from the files that variables name into the environment, for this process
-    and those that it starts. Raise CannotStart if a file cannot be read."""
+    """Read secrets from the files that variables of `environ` name, and set them in `environ`,
+    which is also passed to processes that this one starts. Raise CannotStart if a file cannot be
+    read or a secret is set twice."""
     for name, secret in _FILES.items():
         path = environ.get(name, "")
         if not path:
@@ -162,7 +164,7 @@ def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> N
 
 def port(environ: Mapping[str, str] = os.environ) -> int:
     """Return the port of the editor from ACTION_ASSISTANT_PORT, or 8000 if the variable is not set.
-    Raise CannotStart if it is no port below 65535."""
+    Raise CannotStart unless it is a number from 1 to 65534."""
     text = environ.get("ACTION_ASSISTANT_PORT", "").strip() or "8000"
     if not text.isdecimal() or not 0 < int(text) < 65535:
         raise CannotStart(f"ACTION_ASSISTANT_PORT is a port below 65535, not {text!r}.")
@@ -170,8 +172,8 @@ def port(environ: Mapping[str, str] = os.environ) -> int:
 
 
 def share(environ: Mapping[str, str] = os.environ) -> str:
-    """Return how the environment lets others on the network in: "", "http" or "tls". Raise
-    CannotStart for other values."""
+    """Return how ACTION_ASSISTANT_SHARE lets others on the network in: "" (not at all), "http" or
+    "tls". Raise CannotStart for other values."""
     text = environ.get("ACTION_ASSISTANT_SHARE", "").strip().lower()
     if text not in {"", "http", "tls"}:
         raise CannotStart(f"ACTION_ASSISTANT_SHARE is `http` or `tls`, not {text!r}.")
@@ -224,8 +226,8 @@ def hide_target_password() -> None:
 
 
 def _is_database(name: str) -> bool:
-    """Return whether an argument is the option `--database` or a beginning of it that argparse
-    accepts. `--data` is another option."""
+    """Return whether the argument `name` is the option `--database` or a beginning of it that
+    argparse accepts. `--data` is another option."""
     return len(name) > len("--data") and "--database".startswith(name)
 
 
@@ -248,18 +250,20 @@ def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
 
 
 def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | None:
-    """Return one setting of regular backups from the environment: TO, EVERY, KEEP or AFTER."""
+    """Return a setting of regular backups from the variable ACTION_ASSISTANT_BACKUP_<name>; None if
+    it is not set. `name`: TO, EVERY, KEEP or AFTER."""
     return environ.get(f"ACTION_ASSISTANT_BACKUP_{name}", "").strip() or None
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:
-    """Return whether the limits for rates and sockets are on."""
+    """Return whether rates and numbers of sockets are limited: they are unless
+    ACTION_ASSISTANT_LIMITS is `off`."""
     return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
 
 
 def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
-    """Return whether rooms take their sockets over from the server below. Raise CannotStart for an
-    unknown value."""
+    """Return whether rooms read their sockets directly and not through ASGI: they do unless
+    ACTION_ASSISTANT_SOCKETS is `asgi`. Raise CannotStart for an unknown value."""
     way = environ.get("ACTION_ASSISTANT_SOCKETS", "").strip().lower()
     if way not in {"", "direct", "asgi"}:
         raise CannotStart(f"ACTION_ASSISTANT_SOCKETS is direct or asgi, not {way!r}.")
@@ -267,8 +271,9 @@ def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:
 
 
 def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:
-    """Return how long runs and raw messages are kept, and the folder of archives. Raise CannotStart
-    if a variable is malformed."""
+    """Return how many days runs and raw messages stay in the database before they are archived, and
+    the folder of archives, by default in the data folder `data`. Raise CannotStart if a variable is
+    malformed."""
     return Keep(
         folder=Path(environ.get("ACTION_ASSISTANT_ARCHIVE") or data / ARCHIVE).resolve(),
         runs=_days("ACTION_ASSISTANT_KEEP_RUNS", environ),
@@ -292,8 +297,9 @@ def _days(name: str, environ: Mapping[str, str]) -> float | None:
 def index_folders(
     given: Sequence[str] = (), environ: Mapping[str, str] = os.environ
 ) -> dict[str, Path]:
-    """Return the index folder of each robot, from ROBOT=DIR texts of the command line or else of
-    the environment. Raise CannotStart if a text is malformed or names a robot twice."""
+    """Return the index folder of each robot, by the name of the robot. `given`: texts ROBOT=DIR of
+    the command line; if there are none, they are read from the environment. Raise CannotStart if a
+    text is malformed or names a robot twice."""
     written = given or environ.get(INDEX_FOLDERS, "").split(os.pathsep)
     found: dict[str, Path] = {}
     for each in filter(str.strip, written):
@@ -312,8 +318,8 @@ def as_index_folders(folders: Mapping[str, Path]) -> str:
 
 
 def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
-    """Return the host names from ACTION_ASSISTANT_HOSTS under which people reach the page, beside
-    the loopback names."""
+    """Return the host names in ACTION_ASSISTANT_HOSTS, in lower case, under which people reach the
+    page beside the loopback names; empty if it is not set."""
     names = environ.get("ACTION_ASSISTANT_HOSTS", "")
     return tuple(name.strip().lower() for name in names.split(",") if name.strip())
 
@@ -321,12 +327,9 @@ def more_hosts(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
 def reached(
     url: str | None, trusted: str | None, environ: Mapping[str, str] = os.environ
 ) -> Reachability:
-    """Return the public address and the trusted proxies, from the command line or else from the
-    environment.
-
-    Behind a public address, the proxies of this computer are trusted unless others are named. Raise
-    CannotStart if an address is malformed.
-    """
+    """Return the public address (`url`) and the trusted proxies (`trusted`), each as the command
+    line gives it or, if None, from the environment. Behind a public address, the proxies of this
+    computer are trusted unless others are named. Raise CannotStart if an address is malformed."""
     written = url if url is not None else environ.get("ACTION_ASSISTANT_PUBLIC_URL", "")
     public = public_url(written) if written.strip() else None
     named = trusted if trusted is not None else environ.get("ACTION_ASSISTANT_TRUSTED_PROXIES", "")
@@ -338,8 +341,8 @@ def reached(
 def check_host(
     host: str, hosts: tuple[str, ...], *, share: bool = False, public: PublicUrl | None = None
 ) -> None:
-    """Raise CannotStart for an address that strangers reach, unless sharing, host names or a public
-    address are set."""
+    """Raise CannotStart if strangers can reach the address `host` although neither sharing
+    (`share`), host names nor a public address are set."""
     if host not in LOOPBACK and not hosts and not share and public is None:
         raise CannotStart(
             f"Listening on {host} would show this computer's graphs and robots to the network. "
@@ -349,14 +352,15 @@ def check_host(
 
 
 def data_folder(path: Path) -> Path:
-    """Return a data folder, created if needed, writable and closed to other users. Raise
-    CannotStart if it cannot be made so."""
+    """Create the data folder `path` if it is missing, close it to other users, and return it. Raise
+    CannotStart if it cannot be written or holds half of a backup."""
     settled(path)
     return own_folder(path)
 
 
 def settled(path: Path) -> None:
-    """Raise CannotStart for a folder that holds half of a backup."""
+    """Raise CannotStart if the data folder `path` holds half of a backup, since a restore was
+    interrupted."""
     if (path / RESTORING).exists():
         raise CannotStart(
             f"A restore into {path} was interrupted, so that it holds parts of a backup: run "

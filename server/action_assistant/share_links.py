@@ -38,8 +38,10 @@ class Links(msgspec.Struct, frozen=True):
 def invitations_as_text(
     base: str, keys: Keys, trust: ssl.SSLContext | None = None, *, secret: bool = False
 ) -> str:
-    """Return the links of a running editor as text, made for roles without one; or why there are
-    none. With `secret`, say only where they are found."""
+    """Return the links by which others may join, as text for people, or a sentence that says why
+    there are none. An invitation is made for each role without one. `base`: the URL of the running
+    editor, which is asked with `keys`; `trust`: its TLS. With `secret`, the text says only how to
+    list the links."""
     try:
         links = msgspec.json.decode(_ask(base, keys, trust, "GET"), type=Links)
         if not links.origins:
@@ -70,7 +72,8 @@ def invitations_as_text(
 
 
 def is_ours(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> bool:
-    """Return whether the server at an address knows our token, so that it may be sent there."""
+    """Return whether the server at the URL `base` proves that it knows the token of `keys`, so that
+    the token may be sent there. Wait for at most a second."""
     challenge = secrets.token_urlsafe(32)
     url = f"{base}/api/server?challenge={challenge}"
     try:
@@ -106,7 +109,7 @@ def _text(origins: list[str], link: ShareLink) -> str:
 
 
 def may_of(role: str) -> str:
-    """Return in words what a role may do."""
+    """Return in words the things that a role may do."""
     match role:
         case "viewer" | "editor" | "operator" | "owner":
             return may(role)
@@ -115,15 +118,15 @@ def may_of(role: str) -> str:
 
 
 def _drawn(link: str) -> str:
-    """Return a QR code of half blocks, readable on dark and light terminals."""
+    """Return a QR code of a link as text of half blocks, readable on dark and light terminals."""
     out = io.StringIO()
     segno.make(link, error="l", micro=False).terminal(out, compact=True, border=2)
     return "".join(f"    {line}\n" for line in out.getvalue().splitlines())
 
 
 def _opener(trust: ssl.SSLContext | None) -> urllib.request.OpenerDirector:
-    """Return an opener for the URLs of our own processes. It uses no proxy, since a proxy would see
-    the token."""
+    """Return an opener for the URLs of this program's own processes; `trust` is the TLS context. It
+    uses no proxy, since a proxy would see the token."""
     return urllib.request.build_opener(
         urllib.request.ProxyHandler({}), urllib.request.HTTPSHandler(context=trust)
     )

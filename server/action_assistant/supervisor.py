@@ -80,14 +80,15 @@ class EndSignal:
         self._came = True
 
     def within(self, seconds: float) -> bool:
-        """Wait up to this many seconds, and return whether a signal was received."""
+        """Wait up to this many seconds, unless a signal has come before, and return whether one has
+        come."""
         if not self._came:
             time.sleep(seconds)
         return self._came
 
 
 class Child:
-    """Runs one of the processes, and starts it again when it dies."""
+    """Runs one process of the program, and starts it again when it dies."""
 
     def __init__(
         self,
@@ -109,7 +110,8 @@ class Child:
         self._again = 0.0  # when to start, by the monotonic clock
 
     def start(self, parent: int) -> None:
-        """Start it. `parent` is the reading end of a pipe that closes when we die."""
+        """Start the process. `parent` is the reading end of a pipe that closes when this process
+        dies."""
         environment = {**self._interpreter.environment(os.environ), **self._settings}
         environment["_ACTION_ASSISTANT_PARENT"] = str(parent)
         self._born = time.monotonic()
@@ -122,8 +124,8 @@ class Child:
         )
 
     def tend(self, parent: int) -> int | None:
-        """Start the process again some time after its death. Return its exit code if a new start is
-        hopeless."""
+        """Start the process if it has died and a pause has passed; call this again and again.
+        Return None, or its exit code if a new start is hopeless. `parent`: as for `start`."""
         now = time.monotonic()
         if self._process is None:
             if now >= self._again:
@@ -144,7 +146,7 @@ class Child:
         return None
 
     def end(self) -> None:
-        """Ask it to end, and see that it does."""
+        """Ask the process to end, wait for that, and kill it if it takes too long."""
         if self._process is None:
             return
         self._process.terminate()
@@ -158,8 +160,8 @@ class Child:
 
 
 def serve(plan: ServePlan) -> int:
-    """Run all processes until told to end; return the exit code. Raise CannotStart if a port is
-    taken."""
+    """Run the editor, the runner and the regular backups until a signal comes or one of them cannot
+    start; return the exit code. Raise CannotStart if a port is taken."""
     for port in (plan.port, plan.port + 1):
         for probe in bound(plan.host, port):
             probe.close()
@@ -193,8 +195,8 @@ def serve(plan: ServePlan) -> int:
 
 
 def _children(plan: ServePlan) -> list[Child]:
-    """Return the processes in the order in which they are started and, later, ended: the editor,
-    then the runner."""
+    """Return the processes of a plan, not started yet, in the order in which they are started and
+    ended: the editor, then the runner."""
     address = ["--data", str(plan.data), "--host", plan.host]
     address += [flag for flag, on in (("--share", plan.share), ("--tls", plan.tls)) if on]
     database = {"ACTION_ASSISTANT_DATABASE": plan.database} if plan.database else {}
@@ -225,8 +227,8 @@ def _children(plan: ServePlan) -> list[Child]:
 
 
 def _keeper(plan: ServePlan) -> Child | None:
-    """Return the process that makes backups, with a low priority; None where no backups are
-    planned."""
+    """Return the process, not started yet, that makes backups with a low priority; None if no
+    backups are planned."""
     if plan.backups is None:
         return None
     keeps = plan.backups
@@ -240,8 +242,9 @@ def _keeper(plan: ServePlan) -> Child | None:
 
 
 def _as_settings(reached: Reachability) -> dict[str, str]:
-    """Return environment variables for both processes. They are not arguments, which might contain
-    a word by which people find processes."""
+    """Return the public address and the trusted proxies as environment variables for both
+    processes. They are not arguments, which might contain a text by which people look for
+    processes."""
     return {
         "ACTION_ASSISTANT_PUBLIC_URL": f"{reached.public.page}/" if reached.public else "",
         "ACTION_ASSISTANT_TRUSTED_PROXIES": ",".join(str(each) for each in reached.proxies),
@@ -249,8 +252,8 @@ def _as_settings(reached: Reachability) -> dict[str, str]:
 
 
 def _certified(plan: ServePlan) -> ssl.SSLContext | None:
-    """With --tls, issue the certificate before the processes start; return the TLS context that
-    trusts it, else None."""
+    """With --tls, issue the certificate before the processes start, and return the TLS context that
+    trusts it; else return None."""
     if not plan.tls:
         return None
     # Most do without, and it takes as long to load as much of the rest.
@@ -275,7 +278,8 @@ def _greet(
     children: list[Child],
     enough: EndSignal,
 ) -> None:
-    """Say where the page is once both processes answer, and open it."""
+    """Wait until both processes answer, then print the URL of the page and open it in a browser. Do
+    nothing if the program is told to end (`enough`) before."""
     here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"
     origin = f"{'https' if plan.tls else 'http'}://{f'[{here}]' if ':' in here else here}"
     if not _answer(origin, keys, trust, children, enough):
@@ -312,7 +316,8 @@ def _answer(
     children: list[Child],
     enough: EndSignal,
 ) -> bool:
-    """Wait until every process answers; return False if told to end before."""
+    """Wait until every process of `children` answers at `origin`, without a limit of time. Return
+    False if a signal to end comes before (`enough`)."""
     deadline = time.monotonic() + _PATIENCE
     for child in children:
         while not is_ours(f"{origin}:{child.port}", keys, trust):

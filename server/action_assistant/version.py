@@ -24,8 +24,8 @@ _SHORT: Final = 8
 
 @cache
 def commit() -> str | None:
-    """Return the commit of this program as 40 hex digits; None if it is not known. A `+` follows if
-    the wheel was built from files with changes that were not committed."""
+    """Return the commit of this program as 40 hex digits, or None. A `+` follows if the wheel was
+    built from files with changes that were not committed."""
     try:
         return _CARRIED.read_text().strip() or None
     except OSError:

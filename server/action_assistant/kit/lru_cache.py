@@ -26,7 +26,8 @@ class LruCache(Generic[K, V]):
         return found[0]
 
     def put(self, key: K, value: V, weight: int = 0) -> V:
-        """Store a value and return it; drop the least recently used values beyond the limits."""
+        """Store a value of the given weight under a key, and return the value. The least recently
+        used values beyond the limits are dropped."""
         self._weight += weight - self._values.pop(key, (None, 0))[1]
         self._values[key] = value, weight
         while len(self._values) > 1 and self._is_too_much():

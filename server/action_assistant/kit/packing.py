@@ -11,19 +11,19 @@ _ZLIB: Final = b"\x78"  # the first byte of everything that zlib compresses
 
 
 def packed(plain: bytes, *, least: int) -> bytes:
-    """Return the bytes compressed to a third or less, or as they are if there are fewer than `least`.
-    Compressing needs no interpreter lock, so a thread can do it."""
+    """Return the bytes compressed by zlib, or unchanged if there are fewer than `least`.
+    Compressing holds no interpreter lock, so it can run on a thread."""
     return plain if len(plain) < least else zlib.compress(plain, level=1)
 
 
 def is_packed(stored: bytes) -> bool:
-    """Return whether `packed` compressed these bytes."""
+    """Return whether stored bytes are the output of `packed` in its compressed form."""
     return stored[:1] == _ZLIB
 
 
 def unpacked(stored: bytes) -> bytes:
-    """Return what was packed. Return plain bytes and damaged ones as they are: whoever decodes damaged
-    bytes finds that they are no document."""
+    """Return the bytes that were given to `packed`. Plain and damaged bytes are returned unchanged:
+    a decoder finds that damaged ones are no document."""
     if not is_packed(stored):
         return stored
     try:

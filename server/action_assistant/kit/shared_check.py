@@ -9,8 +9,8 @@ T = TypeVar("T")
 
 
 class SharedCheck(Generic[T]):
-    """Calls `ask` for many callers together. An answer is reused for `fresh` seconds; a caller
-    waits for at most `patience` seconds. A call that hangs is not repeated."""
+    """Calls the async function `ask` once for many callers. An answer is reused for `fresh`
+    seconds; a caller waits for at most `patience` seconds. A call that hangs is not repeated."""
 
     def __init__(
         self, ask: Callable[[], Awaitable[T]], *, patience: float, fresh: float = 1.0
@@ -23,14 +23,15 @@ class SharedCheck(Generic[T]):
         self._last: tuple[T, float, float] | None = None
 
     async def answer(self) -> T | None:
-        """Return the answer; None if there is none in time. Raises the errors of `ask`."""
+        """Return the answer of `ask`, which may be a fresh earlier one; None if it does not come
+        within `patience` seconds. Raise the errors of `ask`."""
         task = self.begin()
         done, _ = await asyncio.wait({task}, timeout=self._patience)
         return task.result() if done else None
 
     def begin(self) -> "asyncio.Task[T]":
-        """Start to ask, unless a question is under way or the last answer is fresh. Return the task
-        whose result is the answer."""
+        """Call `ask` without waiting, unless a call is running or the last answer is fresh. Return
+        the task whose result is the answer."""
         loop = asyncio.get_running_loop()
         task = self._task
         if task is None or (task.done() and loop.time() - self._answered_at > self._fresh):
@@ -74,12 +75,14 @@ class SharedCheck(Generic[T]):
             self._answered_at = loop.time()
 
     def cancel(self) -> None:
-        """Cancel the running call, since nobody needs its answer."""
+        """Cancel the running call of `ask`, if there is one. Call this when its answer is not
+        needed any more."""
         if self._task is not None:
             self._task.cancel()
 
 
 def _heard(task: "asyncio.Task[T]") -> None:
-    """Fetch the exception of a task whose caller may not wait any more; `failure` reports it."""
+    """Fetch the exception of an ended task, so that asyncio does not warn where no caller waits for
+    it any more; `failure` reports it."""
     if not task.cancelled():
         task.exception()

@@ -23,13 +23,13 @@ class TokenBucket:
         self._at = clock()
 
     def spend(self, tokens: float) -> None:
-        """Take tokens, also more than there are."""
+        """Take this number of tokens, even if the bucket holds fewer; then it is in debt."""
         self._refill()
         self._tokens -= tokens
 
     def take(self) -> bool:
-        """Take one token; return False if there is none. A failed attempt also loses the part of
-        the next token, so that endless attempts never succeed."""
+        """Take one token; return False if the bucket holds less than one. A failed attempt also
+        loses that part of a token, so that endless attempts never succeed."""
         self._refill()
         there = self._tokens >= 1
         self._tokens = max(0.0, self._tokens - 1)
@@ -47,7 +47,7 @@ class TokenBucket:
 
     @property
     def used_at(self) -> float:
-        """Return the time of the last call, by the clock of the bucket."""
+        """Return the time of the last call, in seconds of the clock that the bucket was given."""
         return self._at
 
     def _refill(self) -> None:

@@ -24,8 +24,8 @@ NAMES: Final = {
 
 
 def log_tables(metadata: MetaData) -> tuple[Table, Table, Table]:
-    """Define the tables `event`, `head` and `snapshot` of an event log in `metadata`, and return
-    them."""
+    """Define the tables of an event log in `metadata`, and return them: `event` (the events of all
+    streams), `head` (the last event of each stream) and `snapshot`."""
     event = Table(
         "event",
         metadata,
@@ -58,13 +58,10 @@ def log_tables(metadata: MetaData) -> tuple[Table, Table, Table]:
 
 
 def written_by_table(metadata: MetaData) -> Table:
-    """Return the table that lists which versions of the program wrote to a database, with one row
-    for each change of the version.
-
-    A row holds the version, the time since which this version writes, and the revision of the
-    tables. Versions of the program that are older than this one read the last row, so the columns
-    never change.
-    """
+    """Define in `metadata`, and return, the table that lists which versions of the program wrote to
+    a database, with one row for each change of the version. A row holds the version, the time since
+    which it writes, and the revision of the tables. Older versions of the program read the last
+    row, so the columns never change."""
     return Table(
         "written_by",
         metadata,

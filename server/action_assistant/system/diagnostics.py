@@ -104,13 +104,15 @@ CODES: Final[Mapping[str, Severity]] = {
 
 
 def found(code: str, where: object, message: str, remedy: str) -> Diagnostic:
-    """Return the diagnostic of a fault, with the severity of its code. `where`: the path, address
-    or setting with the fault; it becomes text. Raise KeyError for a code that is not in `CODES`."""
+    """Return the diagnostic of a fault, with the severity that `CODES` gives its code. `where`: the
+    path, address or setting with the fault; `message` and `remedy` are sentences for people. Raise
+    KeyError for a code that is not in `CODES`."""
     return Diagnostic(
         code=code, severity=CODES[code], where=str(where), message=message, remedy=remedy
     )
 
 
 def fine(where: object, message: str) -> Diagnostic:
-    """Return the diagnostic of a check that found no fault."""
+    """Return the diagnostic of a check that found no fault. `where`: the path, address or setting
+    that was checked; `message`: the result for people."""
     return Diagnostic(code="", severity="fine", where=str(where), message=message, remedy="")

@@ -26,8 +26,8 @@ resource: Final = _module("resource")
 
 
 def lock_file(descriptor: int) -> bool:
-    """Lock an open file until it is closed or the process ends; return False if another process has
-    locked it. Raise CannotStart if the system has no such locks."""
+    """Lock an open file until it is closed or the process ends; return False at once if another
+    process has locked it. Raise CannotStart if the system has no such locks."""
     try:
         _locking(descriptor, wait=False)
     except OSError:
@@ -36,8 +36,8 @@ def lock_file(descriptor: int) -> bool:
 
 
 def wait_for_lock(descriptor: int) -> None:
-    """Lock an open file, waiting until nobody else holds its lock. Raise OSError or CannotStart if
-    it cannot be locked."""
+    """Lock an open file until it is closed, waiting while another process holds its lock. Raise
+    OSError or CannotStart if it cannot be locked."""
     _locking(descriptor, wait=True)
 
 
@@ -56,7 +56,8 @@ def user_id() -> int | None:
 
 
 def user_name(uid: int) -> str:
-    """Return the name of a user for messages. Users of containers mostly have no name outside."""
+    """Return the name of the user with this id, for messages; `user <id>` if the computer knows
+    none. Users of containers mostly have no name outside."""
     if pwd is not None:
         try:
             return str(pwd.getpwuid(uid).pw_name)
@@ -106,8 +107,8 @@ def descriptors_allowed() -> int:
 
 
 def bound_memory(more: int) -> None:
-    """Limit this process to `more` additional bytes of memory, if the system tells how many it has.
-    Raise OSError or ValueError if the limit cannot be set."""
+    """Limit this process to `more` bytes of memory beyond its present use. Do nothing on systems
+    that do not tell the present use. Raise OSError or ValueError if the limit cannot be set."""
     mapped = _statm(0)
     if resource is not None and mapped:
         resource.setrlimit(resource.RLIMIT_AS, (mapped + more, mapped + more))

@@ -908,7 +908,8 @@ export interface EditorApi {
     };
     /**
      * LaneState
-     * @description A queue for workers. `deaths` and `given_up` since the process began.
+     * @description A queue for worker processes: `waiting` requests without an answer, `busy` workers. `deaths`
+     *     of workers and requests `given_up` for lack of time, both since the process began.
      */
     LaneState: {
         name: string;

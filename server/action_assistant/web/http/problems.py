@@ -49,14 +49,15 @@ class ProblemDetails(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 def problem_of(refused: Refused) -> bytes:
-    """Return the JSON body for a refusal."""
+    """Return the JSON body (problem details, RFC 9457) that describes a refusal."""
     return msgspec.json.encode(
         ProblemDetails(refused.type, refused.title, refused.status, refused.detail, refused.where)
     )
 
 
 def problem_handlers() -> ExceptionHandlersMap:
-    """Return the handlers for `Litestar(exception_handlers=…)`."""
+    """Return the functions that answer for exceptions, as `Litestar(exception_handlers=…)` takes
+    them."""
     return {
         Refused: _refused,
         HTTPException: _framework,
@@ -82,8 +83,8 @@ def _refused(request: Request[Any, Any, Any], error: Refused) -> Response[bytes]
 
 
 def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Response[bytes]:
-    """Answer the refusals of Litestar itself: unknown routes and methods, malformed and too large
-    bodies."""
+    """Answer a refusal of Litestar itself, such as an unknown route or method, or a malformed or
+    too large body."""
     phrase = HTTPStatus(error.status_code).phrase
     detail, where = _told(request, error)
     if error.status_code >= 500:
@@ -96,7 +97,8 @@ def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Respons
 def _told(
     request: Request[Any, Any, Any], error: HTTPException
 ) -> tuple[str, dict[str, Any] | None]:
-    """Return a sentence about the error, and the path of the wrong field in the body, if known."""
+    """Return a sentence about an error of Litestar, and the path of the wrong field in the body as
+    `{"path": …}`, or None if there is no such field."""
     if isinstance(error, ValidationException) and isinstance(error.extra, list):
         wrong = [item for item in error.extra if isinstance(item, dict)]
         said = [
@@ -118,7 +120,7 @@ def _told(
 
 
 def _limit(request: Request[Any, Any, Any]) -> str:
-    """Return, as text, the longest body that the route accepts."""
+    """Return, as text such as `2 MB`, the longest body that the route of a request accepts."""
     handler = request.scope.get("route_handler")
     if not isinstance(handler, HTTPRouteHandler):
         return "some bytes"

@@ -51,7 +51,8 @@ class Requests:
         self._counts = counts
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on with a request id, and count it while it is open."""
+        """Pass an HTTP or WebSocket request on with a request id, and count it while it is open.
+        The parameters are those of ASGI."""
         if scope["type"] not in _CALLS:  # lifespan
             await self._app(scope, receive, send)
             return
@@ -97,7 +98,7 @@ class Requests:
 
 
 def _id_of(scope: Any) -> str:
-    """Return the request id of a trusted proxy, or else a new one."""
+    """Return the request id that a trusted proxy gave to a request, or else a new one."""
     if scope.get("state", {}).get(PROXIED):
         for name, value in scope["headers"]:
             if name.lower() == HEADER and _ID.fullmatch(value):

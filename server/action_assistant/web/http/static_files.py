@@ -68,7 +68,8 @@ class File:
 async def send_file(
     scope: HTTPScope, send: Send, file: File, status: int = 200, more: Fields = ()
 ) -> None:
-    """Answer with a file; `more` are additional headers."""
+    """Answer with a file, compressed if the client accepts that, or with 304 if the client has it
+    already. `more` are additional headers."""
     asked = dict(scope["headers"])
     fields = [
         (b"etag", file.etag.encode()),
@@ -137,7 +138,8 @@ class Page:
         return accepts_html and not path.startswith(_NOT_PAGES)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send the file, or the page itself for an address that the page's router knows."""
+        """Answer a request for a file of the page or for an address that the page's router knows;
+        pass other requests on. The parameters are those of ASGI."""
         if scope["type"] != ScopeType.HTTP or scope["method"] not in {"GET", "HEAD"}:
             await self._app(scope, receive, send)
             return
@@ -178,12 +180,12 @@ class HelpSite:
 
     @staticmethod
     def knows(path: str) -> bool:
-        """Return whether a path belongs to the documentation."""
+        """Return whether a path is `/help` or below it, where the documentation is."""
         return path == _HELP or path.startswith(f"{_HELP}/")
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Send a file of the site, or a 404 for an unknown path below `/help/`; pass other requests
-        on."""
+        """Answer with a file of the site, or with 404 for an unknown path below `/help/`; pass
+        other requests on. The parameters are those of ASGI."""
         if (
             scope["type"] != ScopeType.HTTP
             or scope["method"] not in {"GET", "HEAD"}

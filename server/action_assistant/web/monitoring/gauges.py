@@ -33,7 +33,7 @@ class Family(NamedTuple):
 
 
 class Looked(Collector):
-    """A collector whose numbers `look` finds."""
+    """A collector of metrics that calls the function `look` for them each time."""
 
     def __init__(self, look: Callable[[], Iterable[Family]]) -> None:
         self._look = look

@@ -61,15 +61,16 @@ class Watched:
         self.folders: Final = folders
 
     def families(self) -> Iterator[Family]:
-        """Yield the metrics that are computed at each request."""
+        """Yield the metrics that are computed at each request of them. A subclass implements this."""
         raise NotImplementedError
 
     def activity(self) -> Activity:
-        """Return the present activity of the process."""
+        """Return the present activity of the process. A subclass implements this."""
         raise NotImplementedError
 
     async def parts(self) -> Parts:
-        """Return the state of the other parts that have to work, beside journal and disk."""
+        """Return the state of the other parts that have to work, beside journal and disk: the fault
+        by name of the part, None where it works."""
         return {}
 
 
@@ -128,7 +129,7 @@ class Monitoring:
 
     @asynccontextmanager
     async def watching(self, watched: Watched) -> AsyncIterator[None]:
-        """Look at these services, as long as you are inside."""
+        """Return a context in which the parts of an open process are monitored."""
         self._watched = watched
         storage = self._storage = StorageWatch(
             self._data,
@@ -174,7 +175,8 @@ class Monitoring:
         return generate_latest(self._registry).decode().replace(".0\n", "\n")
 
     async def status(self) -> ProcessStatus:
-        """Return the state of the process for its administrators."""
+        """Return the state of the process for its administrators. Raise RuntimeError outside of
+        `watching`."""
         watched, storage = self._watched, self._storage
         if watched is None or storage is None:
             raise RuntimeError("the process is not open yet")

@@ -34,8 +34,8 @@ class Readiness(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, parts: Parts) -> "Readiness":
-        """Return the readiness that follows from these parts: all that are not optional have to
-        work."""
+        """Return the readiness that follows from the faults of parts: a process is ready if only
+        optional parts have one."""
         lacking = {name: why for name, why in parts.items() if name not in _OPTIONAL}
         problems = tuple(why for why in lacking.values() if why is not None)
         return cls(not problems, problems, parts)

@@ -67,7 +67,8 @@ class StorageShown(msgspec.Struct, frozen=True):
 
 
 class LaneState(msgspec.Struct, frozen=True):
-    """A queue for workers. `deaths` and `given_up` since the process began."""
+    """A queue for worker processes: `waiting` requests without an answer, `busy` workers. `deaths`
+    of workers and requests `given_up` for lack of time, both since the process began."""
 
     name: str
     waiting: int
@@ -115,12 +116,13 @@ class ProcessStatus(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def began_at() -> datetime:
-    """Return when this process began."""
+    """Return the time when this process began."""
     return datetime.fromtimestamp(_BEGAN, UTC)
 
 
 def load_now(loop_lag_s: float) -> Load:
-    """Return the resources that this process uses."""
+    """Return the resources that this process uses. `loop_lag_s`: the largest lag of its event loop,
+    as it was measured (seconds)."""
     used = resource.getrusage(resource.RUSAGE_SELF)
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return Load(
@@ -133,18 +135,18 @@ def load_now(loop_lag_s: float) -> Load:
 
 
 def versions(schema: str) -> ProcessVersions:
-    """Return the versions of this process."""
+    """Return the versions of this program, of Python and of the tables (`schema`)."""
     return ProcessVersions(VERSION, platform.python_version(), schema)
 
 
 def journal_state(journal: Journal) -> JournalState:
-    """Return the state of the journal's writer."""
+    """Return the state of the journal's writer for the API."""
     metrics = journal.metrics
     return JournalState(journal.database_name, metrics.waiting, metrics.busy_s, metrics.failing)
 
 
 def storage_shown(found: Storage | None) -> StorageShown | None:
-    """Return the last measurement of storage for the API; None before the first."""
+    """Return a measurement of storage in the form for the API; None if there is none yet."""
     if found is None:
         return None
     at = datetime.fromtimestamp(found.at, UTC)
@@ -152,7 +154,7 @@ def storage_shown(found: Storage | None) -> StorageShown | None:
 
 
 def lane_states(lanes: Sequence[Lane]) -> list[LaneState]:
-    """Return the state of each worker lane."""
+    """Return the state of each pool of worker processes."""
     return [
         LaneState(each.name, each.waiting, each.busy, each.deaths, each.given_up) for each in lanes
     ]

@@ -59,7 +59,7 @@ class StorageWatch:
         self._counted: Mapping[str, int] = {}
 
     async def run(self) -> None:
-        """Look at the storage again and again until cancelled."""
+        """Measure the storage periodically until cancelled."""
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(self._watch_folders)
             while True:
@@ -71,7 +71,8 @@ class StorageWatch:
                 await anyio.sleep(_LOOK_S)
 
     async def look(self) -> None:
-        """Look at the disk, the database and the backups once."""
+        """Measure the disk, the database and the backups once, and keep the result in `found`.
+        `found` becomes None if the disk cannot be measured."""
         try:
             disk = await to_thread.run_sync(shutil.disk_usage, self._data, abandon_on_cancel=True)
         except OSError as error:
@@ -106,7 +107,7 @@ class StorageWatch:
             await anyio.sleep(_FOLDERS_S)
 
     def families(self) -> Iterator[Family]:
-        """Yield the newest numbers as metrics."""
+        """Yield the newest measurement as metrics."""
         found = self.found
         if found is None:
             return
@@ -159,8 +160,8 @@ class BackupsShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def backups_shown(state: BackupState | None) -> BackupsShown | None:
-    """Return the state of backups for people; None if it cannot be read, which does not mean that
-    there are none."""
+    """Return the state of backups in the form for people; None if it cannot be read, which does not
+    mean that no backups exist."""
     if state is None:
         return None
     last, failed, schedule = state.last, state.failed, state.schedule
@@ -181,8 +182,8 @@ def backups_shown(state: BackupState | None) -> BackupsShown | None:
 
 
 def backup_families(state: BackupState | None) -> Iterator[Family]:
-    """Yield the metrics of backups. Metrics of events that never happened are left out; without a
-    state these are all."""
+    """Yield the metrics of backups, without those of events that never happened; no metrics if the
+    state is not known (None)."""
     if state is None:
         return
     if (last := state.last) is not None:

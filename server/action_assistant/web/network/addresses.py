@@ -100,7 +100,8 @@ class Addresses:
         return self.secure if self._public is None else self._public.is_secure
 
     def allows_host(self, header: str | None) -> bool:
-        """Return whether a request may name this host. A request after DNS rebinding names another."""
+        """Return whether a request with this Host header may be answered; None stands for a missing
+        header, which may not. A request after DNS rebinding names another host."""
         if header is None:
             return False
         return self.public_at(header) is not None or self._knows(host_name(header))
@@ -130,10 +131,8 @@ class Addresses:
 
     def replaced_host(self, header: str | None, origin: str) -> str | None:
         """Return a sentence if a proxy replaced the Host header of a request from the public page,
-        else None.
-
-        Such a request would look like one from a page of this computer.
-        """
+        else None. `origin`: of the page that sent the request. Such a request would seem to come
+        from a page of this computer."""
         public = self._public
         if public is None or origin != public.origin or self.public_at(header or ""):
             return None
@@ -143,7 +142,8 @@ class Addresses:
         )
 
     def runner_at(self, header: str, port: int) -> str:
-        """Return the URL of the runner, without a final slash, for a client that named this host."""
+        """Return the URL of the runner, without a final slash, for a client that sent this Host
+        header. `port`: of the runner, if no proxy stands between."""
         public = self.public_at(header)
         return public.runner if public is not None else self.direct(header, port)
 
@@ -153,7 +153,8 @@ class Addresses:
         return f"{self._scheme}://{_shown(host_name(header) or '127.0.0.1')}:{port}"
 
     def jar(self, header: str) -> tuple[bool, str]:
-        """Return whether cookies are `Secure` for a client that named this host, and their path."""
+        """Return whether cookies are `Secure` for a client that sent this Host header, and the path
+        of the cookies."""
         public = self.public_at(header)
         return (self.secure, "/") if public is None else (public.is_secure, f"{public.path}/")
 
@@ -204,7 +205,8 @@ def addresses_of(
     secure: bool,
     public: PublicUrl | None = None,
 ) -> Addresses:
-    """Return the addresses that follow from the settings of a process."""
+    """Return the addresses that follow from the settings of a process. `host`: where it listens;
+    `hosts`: further names; `share`: it is open to the network; `secure`: it serves TLS."""
     listens_everywhere = share and host in _ANYWHERE
     lan = lan_names if listens_everywhere else None
     return Addresses(

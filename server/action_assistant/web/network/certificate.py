@@ -40,7 +40,8 @@ Signer: TypeAlias = tuple[x509.Certificate, ec.EllipticCurvePrivateKey]
 
 
 class Certificate:
-    """The files in a data folder. Several processes may ask at once."""
+    """The authority and the certificate of this server, as files in a data folder. Several
+    processes may call it at once."""
 
     def __init__(self, data: Path) -> None:
         self._folder = data / FOLDER
@@ -49,8 +50,9 @@ class Certificate:
         self.key: Final = self._folder / "server-key.pem"
 
     def renew(self, names: Sequence[str], *, now: datetime | None = None) -> bool:
-        """Make sure that a certificate for these names is valid for a while; return True if a new
-        one was issued. Raise CannotStart if the folder cannot be written."""
+        """Issue a certificate for these host names unless there is one that is valid for a while;
+        return True if a new one was issued. `now`: the present time, for tests. Raise CannotStart
+        if the folder cannot be written."""
         now = now or datetime.now(UTC)
         try:
             with self._alone():
@@ -120,8 +122,8 @@ class Certificate:
         _write(self.chain, _text(certificate) + _text(authority))
 
     def _authority(self, names: Sequence[str], now: datetime) -> Signer:
-        """Return the existing authority if it may sign for these names for long enough, else a new
-        one."""
+        """Return the existing authority (its certificate and key) if it may sign for these host
+        names for long enough after `now`, else a new one."""
         kept = self._folder / "ca-key.pem"
         try:
             found = x509.load_pem_x509_certificate(self.authority.read_bytes())
@@ -169,7 +171,8 @@ _SIGNS: Final = x509.KeyUsage(
 
 
 def _begun(issuer: x509.Name, now: datetime, days: int) -> x509.CertificateBuilder:
-    """Begin a certificate that is valid from an hour ago, since clocks of tablets may be late."""
+    """Return the builder of a certificate that `issuer` signs, valid from an hour before `now`,
+    since the clock of a tablet may be late, until `days` after it."""
     return (
         x509.CertificateBuilder()
         .issuer_name(issuer)
@@ -235,5 +238,5 @@ def _pem(key: ec.EllipticCurvePrivateKey) -> bytes:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Replace a file, readable only by this user from its creation on."""
+    """Replace the content of a file, which only this user can read from its creation on."""
     replace_file(path, content, part=path.with_suffix(".new"))

@@ -27,7 +27,8 @@ class ConcurrencyLimit:
 
     @asynccontextmanager
     async def turn(self, person: str) -> AsyncIterator[None]:
-        """Wait until fewer blocks than the limit run for this person, then run the block."""
+        """Return a context that waits at its beginning until fewer contexts than the limit are open
+        for this person."""
         turn, waiting = self._turns.get(person, (anyio.Semaphore(self._most), 0))
         self._turns[person] = turn, waiting + 1
         try:
@@ -61,9 +62,9 @@ class ConnectionLimits:
 
     @contextmanager
     def admitted(self, person: str, address: str) -> Iterator[None]:
-        """Count one open socket of this person and this address until the end of the `with` block.
-        Raise TooMany if either of them has too many sockets open, or has opened too many in a
-        short time."""
+        """Return a context during which an open socket of this person and address is counted. Raise
+        TooMany if either of them has too many sockets open, or has opened too many in a short time.
+        """
         if self._limits and not (self._keeps_one and not self._people[person]):
             self._check(person, address)
         self._people[person] += 1

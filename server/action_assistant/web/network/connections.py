@@ -74,7 +74,7 @@ class ConnectionsByHolder:
         return iter(self._peers.items())
 
     def get(self, peer: Peer) -> Connection | None:
-        """Return the connection whose other end has this address; None if there is no such
+        """Return the connection whose other end has the address `peer`; None if there is no such
         connection."""
         return self._peers.get(peer)
 
@@ -145,7 +145,8 @@ class Connections:
     def listen(
         self, listener: socket.socket, factory: Factory, context: ssl.SSLContext | None
     ) -> None:
-        """Accept connections at a listening socket from now on."""
+        """Accept connections at a listening socket from now on, and return at once. `factory` makes
+        the protocol of each; `context` is its TLS, None for plain HTTP."""
         listener.setblocking(False)
         self._listeners.append(listener)
         asyncio.get_running_loop().add_reader(listener, self._accept, listener, factory, context)
@@ -194,11 +195,8 @@ class Connections:
         factory: Factory,
         context: ssl.SSLContext | None,
     ) -> None:
-        """Open a connection once its first bytes have come.
-
-        Until then a connection costs next to nothing, so that many silent ones take no time from
-        the others.
-        """
+        """Open a connection whose first bytes have come (`wire`: its socket). Until then it costs
+        next to nothing, so that many silent ones take no time from the others."""
         asyncio.get_running_loop().remove_reader(wire)
         connection.is_silent = False
         self._keep(self._open(connection, wire, factory, context))
@@ -269,8 +267,8 @@ class Connections:
 
     @contextlib.contextmanager
     def answering(self, peer: Peer | None) -> Iterator[ConnectionHolder]:
-        """Count a request on a connection while it is answered. Yield the object to which the
-        person is reported once known."""
+        """Return a context during which a request on the connection of `peer` counts as being
+        answered. Its value takes the name of the person once that is known."""
         connection = None if peer is None else self._all.get(peer)
         holder = ConnectionHolder(self, peer, connection)
         if connection is None:
@@ -284,7 +282,8 @@ class Connections:
             connection.since = time.monotonic()
 
     def hold(self, peer: Peer, connection: Connection, holder: str, *, is_stranger: bool) -> None:
-        """Count a connection for another holder from now on."""
+        """Count a connection for another holder from now on; do nothing if it is the holder
+        already. `is_stranger`: the holder is an address, not a signed-in person."""
         if connection.holder == holder:
             return
         self._forget(peer, connection)
@@ -294,13 +293,14 @@ class Connections:
             self._strangers.add(peer, connection)
 
     def drop(self, peer: Peer | None) -> None:
-        """Close a connection whose client has stopped responding."""
+        """Close the connection of `peer`, whose client has stopped responding. Do nothing for None
+        or an unknown peer."""
         if peer is not None and (connection := self._all.get(peer)) is not None:
             connection.end()
 
 
 def _in_use() -> int:
-    """Return the number of descriptors in use."""
+    """Return the number of open file descriptors of this process."""
     try:
         return len(os.listdir("/proc/self/fd"))  # noqa: PTH208 - counted, not visited
     except OSError:

@@ -67,13 +67,13 @@ def application(
     mount: str = "",
     body_limit: int = BODY_LIMIT,
 ) -> ASGIApp:
-    """Return the whole ASGI application of a process.
-
-    `body_limit`: bytes of a request body, unless a route has its own limit. `page`, `help_site`,
-    `runner_port`: only for the editor, which serves the built page and the documentation, and names
-    the runner in the Content-Security-Policy. `mount`: the path at which a proxy serves this
-    process. `scraped`: the token that allows /metrics only.
-    """
+    """Return the whole ASGI application of a process. `title`: of its OpenAPI document; `keys`,
+    `revoked`: how clients are authenticated; `addresses`, `page_port`: the hosts and origins that
+    may call it; `lifespan`: contexts for as long as it runs. `body_limit`: bytes of a request body,
+    unless a route has its own limit. `page`, `help_site`, `runner_port`: only for the editor, which
+    serves the built page and the documentation, and names the runner in the
+    Content-Security-Policy. `mount`: the path at which a proxy serves this process. `scraped`: the
+    token that allows /metrics only."""
     handlers = [
         *route_handlers,
         *_health(monitoring),
@@ -112,8 +112,9 @@ def _with_built(
     help_site: Path | None,
     root_of: Callable[[HTTPScope], str],
 ) -> tuple[ASGIApp, Callable[[str, bool], bool]]:
-    """Return the routes behind the built page and documentation, and a function that says which
-    paths these two answer."""
+    """Return the application `inner` behind the built page and documentation (None: without it),
+    and a function that says which paths these answer. `root_of` returns the path prefix of the page
+    for a request."""
     shown = Page(inner, page, root_of) if page is not None else None
     helped = HelpSite(shown or inner, help_site) if help_site is not None else None
 
@@ -132,7 +133,8 @@ def _routed(
     body_limit: int,
     openapi: OpenApiText,
 ) -> Litestar:
-    """Return the Litestar application with its routes, error handlers and OpenAPI document."""
+    """Return the Litestar application with its routes, error handlers and OpenAPI document, but
+    without authentication."""
     inner = Litestar(
         handlers,
         guards=[_undecided],
@@ -156,11 +158,9 @@ def _answers_strangers(path: str) -> bool:
 
 
 def _decisions(inner: Litestar) -> dict[tuple[str, str], Permission]:
-    """Return the permission that each route needs, by path and method.
-
-    Reading needs no more than being signed in. Other routes have to name their permission; those
-    that do not are missing here, and only owners may call them.
-    """
+    """Return the permission that each route needs, by path and method. Reading needs no more than
+    being signed in. Other routes have to name their permission; routes that do not are missing in
+    the result, and only owners may call them."""
     found: dict[tuple[str, str], Permission] = {}
     for route in inner.routes:
         if not isinstance(route, HTTPRoute) or _answers_strangers(route.path_format):
@@ -185,7 +185,8 @@ def _said(handler: BaseRouteHandler) -> Permission | None:
 async def _undecided(
     connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler
 ) -> None:
-    """Guard: let only owners call a writing route for which no permission was chosen."""
+    """Guard of all routes: let only owners call a writing route for which no permission was chosen.
+    Raise Forbidden for others."""
     if connection.scope.get("method", "GET") in _SAFE or _said(handler) is not None:
         return
     if not _answers_strangers(connection.scope["path"]):

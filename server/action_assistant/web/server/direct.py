@@ -51,7 +51,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
     """
 
     def shutdown(self) -> None:
-        """Close the socket because the process shuts down."""
+        """Close the socket, since the process shuts down. It raises no error in any state."""
         if not self.transport.is_closing():
             end_connection(self.transport, super().shutdown)
             return
@@ -82,7 +82,8 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
 
 
 def end_connection(transport: asyncio.Transport, shutdown: Callable[[], None]) -> None:
-    """End a connection as its protocol does it, by `shutdown`; where that fails, without a word."""
+    """End a connection by its protocol's `shutdown`; if that raises an error, log it and cut the
+    connection off."""
     try:
         shutdown()
     except Exception as error:  # noqa: BLE001 - the next ones are to be ended, too
@@ -108,13 +109,13 @@ class IgnoringReceiver:
     """Ignores the messages that come after a socket was released."""
 
     def heard(self, message: bytes | None) -> None:
-        """Ignore a message of the released socket."""
+        """Ignore a message of the socket."""
 
     def may_write(self) -> None:
-        """Write nothing more to the released socket."""
+        """Ignore that the socket can send again."""
 
     def gone(self) -> None:
-        """Ignore the end of the socket."""
+        """Ignore that the socket has ended."""
 
 
 class DirectSocket(WebSocketProtocol):
@@ -140,7 +141,7 @@ class DirectSocket(WebSocketProtocol):
         await super().run_asgi()
 
     def handle_connect(self, event: Request) -> None:
-        """Handle the upgrade request, and drop its headers."""
+        """Handle the request for an upgrade to a WebSocket, and free the memory of its headers."""
         super().handle_connect(event)
         event.headers.clear()  # the parser keeps it for as long as the socket is open
 
@@ -152,7 +153,7 @@ class DirectSocket(WebSocketProtocol):
         return event
 
     async def send(self, message: ASGISendEvent) -> None:
-        """Send an event of an application that did not take the socket over."""
+        """Send an ASGI message of an application that did not take the socket over."""
         await super().send(message)
         if message["type"] == "websocket.accept" and self.handshake_complete:
             self.response.headers.clear()  # sent
@@ -190,8 +191,8 @@ class DirectSocket(WebSocketProtocol):
         return self.writable.is_set()
 
     def write_framed(self, data: bytes) -> bool:
-        """Send whole frames at once, and return True; return False if the socket is closing or its
-        send buffer is full."""
+        """Send `data`, which consists of whole WebSocket frames, without waiting, and return True.
+        Return False if the socket is closing or its send buffer is full."""
         if (
             self.close_sent
             or self.disconnected
@@ -222,7 +223,8 @@ class DirectSocket(WebSocketProtocol):
     # --- for the transport --------------------------------------------------------------------
 
     def data_received(self, data: bytes) -> None:
-        """Handle received bytes; one short message, nearly always the case, takes a fast path."""
+        """Handle received bytes of the connection. One short message, nearly always the case, takes
+        a fast path."""
         if not self.handshake_initiated:
             super().data_received(data)
             return
@@ -250,14 +252,14 @@ class DirectSocket(WebSocketProtocol):
             self._receiver.may_write()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Notify the receiver that the connection is over."""
+        """Report to the receiver that the connection is over."""
         super().connection_lost(exc)
         self._rest.clear()
         if self._receiver is not None:
             self._receiver.gone()
 
     def shutdown(self) -> None:
-        """Close the socket because the process shuts down."""
+        """Close the socket, since the process shuts down."""
         super().shutdown()
         if self._receiver is not None:
             self._receiver.gone()
@@ -300,10 +302,9 @@ class DirectSocket(WebSocketProtocol):
             self._read_on()
 
     def _frame(self) -> tuple[int, int]:
-        """Return where the payload of the next frame begins and ends.
-
-        The end lies beyond the received bytes while it is not known yet. A frame that is not
-        allowed has no payload and ends where the bytes do: the usual parser refuses it by its head.
+        """Return the offsets at which the payload of the next received frame begins and ends. The
+        end lies beyond the received bytes while the frame is not complete. A frame that is not
+        allowed has no payload and ends with the received bytes: the usual parser then refuses it.
         """
         rest, there = self._rest, len(self._rest)
         start = 6
@@ -374,7 +375,7 @@ class DirectSocket(WebSocketProtocol):
 def direct_socket(
     extensions: Mapping[str, Mapping[object, object]] | None,
 ) -> DirectSocket | None:
-    """Return the socket of a scope with these extensions; None if it cannot be taken over."""
+    """Return the socket in the `extensions` of an ASGI scope; None if it cannot be taken over."""
     found = (extensions or {}).get(_EXTENSION, {}).get("socket")
     return found if isinstance(found, DirectSocket) else None
 

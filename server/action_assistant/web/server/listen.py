@@ -59,12 +59,10 @@ def serve(
     proxies: tuple[Network, ...] = (),
     direct: bool = False,
 ) -> None:
-    """Bind the address, then make the application and serve it until the process is told to end.
-
-    `identity`: serve TLS with its certificate. `proxies`: addresses whose forwarding headers are
-    trusted. `direct`: let applications take over their sockets. Raise CannotStart if the address is
-    taken or unknown.
-    """
+    """Bind `host` and `port`, then make the application and serve it until the process is told to
+    end or its parent dies. `identity`: serve TLS with its certificate. `proxies`: addresses whose
+    forwarding headers are trusted. `direct`: let applications take over their sockets. Raise
+    CannotStart if the address is taken or unknown."""
     sockets = bound(host, port)
     try:
         if identity is not None:
@@ -119,10 +117,8 @@ class TlsIdentity:
         self._loaded = 0  # when the certificate that is in use was written
 
     def keep(self, config: uvicorn.Config) -> None:
-        """Watch the certificate on a daemon thread.
-
-        New connections get the new certificate; open ones keep theirs.
-        """
+        """Watch the certificate on a daemon thread, and load each new one into the TLS context of
+        `config`. Open connections keep theirs."""
 
         def look() -> None:
             while True:
@@ -153,11 +149,12 @@ class StreamEndings:
         self._told = asyncio.Event()
 
     def begin(self) -> None:
-        """End every stream from now on."""
+        """End every open stream, and each later one at its beginning."""
         self._told.set()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, and end its stream at a shutdown."""
+        """Pass a request on, and end its stream when the process shuts down. The parameters are
+        those of ASGI."""
         if scope["type"] != ScopeType.HTTP:
             await self._app(scope, receive, send)
             return
@@ -181,7 +178,8 @@ class StreamEndings:
             await send({"type": "http.response.body", "body": b"", "more_body": False})
 
     async def _next(self, receive: Receive) -> Any:
-        """Return the client's disconnect, or a disconnect of our own at a shutdown."""
+        """Wait for the client's next message, or for the shutdown of this process, which is
+        returned as a disconnect."""
         gone = asyncio.ensure_future(receive())
         told = asyncio.ensure_future(self._told.wait())
         try:
@@ -203,7 +201,8 @@ class ActivityTracker:
         self._connections = connections
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on while its connection counts as being answered."""
+        """Pass a request on, and count its connection as being answered until that is done. The
+        parameters are those of ASGI."""
         if scope["type"] not in _CALLS:  # lifespan
             await self._app(scope, receive, send)
             return
@@ -236,11 +235,9 @@ class ActivityTracker:
 
 
 def _waits_for_body(scope: Scope) -> bool:
-    """Return whether the server has to wait for the body of a request before it answers.
-
-    A method without a body is answered at once, since a client would take a failure of that wait
-    for a failed request.
-    """
+    """Return whether the server has to wait for the body of a request (its ASGI scope) before it
+    answers. A method without a body is answered at once, since a client would take a failure of
+    that wait for a failed request."""
     if scope["type"] != ScopeType.HTTP or scope["method"] in _WITHOUT_BODY:
         return False
     return any(name == b"content-length" and value != b"0" for name, value in scope["headers"])
@@ -262,12 +259,14 @@ class _Http(H11Protocol):
         self._strict = self.conn = _Strict(h11.SERVER, HEAD_LIMIT)
 
     def data_received(self, data: bytes) -> None:
-        """Handle received bytes, and note the time for the header of a Stop."""
+        """Handle received bytes, and store the time of it, from which the header of a Stop is
+        computed."""
         _RECEIVED.set((time.process_time(), time.perf_counter()))
         super().data_received(data)
 
     def send_400_response(self, msg: str) -> None:
-        """Answer a malformed request with a refusal."""
+        """Answer a malformed request with a refusal: 411 if its body has no length, else 400 with
+        the text `msg`."""
         if not self._strict.in_crumbs:
             super().send_400_response(msg)
             return
@@ -275,7 +274,7 @@ class _Http(H11Protocol):
         self.transport.close()
 
     def shutdown(self) -> None:
-        """Close the connection because the process shuts down."""
+        """Close the connection, since the process shuts down."""
         if not self.transport.is_closing():
             end_connection(self.transport, super().shutdown)
             return
@@ -334,14 +333,16 @@ class _Server(uvicorn.Server):
         )
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        """Shut down: end streams, close the listeners, wait for open requests. Called once."""
+        """Shut down: end streams, close the listeners, and wait for open requests. uvicorn calls
+        this once."""
         self._endings.begin()
         self._connections.close()
         await super().shutdown(sockets)
 
 
 def _in_one_line(record: logging.LogRecord) -> bool:
-    """Log filter: shorten an error that a malformed message causes to a warning without our stack."""
+    """Filter a log record: turn an error that a malformed message of a client causes into a warning
+    without a traceback. Always return True, so that no line is lost."""
     if "Invalid UTF-8" in record.msg:
         record.exc_info = None
         record.levelno, record.levelname = logging.WARNING, "WARNING"
@@ -349,7 +350,8 @@ def _in_one_line(record: logging.LogRecord) -> bool:
 
 
 def _end_with_parent(server: uvicorn.Server) -> None:
-    """End when the process that started us dies, however it dies: its end of the pipe closes."""
+    """Let `server` shut down when the process that started it dies, for any reason: its end of a
+    pipe closes then. A daemon thread watches that."""
     descriptor = os.environ.pop("_ACTION_ASSISTANT_PARENT", None)
     if descriptor is None:
         return

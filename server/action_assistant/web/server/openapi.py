@@ -54,7 +54,7 @@ def answer(
     text: str = "Request fulfilled, document follows",
 ) -> ResponseSpec:
     """Return the value for `responses=` of a route whose annotation does not give the type of its
-    answer. `text`: its description."""
+    answer. `kind`: that type; `media`: its media type; `text`: its description."""
     return ResponseSpec(
         data_container=kind,
         generate_examples=False,
@@ -74,7 +74,7 @@ class OpenApiText(JsonRenderPlugin):
         self._turn = anyio.Lock()
 
     def made(self) -> bytes:
-        """Return a newly rendered document."""
+        """Return the document, rendered anew, as JSON."""
         return msgspec.json.encode(self.make())
 
     def router(self) -> Router:
@@ -104,7 +104,7 @@ class OpenApiText(JsonRenderPlugin):
 
 
 def openapi_config(title: str, text: OpenApiText) -> OpenAPIConfig:
-    """Return the OpenAPI configuration for Litestar."""
+    """Return the OpenAPI configuration for Litestar, with the route that `text` gives."""
     schemes: dict[str, Any] = {"token": SecurityScheme(type="http", scheme="bearer")}
     return OpenAPIConfig(
         title=title,
@@ -119,9 +119,9 @@ def openapi_config(title: str, text: OpenApiText) -> OpenAPIConfig:
 def document(
     app: Litestar, needs: Mapping[tuple[str, str], Permission], is_open: Callable[[str], bool]
 ) -> dict[str, Any]:
-    """Return the OpenAPI document of an application. `needs`: the permission by path and method,
-    which becomes `x-needs`; `is_open`: returns True for a path without authentication, which
-    gets an empty `security` (Litestar omits that)."""
+    """Return the OpenAPI document of the application `app`. `needs`: the permission by path and
+    method, which becomes `x-needs`; `is_open`: returns True for a path without authentication,
+    which gets an empty `security` (Litestar omits that)."""
     found = app.openapi_schema.to_schema()
     types = _Types()
     for path, method, handler in _handlers(app):
@@ -147,7 +147,8 @@ def _handlers(app: Litestar) -> Iterator[tuple[str, str, HTTPRouteHandler]]:
 
 
 def _describe(operation: dict[str, Any], handler: HTTPRouteHandler, types: "_Types") -> None:
-    """Add the types of a route's body and answers to its operation in the document."""
+    """Add the types of the body and answers of a route (`handler`) to its operation in the
+    document, and collect them in `types`."""
     signature = handler.parsed_fn_signature
     data = signature.parameters.get("data")
     body = handler.opt.get(_BODY, None if data is None else data.annotation)
@@ -186,12 +187,14 @@ class _Types:
         self._answered: list[tuple[object, dict[str, Any]]] = []
 
     def asked(self, kind: object) -> dict[str, Any]:
-        """Return the schema of a request body of this type; it is filled in later."""
+        """Return the schema of a request body of the type `kind`: an empty object, which `written`
+        fills in later."""
         self._asked.append((kind, {}))
         return self._asked[-1][1]
 
     def answered(self, kind: object) -> dict[str, Any]:
-        """Return the schema of an answer of this type; it is filled in later."""
+        """Return the schema of an answer of the type `kind`: an empty object, which `written` fills
+        in later."""
         self._answered.append((kind, {}))
         return self._answered[-1][1]
 
@@ -217,14 +220,15 @@ class _Types:
 
 
 def _anything(kind: type) -> dict[str, Any]:
-    """Return the schema of `object`, for which msgspec has none."""
+    """Return the schema of the type `object`, for which msgspec has none. Raise NotImplementedError
+    for another type."""
     if kind is not object:
         raise NotImplementedError
     return {"description": "Any JSON value"}
 
 
 def _structs(types: Iterable[object]) -> dict[type, kinds.StructType]:
-    """Every struct that values of these types may hold."""
+    """Return every struct that values of the given types may hold, at any depth."""
     found: dict[type, kinds.StructType] = {}
     left: list[object] = list(kinds.multi_type_info(types))
     while left:
@@ -244,17 +248,14 @@ def _structs(types: Iterable[object]) -> dict[type, kinds.StructType]:
 
 
 def _may_lack(struct: kinds.StructType) -> bool:
-    """Return whether request bodies may lack fields that answers always have."""
+    """Return whether a request body may lack fields of a struct that answers always have."""
     defaults = any(not field.required for field in struct.fields)
     return defaults and not struct.cls.__struct_config__.omit_defaults
 
 
 def _complete(shape: dict[str, Any], struct: kinds.StructType, *, only_answered: bool) -> None:
-    """Add to a struct's schema what msgspec does not say.
-
-    Answers always have the fields with a default, or never have them as null. Times have the format
-    `date-time`.
-    """
+    """Add to the schema `shape` of a struct facts that msgspec omits. Answers always have the
+    fields with a default, or never have them as null. Times have the format `date-time`."""
     omits = struct.cls.__struct_config__.omit_defaults
     shape["description"] = re.sub(r"\bNone\b", "null", cleandoc(struct.cls.__doc__ or ""))
     for field in struct.fields:
@@ -278,7 +279,7 @@ def _has_default(field: kinds.Field) -> bool:
 
 
 def _type_enums(shape: dict[str, Any]) -> None:
-    """Say of words that they are strings."""
+    """Add the type `string` to every enumeration of strings in a schema, at any depth."""
     if all(isinstance(each, str) for each in shape.get("enum", [None])):
         shape["type"] = "string"
     for value in shape.values():

@@ -44,8 +44,9 @@ class Forwarded:
         self._proxies = proxies
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on to the application. If the request comes from a trusted proxy, the
-        client's address is replaced by the address that the proxy names in its header."""
+        """Pass a request on to the application. If it comes from a trusted proxy, the client's
+        address is replaced by the address that the proxy names in its header. The parameters are
+        those of ASGI."""
         if scope["type"] in _CALLS and self._proxies:
             peer: Any = scope.get("client")
             if peer and self.is_proxy(peer[0]):
@@ -59,7 +60,8 @@ class Forwarded:
 
     def _asker(self, peer: str, chain: list[str]) -> str | None:
         """Return the address of the client behind trusted proxies; None if the peer itself is the
-        client."""
+        client. `chain`: the addresses of X-Forwarded-For, the last proxy's client at the end; it is
+        used up."""
         found = None
         address = _address(peer)
         while address is not None and self._believes(address) and chain:
@@ -68,7 +70,7 @@ class Forwarded:
         return found
 
     def is_proxy(self, peer: str) -> bool:
-        """Return whether this address is that of a trusted proxy."""
+        """Return whether the address `peer` is that of a trusted proxy."""
         address = _address(peer)
         return address is not None and self._believes(address)
 
@@ -89,7 +91,7 @@ class Mounted:
         self._raw = mount.encode()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on without the mount in its path."""
+        """Pass a request on without the mount in its path. The parameters are those of ASGI."""
         if not self._mount or scope["type"] not in _CALLS:
             await self._app(scope, receive, send)
             return
@@ -126,8 +128,8 @@ class Mounted:
 
 
 def misrouted(runner_port: int) -> ControllerRouterHandler:
-    """Return the editor's route for requests that a proxy should have sent to the runner; it
-    answers with an error."""
+    """Return the editor's route for requests that a proxy should have sent to the runner, at
+    `runner_port`. It answers each with an error that says so."""
 
     @route(
         f"{RUNNER}/{{rest:path}}",
@@ -145,7 +147,7 @@ def misrouted(runner_port: int) -> ControllerRouterHandler:
 
 
 def _nobody(_: str) -> None:
-    """Ignore whose request this is."""
+    """Ignore the address of the client, since no part asked for it."""
 
 
 async def _lead(send: Send, location: str) -> None:
@@ -157,7 +159,8 @@ async def _lead(send: Send, location: str) -> None:
 
 
 def _forwarded(scope: HTTPScope | WebSocketScope) -> list[str]:
-    """Return the addresses of X-Forwarded-For; the last is the client of the last proxy."""
+    """Return the addresses in the X-Forwarded-For headers of a request; the last is the client of
+    the last proxy. Empty without such a header."""
     fields = (
         value.decode("latin-1")
         for name, value in scope["headers"]

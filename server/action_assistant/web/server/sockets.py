@@ -11,8 +11,9 @@ UNHEARD: Final = 20  # seconds after which a peer that takes nothing of what it 
 
 
 def bound(host: str, port: int) -> list[socket.socket]:
-    """Return listening sockets for the address: for a loopback name in both families, so that no
-    other process can answer under `localhost`; for EVERYWHERE in both families, too."""
+    """Return listening sockets for the address: for a loopback name in both IP families, so that no
+    other process can answer under `localhost`; for EVERYWHERE in both families, too. Raise
+    CannotStart if the address is taken or unknown."""
     hosts = [host]
     if host in {"127.0.0.1", "localhost"}:
         hosts = ["127.0.0.1", "::1"]

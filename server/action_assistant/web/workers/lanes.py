@@ -70,7 +70,7 @@ def _context() -> "ForkServerContext":
 
 
 def wire() -> tuple[Connection, Connection]:
-    """Return the two ends of a pipe: ours and the worker's."""
+    """Return the two ends of a pipe: that of this process and that of the worker."""
     ours, theirs = _context().Pipe()
     return ours, theirs
 
@@ -78,9 +78,9 @@ def wire() -> tuple[Connection, Connection]:
 def child(
     work: Callable[..., None], *args: Any, name: str, nice: int, preloaded: Sequence[str]
 ) -> "ForkServerProcess":
-    """Start a process of low priority that runs `work(*args)` and ends with this one. Wait until it
-    exists. `preloaded`: modules that the fork server imports before the first fork. Raise
-    OSError or EOFError if it cannot be started."""
+    """Start a process named `name` that runs `work(*args)` and ends with this one; wait until it
+    exists. `nice`: how much lower its priority is; `preloaded`: modules that the fork server
+    imports before the first fork. Raise OSError or EOFError if it cannot be started."""
     _context().set_forkserver_preload(list(preloaded))
     told = (name, work, args, nice)
     process = _context().Process(target=_humbly, args=told, name=name, daemon=True)
@@ -89,8 +89,8 @@ def child(
 
 
 def _humbly(name: str, work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
-    """Set up the new process and call `work` in it. When processor time runs short, other processes
-    go first (`nice`); when memory runs short, the system ends this process first."""
+    """Set up the new process `name` and call `work` in it. When processor time runs short, other
+    processes go first (`nice`); when memory runs short, the system ends this process first."""
     make_streams_printable()
     set_up_worker(name)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # meant for our parent, which ends us
@@ -113,7 +113,8 @@ def _end_with_parent() -> None:
 
 
 def serve(wire: Connection) -> None:
-    """Serve requests one after the other until the parent closes the pipe."""
+    """Run the functions that come as requests on the pipe `wire`, one after the other, and send
+    back their results, until the parent closes the pipe."""
     with contextlib.suppress(EOFError, OSError):
         while True:
             wire.send_bytes(_reply(wire.recv_bytes()))
@@ -150,12 +151,12 @@ class RunInWorker(Protocol):
     """
 
     def __call__(self, work: Callable[..., T], /, *args: Any) -> Awaitable[T]:
-        """Return the result of `work(*args)`."""
+        """Return the result of `work(*args)`, computed in another process."""
         ...
 
 
 async def run_here(work: Callable[..., T], /, *args: Any) -> T:
-    """Run the function in this process, without a worker."""
+    """Return the result of `work(*args)`, computed in this process and not in a worker."""
     return work(*args)
 
 
@@ -176,7 +177,8 @@ class GaveUp(Unavailable):
 
     @property
     def type(self) -> str:
-        """The problem type for programs: that of Unavailable."""
+        """The type of the problem for programs: that of Unavailable, as for other faults of
+        workers."""
         return "unavailable"
 
 
@@ -251,9 +253,9 @@ class Lane:
 
     @contextmanager
     def _queued(self, person: str) -> Iterator[anyio.Lock]:
-        """Count this request as waiting until the end of the block, and yield the lock of this
-        person's requests. Raise TooMany if too many requests of this person or of all people wait;
-        one without a person ("") is always taken."""
+        """Return a context during which a request of this person counts as waiting; its value is
+        the lock of the person's requests. Raise TooMany if too many requests of this person or of
+        all people wait; one without a person ("") is always taken."""
         waiting = self._waiting.get(person, 0)
         if person and (waiting >= _WAITING or sum(self._waiting.values()) >= _ALL_WAITING):
             raise TooMany("Too much waits to be worked on already; wait some seconds.")
@@ -299,17 +301,17 @@ class Lane:
 
     @property
     def name(self) -> str:
-        """Return the name of the lane."""
+        """The name of the pool, for people and metrics."""
         return self._name
 
     @property
     def busy(self) -> int:
-        """The number of workers with a request."""
+        """The number of workers that are working on a request."""
         return len(self._busy)
 
     @property
     def waiting(self) -> int:
-        """The number of requests without an answer, including those in work."""
+        """The number of requests without an answer, including the ones that are worked on."""
         return sum(self._waiting.values())
 
     async def warm(self) -> None:
@@ -335,7 +337,7 @@ class Lane:
             raise Crashed(f"No process can be started to work on this: {error!r}.") from error
 
     def close(self) -> None:
-        """Kill all workers of the lane."""
+        """Kill all worker processes of the pool."""
         for worker in (*self._idle, *self._busy):
             worker.kill()
         self._idle.clear()
@@ -343,8 +345,8 @@ class Lane:
 
 @asynccontextmanager
 async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
-    """Keep workers of these lanes ready inside of the `async with`. The first ones are started soon
-    after its beginning."""
+    """Return a context in which a worker of each pool is kept ready. The first ones are started
+    soon after its beginning; all workers are killed at its end."""
     tasks = [asyncio.create_task(_keep_warm(lane)) for lane in lanes]
     try:
         yield
@@ -357,7 +359,8 @@ async def kept_warm(*lanes: Lane) -> AsyncIterator[None]:
 
 
 async def _keep_warm(lane: Lane) -> None:
-    """Keep a worker ready, so that the next request does not wait for a new process."""
+    """Keep one worker of a pool ready until cancelled, so that the next request does not wait for a
+    new process."""
     await anyio.sleep(_FIRST_S)
     while True:
         try:
@@ -368,7 +371,7 @@ async def _keep_warm(lane: Lane) -> None:
 
 
 class _Worker:
-    """One worker process, for its parent."""
+    """A worker process, as its parent sees it: answers one request at a time."""
 
     def __init__(self, process: "ForkServerProcess", wire: Connection) -> None:
         self._process = process
@@ -376,7 +379,8 @@ class _Worker:
 
     @classmethod
     def born(cls, name: str, nice: int, preloaded: Sequence[str]) -> "_Worker":
-        """Start a worker. This takes milliseconds; for the first one longer."""
+        """Start a worker process named `name`, and wait until it exists: milliseconds, longer for
+        the first one. `nice` and `preloaded`: as for `child`."""
         ours, theirs = wire()
         process = child(serve, theirs, name=name, nice=nice, preloaded=preloaded)
         theirs.close()
