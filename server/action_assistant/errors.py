@@ -67,7 +67,7 @@ class Unauthenticated(Refused):
 
 
 class Withdrawn(Unauthenticated):
-    """The credentials were valid until somebody revoked them."""
+    """The credentials were valid until a person revoked them."""
 
     title = "Your invitation was revoked"
 

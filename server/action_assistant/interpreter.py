@@ -32,8 +32,8 @@ class Interpreter(msgspec.Struct, frozen=True, kw_only=True):
     remark: str = ""
 
     def environment(self, environ: Mapping[str, str]) -> dict[str, str]:
-        """Return `environ` without the variables that processes of this interpreter must not
-        get."""
+        """Return `environ` without the variables that mislead this interpreter, such as those of a
+        sourced ROS for the interpreter of `make ros`."""
         drop = {
             "this": (),
             "named": (_ANEW,),

@@ -305,7 +305,8 @@ class WatchedGraph:
             self._lines.change(seq, who, change)
 
     def _who_wrote(self) -> list[str]:
-        """Return who added content since the last call. People who only deleted are not visible."""
+        """Return the names of the people who added content since the last call. People who only
+        deleted are not visible."""
         reader = messages.ByteReader(self.doc.get_state())
         clocks = {reader.number(): reader.number() for _ in range(reader.number())}
         before, self._clocks = self._clocks, clocks

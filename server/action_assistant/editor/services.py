@@ -97,8 +97,8 @@ class EditorState:
         return self._services
 
     async def acting(self, request: Request[Any, Any, Any]) -> tuple[EditorServices, Person]:
-        """Return the services, and the person who sent a request, whose name is stored from now on. Raise
-        Unavailable if it cannot be stored."""
+        """Store the name of the person who sent a request, and return the services and this person.
+        Raise Unavailable if the name cannot be stored."""
         person = person_of(request)
         await self.services.people.seen(person)
         return self.services, person

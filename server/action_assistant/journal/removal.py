@@ -38,7 +38,8 @@ class StreamRemoved(msgspec.Struct, frozen=True):
 
 
 def taken_out(event: Event) -> tuple[str, Head] | None:
-    """Return the stream that an event removes from the log, and its end; None for other events."""
+    """Return the name of the stream that the event `event` removes from the log, and the end of
+    that stream; None for an event that removes none."""
     if event.stream != STREAM or event.kind != StreamRemoved.kind:
         return None
     removed = msgspec.json.decode(event.body, type=StreamRemoved)

@@ -26,9 +26,9 @@ _NICER: Final = 10
 
 
 class RunnerWorkers:
-    """The lanes of a runner. `starts`: the stages of starts, and the work of open runs. `looks`:
-    questions about stored runs, which may take long. `ours`: questions of the runner itself, which
-    wait behind no others."""
+    """The pools of worker processes of a runner. `starts`: for the stages of starts, and the work
+    of open runs. `looks`: for questions about stored runs, which may take long. `ours`: for
+    questions of the runner itself, which wait behind no others."""
 
     def __init__(self) -> None:
         threads = CapacityLimiter(8)
@@ -39,8 +39,8 @@ class RunnerWorkers:
     @classmethod
     @asynccontextmanager
     async def opened(cls) -> "AsyncIterator[RunnerWorkers]":
-        """Keep workers running while the context is open. The first processes are made soon after
-        it is entered."""
+        """Return a context with the pools, in which workers are kept running. The first processes
+        are made soon after its beginning."""
         lanes = cls()
         async with kept_warm(lanes.starts, lanes.looks, lanes.ours):
             yield lanes

@@ -292,8 +292,9 @@ def _is_anothers(path: Path, done: FinishedBackup) -> bool:
 
 
 def _taken_away(command: str | None, path: Path) -> OffSite | None:
-    """Run the command with the path of the backup as its last argument; its output goes to our log.
-    Return how that ended; None without a command."""
+    """Run the command that takes a finished backup elsewhere, with the path of the backup as its
+    last argument, and wait for its end; its output goes to the log. Return the result; None without
+    a command."""
     if not command:
         return None
     begun = time.monotonic()

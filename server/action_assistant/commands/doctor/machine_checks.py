@@ -383,7 +383,8 @@ def _unusable(data: Path, why: Path) -> Diagnostic:
 
 
 def _blocked(folder: Path) -> Path | None:
-    """Return the path that keeps us from creating a missing folder; None if nothing does."""
+    """Return the file or link that prevents this program from creating a missing folder; None if
+    there is no such obstacle."""
     above = next(each for each in folder.absolute().parents if each.exists())
     return None if above.is_dir() and os.access(above, os.W_OK | os.X_OK) else above
 

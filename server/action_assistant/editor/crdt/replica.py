@@ -256,7 +256,8 @@ class Replica:
                 self._replay_together(group.part(at, len(group)))
 
     def _until_nothing_waits(self, events: EventColumns) -> int:
-        """Replay events one by one until no update waits; return how many were replayed."""
+        """Replay events one by one until no update waits for an earlier one any more; return how
+        many were replayed."""
         done = 0
         while self._waiting and done < len(events):
             self._replay_one_by_one(events.part(done, done + 1))

@@ -1,4 +1,4 @@
-"""Derives texts, problems and facts from a graph at one seq of its log. For workers, except `GraphAtSeq`.
+"""Derives texts, problems and facts from a graph at one seq of its log. Runs in workers, except `GraphAtSeq`.
 
 The event loop knows a graph only as the bytes of its document; what depends on its size is asked of
 a worker, which remembers the graphs that it read last.

@@ -1,4 +1,4 @@
-"""Summarises the changes of edit sessions as differences of actions, arrows and notes. For workers."""
+"""Summarises the changes of edit sessions as differences of actions, arrows and notes. Runs in workers."""
 
 from collections.abc import Iterable, Mapping, Sequence, Set
 from typing import Any, Final, TypeAlias

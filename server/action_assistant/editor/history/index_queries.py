@@ -63,8 +63,8 @@ class IndexGrowth(msgspec.Struct, frozen=True):
 
 
 def growth(connection: Connection, graph: str, slice_rows: int) -> IndexGrowth | None:
-    """Return the rows that the next events of a graph add to its index, in slices of `slice_rows`;
-    None if there are no more events."""
+    """Return the rows that the next events of a graph add to the index of its changes, with
+    `slice_rows` rows in each slice. Return None if all events are in the index."""
     seq, kept = _head(connection, graph)
     document = unpacked(kept)
     leftovers = any(

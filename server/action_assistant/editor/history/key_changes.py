@@ -1,4 +1,4 @@
-"""Keys of a document: to what each belongs, and which of them each event of its log changed. For workers."""
+"""Tells to which thing each key of a document belongs, and which keys each event changed. Runs in workers."""
 
 from bisect import bisect_right
 from collections import defaultdict

@@ -1,1 +1,1 @@
-"""Between documents and UMRF text: files, edited text, rehearsals. For workers."""
+"""Between documents and UMRF text: files, edited text, rehearsals. Runs in workers."""

@@ -1,4 +1,4 @@
-"""C++ packages of the actions that a graph has, as routes answer them. For workers."""
+"""C++ packages of the actions that a graph has, as routes answer them. Runs in workers."""
 
 import io
 import zipfile

@@ -1,4 +1,4 @@
-"""Makes edits on a copy of a document, as updates (rule R9), and the rule of three-way merges. For workers."""
+"""Makes edits on a copy of a document, as updates (rule R9), and the rule of three-way merges. Runs in workers."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Literal, TypeAlias

@@ -1,4 +1,4 @@
-"""Reads files that people import into the content of a document. For workers."""
+"""Reads files that people import into the content of a document. Runs in workers."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Sub-graphs: made of chosen actions, unpacked, flattened and packed as files. For workers.
+"""Sub-graphs: made of chosen actions, unpacked, flattened and packed as files. Runs in workers.
 
 Actions are moved by changes of a document key by key. The page makes these changes, so that they are an edit of
 the person's own; `before` lets it see what others changed meanwhile

@@ -1,4 +1,4 @@
-"""Computes how library actions and the graphs that use them would update each other. For workers."""
+"""Computes how library actions and the graphs that use them would update each other. Runs in workers."""
 
 from collections.abc import Callable, Sequence
 

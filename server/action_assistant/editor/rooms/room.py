@@ -369,7 +369,7 @@ class Room:
         return self._replica
 
     async def close_if_unused(self, is_needed: Callable[[], bool]) -> None:
-        """Store a snapshot and end the room, unless `is_needed()` by then."""
+        """Store a snapshot, then end the room unless `is_needed()` returns True by then."""
         await self._idle.wait()
         if not self._ended and self.damaged is None:
             await self._snapshots.store_now(self.seq, self._replica)

@@ -1,5 +1,5 @@
 """Checks expected courses against a graph as it is now: which it still takes, and which arrows they
-cover. For workers."""
+cover. Runs in workers."""
 
 import time
 from collections.abc import Iterable, Sequence

@@ -72,8 +72,9 @@ def within(found: dict[str, LevelPlace], action: str) -> list[str]:
 
 
 def _by_part(graph: str, names: Iterable[str]) -> dict[str, list[str]]:
-    """Return names by every prefix that may be their sub-graph: both it and the action may contain
-    the mark."""
+    """Return the given names of actions by each prefix that may be the running name of their
+    sub-graph. Several prefixes of one name may, since names of sub-graphs and actions can both
+    contain a slash."""
     parts: dict[str, list[str]] = defaultdict(list)
     for name in names:
         at = name.find("/", len(graph)) if name.startswith(f"{graph}__") else -1

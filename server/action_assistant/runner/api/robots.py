@@ -423,8 +423,8 @@ async def _umrf(services: RunnerServices, text: str) -> Response[bytes]:
 
 
 def canonical(text: str) -> bytes:
-    """Return the graph of a UMRF text in the form that imports read, in UTF-8. Raise NotFound if
-    the text cannot be read. For workers."""
+    """Return the graph of a UMRF text in the form that imports read, in UTF-8. Call it in a worker
+    process. Raise NotFound if the text cannot be read."""
     try:
         graph = codec.read(text).graph
     except codec.Unreadable as wrong:

@@ -109,8 +109,8 @@ class PublishedGraphs:
         self.plans |= index.graphs
 
     def take(self, traces: Sequence[Trace], now_ms: float) -> list[str]:
-        """Process traces (events) of the engine at `now_ms`; return the names of the graphs that
-        ended, without sub-graphs."""
+        """Update the shown states of graphs by events (`traces`) of the simulated engine at
+        `now_ms`. Return the names of the graphs that ended, without sub-graphs."""
         ended: list[str] = []
         seen = _as_threads_do(traces)
         at_once = sum(isinstance(each, NodeStateEvent) and each.state in _SHOWN for each in seen)

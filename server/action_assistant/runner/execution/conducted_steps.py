@@ -128,12 +128,12 @@ class Step:
 
     @property
     def is_open(self) -> bool:
-        """True while its piece may move: it was handed over and is not proven at rest."""
+        """True while the piece of the step may move: it was handed over and is not proven at rest."""
         return self.run is not None and self.run.end is None
 
     @property
     def has_rested(self) -> bool:
-        """True while its action has ended and the graph of its piece goes on."""
+        """True while the action of the step has ended and the graph of its piece goes on."""
         run = self.run
         if run is None or run.graph_state != "RUNNING":
             return False
@@ -146,7 +146,8 @@ class Step:
         return self.is_open or (self.run is not None and self.is_led)
 
     def waiting(self) -> anyio.CancelScope:
-        """Return a scope that is cancelled when the step is to end."""
+        """Return a scope for the wait before the piece is sent; it is cancelled when the step is to
+        end."""
         self._waiting = anyio.CancelScope()
         return self._waiting
 

@@ -53,10 +53,10 @@ class LedCalls:
         self._news.append(CallStopped(number=number))
 
     def pause(self, number: int) -> None:
-        """Do nothing: a conducted run pauses by holding what has not begun."""
+        """Do nothing: a conducted run is not paused, but held, so that nothing further begins."""
 
     def resume(self, number: int) -> None:
-        """Do nothing: a conducted run pauses by holding what has not begun."""
+        """Do nothing: a conducted run is not paused, but held, so that nothing further begins."""
 
     def give_up(self, number: int) -> str | None:
         """Return None and do nothing: only a proof ends a call that a robot carries out."""
@@ -72,7 +72,9 @@ class LedCalls:
         return []
 
     def kill_all(self) -> None:
-        """Do nothing: the robots go on, and each has a Stop of its own."""
+        """Do nothing: robots that carry out calls go on, and each is stopped by the Stop of its
+        piece."""
 
     def end(self) -> None:
-        """Do nothing: the robots go on, and each has a Stop of its own."""
+        """Do nothing: robots that carry out calls go on, and each is stopped by the Stop of its
+        piece."""

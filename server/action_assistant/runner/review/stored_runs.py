@@ -1,4 +1,4 @@
-"""Answers questions about stored runs: sums, causes, comparisons, exports, expected courses. For workers."""
+"""Answers questions about stored runs: sums, causes, comparisons, exports, expected courses. Runs in workers."""
 
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from datetime import datetime

@@ -87,7 +87,7 @@ class StreamAppender:
             await self._done.wait()
 
     async def find_end(self) -> None:
-        """Ask the journal for the end of the stream until it answers."""
+        """Ask the journal for the end of the stream, again and again until it answers."""
         failures = 0
         while True:
             try:

@@ -89,7 +89,7 @@ class Standstill:
         self._looks = 0
 
     def forget(self) -> None:
-        """Start over, since the graph moves or was not in the answer."""
+        """Forget for how long the graph has stood still, since it moves or was not in the answer."""
         self._since, self._looks = None, 0
 
     @property

@@ -113,7 +113,8 @@ class LoadingWatch:
         self._meddled = True
 
     def forget(self) -> None:
-        """Forget all observations, since they prove nothing any more."""
+        """Forget all observations of actions that may be loading, since they prove nothing any
+        more."""
         self._after.clear()
         self._read.clear()
         self._age += 1

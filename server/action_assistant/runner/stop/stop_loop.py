@@ -84,8 +84,9 @@ class StopLoop:
                 gap = _FIRST_GAP_S
 
     async def _turn(self) -> None:
-        """If the engine does not hold the run any more, wait for a press: only one message is sent
-        for each then, since a graph of that name would be another one."""
+        """Wait until the next stop message may be sent. That is at once while the engine holds the
+        run; later a person has to press Stop for each message, since a graph of that name would be
+        another one."""
         while self._run.lost and not self._pressed.is_set():
             with anyio.move_on_after(_GAP_S):
                 await self._pressed.wait()

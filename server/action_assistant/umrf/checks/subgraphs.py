@@ -263,7 +263,8 @@ def _inner(name: str, facts: EngineFacts, graphs: SubGraphs) -> _Inner:
 
 
 def _stays(finding: _Finding) -> bool:
-    """Return whether this finding already says that the sub-graph may never end."""
+    """Return whether a finding makes it needless to try how the sub-graph ends: it is an error, or
+    says that the sub-graph may never end (H8)."""
     return finding.severity == "error" or finding.place.code == "H8"
 
 

@@ -227,8 +227,9 @@ class _Waiting:
 
 
 def _report_at_exit(subject: Subject, net: Network, found: list[Trial]) -> None:
-    """Report once each parent for which the exit waits for ever, and once the outputs that the exit
-    lacks. `found`: the trials in which the exit waits; `net`: the graph as numbers."""
+    """Report, as problems of `subject`, each parent that the exit waits for and that never runs,
+    once; and once the outputs that the exit needs as its inputs and does not get. `found`: the
+    trial courses in which the exit waits; `net`: the graph as numbers."""
     mended = _mended(subject.graph, {name for trial in found for name in trial.end.lacking})
     is_mend = bool(found) and _never_stuck(mended)
     reported: set[str] = set()

@@ -266,9 +266,10 @@ class _DeviatingCourse:
     # Situations that are known
 
     def _forget(self, after: int) -> Outcome | None:
-        """Drop states that can make no difference any more. Return the outcome if no state is left
-        or if another course had the same situation, else None. `after`: the number of the following
-        instant of the baseline."""
+        """Drop the states of actions that cannot influence the course any more. Return the outcome
+        of the course if no state is left, or if an earlier course came to the same states and its
+        outcome is known; else None. `after`: the number of the following instant of the baseline.
+        """
         course = self.course
         lively: Mask = 0
         idle: list[int] = []

@@ -41,7 +41,8 @@ def tree_of(graph: Graph, stamp: Stamp | None = None) -> dict[str, Json]:
 
 
 def name_order(relation: Relation) -> tuple[str, int]:
-    """Return the sort key of relations that have the same order number: their keys."""
+    """Return the key by which relations with the same order number are sorted: the keys of parent
+    and child, then the number of the listing."""
     return f"{relation.parent}>{relation.child}", relation.listing
 
 

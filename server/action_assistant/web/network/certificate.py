@@ -66,11 +66,13 @@ class Certificate:
             ) from error
 
     def trusting(self) -> ssl.SSLContext:
-        """Return a TLS context that trusts our own authority only, for clients on this computer."""
+        """Return a TLS context that trusts this server's own authority only, for clients on this
+        computer."""
         return ssl.create_default_context(cafile=str(self.authority))
 
     def trusting_too(self) -> ssl.SSLContext:
-        """Return a TLS context that trusts the system's authorities, and our own if it exists."""
+        """Return a TLS context that trusts the system's authorities, and this server's own if it
+        exists."""
         context = ssl.create_default_context()
         if self.authority.exists():
             context.load_verify_locations(cafile=str(self.authority))

@@ -1,4 +1,4 @@
-"""Splits one large update into small ones that can be applied one after the other. For workers.
+"""Splits one large update into small ones that can be applied one after the other. Runs in workers.
 
 The CRDT library applies an update in one call that holds the interpreter, 45 ms for each MB. Between two small ones
 the event loop does something else. Yjs update format, version 1: the bytes of a struct say the same in any update.

@@ -1,4 +1,4 @@
-"""Previews a merge as differences of actions, arrows and notes, and makes its update. For workers."""
+"""Previews a merge as differences of actions, arrows and notes, and makes its update. Runs in workers."""
 
 from collections.abc import Collection, Iterable, Mapping
 from typing import Any, Final, Literal, TypeAlias

@@ -152,8 +152,8 @@ class _Merge:
         )
 
     def _take_along(self, actions: Iterable[str]) -> None:
-        """Take the arrows of an action that one side removed from the side that was chosen for the
-        action; actions that stay come first."""
+        """Choose the side of each arrow of the given actions, which one side removed: the side that
+        was chosen for the action at its end. Where both ends were, an action that stays decides."""
         whole = {action: self._whole[action] for action in actions if action in self._whole}
         stays = {action for action, side in whole.items() if action in self._there[side]}
         for action in sorted(whole, key=lambda each: (each not in stays, each)):

@@ -19,9 +19,9 @@ _MAKE: Final = "`make ros` in a checkout, or `source` the ROS 2 workspace before
 def ros2_reach(
     clock_us: Callable[[], int], environ: Mapping[str, str] = os.environ
 ) -> "Reach | str":
-    """Return the reach (maker of links) over ROS 2, or one sentence why this process can have none.
-    `clock_us`: returns microseconds UTC; `environ`: the environment variables. rclpy is imported
-    only here, since an editor's computer has none, and its wheels restart their interpreter."""
+    """Return the object that makes links to robots over ROS 2, or a sentence that says why this
+    process cannot have one. `clock_us`: returns microseconds UTC; `environ`: the environment
+    variables, such as ROS_DOMAIN_ID."""
     missing = why_not(environ)
     if missing:
         return missing

@@ -99,7 +99,7 @@ class Ros2:
         )
 
     async def aclose(self) -> None:
-        """Leave every domain, also if the call is cancelled."""
+        """Leave every ROS domain, and wait for that, also if the call is cancelled."""
         with anyio.CancelScope(shield=True):
             while self._domains:
                 _, domain = self._domains.popitem()
