@@ -91,3 +91,58 @@ test("keys and marquee: Tab searches, all are selected, Delete deletes, a frame 
   expect(failures).toEqual([]);
   await context.close();
 });
+
+test("graphs are moved into folders by keys, found there, and none is lost with a folder", async ({
+  browser,
+}) => {
+  const { page, context, failures } = await product.person(browser, "Ada");
+  const heading = (name: string) => page.getByRole("heading", { name, exact: true });
+  const folder = (name: string) =>
+    page.getByRole("region", { name: "Folders" }).getByRole("link", { name });
+  const dialog = page.getByRole("dialog");
+
+  await page.getByRole("button", { name: "New folder" }).click();
+  await dialog.getByRole("textbox", { name: "Name of the folder" }).fill("Lab");
+  await page.keyboard.press("Enter");
+  await expect(folder("Lab")).toContainText("0 graphs");
+
+  // By keys alone: the menu of the graph, a new folder inside of the one that arrows choose.
+  const { name } = (await product.ask<{ name: string }[]>("/api/graphs"))[0] ?? { name: "" };
+  await page.getByRole("button", { name: `More about ${name}`, exact: true }).focus();
+  await page.keyboard.press("Enter");
+  await page.getByRole("menuitem", { name: "Move to folder" }).focus();
+  await page.keyboard.press("Enter");
+  await expect(dialog.getByRole("radio", { name: "No folder" })).toBeFocused();
+  await page.keyboard.press("ArrowDown");
+  await expect(dialog.getByRole("radio", { name: "Lab" })).toBeChecked();
+  await page.keyboard.press("Tab");
+  await page.keyboard.type("Night");
+  await page.keyboard.press("Enter");
+  await expect(heading(name)).toHaveCount(0);
+
+  await folder("Lab").click();
+  await expect(folder("Night")).toContainText("1 graph");
+  await page.getByRole("textbox", { name: "Search graphs" }).fill(name);
+  await expect(heading(name)).toBeVisible();
+  await expect(page.getByText("In Lab / Night")).toBeVisible();
+  await page.getByRole("textbox", { name: "Search graphs" }).fill("");
+
+  await folder("Night").click();
+  await expect(heading(name)).toBeVisible();
+  const graph = await product.ask<{ folder?: string }[]>("/api/graphs");
+  await page.getByRole("button", { name: "New graph" }).first().click();
+  await page.waitForURL(/\/graphs\/.+/);
+  const made = new URL(page.url()).pathname.split("/").at(-1);
+  const filed = await product.ask<{ folder?: string }>(`/api/graphs/${made}`);
+  expect(graph.map((each) => each.folder)).toContain(filed.folder);
+  await page.goBack();
+
+  await page.getByRole("button", { name: "More about the folder Night" }).click();
+  await page.getByRole("menuitem", { name: "Remove the folder" }).click();
+  await expect(dialog).toContainText("(2 graphs) go into");
+  await dialog.getByRole("button", { name: "Remove the folder" }).click();
+  await expect(heading("Folder Lab")).toBeVisible();
+  await expect(heading(name)).toBeVisible();
+  expect(failures).toEqual([]);
+  await context.close();
+});

@@ -50,7 +50,7 @@ const PAGE = "src/app/main.tsx";
  */
 const BUDGETS: readonly (readonly [page: string, most: number, entries: readonly string[]])[] = [
   ["STOP alone", 84, []],
-  ["the list of graphs", 181, [PAGE, "src/app/home-screen.tsx"]],
+  ["the list of graphs", 183, [PAGE, "src/app/home-screen.tsx"]],
   ["the editor", 346, [PAGE, "src/app/graph-screen.tsx"]],
   ["administration", 170, [PAGE, "src/administration/administration-page.tsx"]],
   ["robots", 211, [PAGE, "src/robots/robots-page.tsx"]],

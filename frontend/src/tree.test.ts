@@ -355,6 +355,8 @@ const UNDRAFTED: Readonly<Record<string, string>> = {
   "levels/sub-graph-dialogs.tsx ExtractForm": DIALOG,
   "levels/flat-dialog.tsx FlatForm": DIALOG,
   "home/graph-cards.tsx GraphCards": "a search",
+  "home/folder-dialogs.tsx FolderName": DIALOG,
+  "home/folder-dialogs.tsx MoveChoice": DIALOG,
   "home/rename-dialog.tsx Rename": DIALOG,
   "home/sidebar.tsx Sidebar": "a search",
   "review/run-filters.tsx Person": "a filter",

@@ -74,6 +74,7 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     ),
     "export": CommandEntry("remote", "print a graph as UMRF", described=True),
     "graphs": CommandEntry("remote", "list the graphs", described=True),
+    "folders": CommandEntry("folders", "folders of graphs: list, new, rename, move, remove, put"),
     "drafts": CommandEntry("drafts", "drafts of a graph: list, new, merge", described=True),
     "runs": CommandEntry("runs", "list the runs, newest first", described=True),
     "run": CommandEntry(

@@ -342,3 +342,30 @@ def test_a_draft_is_made_looked_at_and_merged(product: Product, files: dict[str,
     assert (merged.returncode, merged.stdout.splitlines()[-1]) == (0, "merged: change 3")
     assert product.cli("drafts", "merge", draft, "--choose", "nowhere").returncode == 2
     assert product.cli("export", "AbCdEfGhIjKl").returncode == 1
+
+
+def test_folders_are_made_by_path_and_graphs_are_put_into_them(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    night = product.cli("folders", "new", "Lab/Night").stdout.strip()
+    assert product.cli("folders", "new", "Lab/Night").stdout.strip() == night
+    assert product.cli("folders", "put", graph, "--into", "Lab/Night").returncode == 0
+    lines = product.cli("folders", "list").stdout.splitlines()
+    assert [line.split("  ", 1)[1] for line in lines] == ["Lab  0 graphs", "Lab/Night  1 graph"]
+    assert product.cli("graphs", "--folder", "Lab/Night").stdout.startswith(f"{graph}  ")
+    assert json.loads(product.cli("graphs", "--folder", "Lab", "--json").stdout) == []
+    assert product.cli("folders", "rename", "Lab/Night", "Day").returncode == 0
+    assert product.cli("folders", "move", "Lab/Day", "--into", "/").returncode == 0
+    assert graph in product.cli("graphs", "--folder", "Day").stdout
+    assert product.cli("folders", "remove", night).returncode == 0
+    assert graph in product.cli("graphs", "--folder", "/").stdout
+    for words, why in (
+        (("remove", "Lab/Day"), "There is no folder 'Lab/Day'."),
+        (("remove", "/"), "Name a folder"),
+        (("new", "/"), "A path names at least one folder."),
+        (("move", "Lab", "--into", "Lab"), "A folder cannot lie in itself."),
+    ):
+        refused = product.cli("folders", *words)
+        assert (refused.returncode, why in refused.stderr) == (1, True), refused.stderr
+    product.cli("folders", "remove", "Lab")

@@ -22,6 +22,7 @@ const inGraph = (id: string) => ({ graph_id: id });
 export const queryKeys = {
   graphs: ["graphs"] as const,
   deleted: ["deleted graphs"] as const,
+  folders: ["folders"] as const,
   actions: ["actions"] as const,
   graph: (id: string) => ["graphs", id] as const,
   problems: (id: string, seq: number) => ["graphs", id, "problems", seq] as const,
@@ -80,8 +81,11 @@ export function useProblems(graph: string, seq: number) {
   });
 }
 
-export function createGraph(name: string): Promise<GraphSummary> {
-  return editor.post("/api/graphs", { body: { name }, status: 201 });
+type Place = string | null | undefined;
+
+/** `folder`: in which the graph is made, if any; also of what imports and copies make. */
+export function createGraph(name: string, folder: Place): Promise<GraphSummary> {
+  return editor.post("/api/graphs", { query: { folder }, body: { name }, status: 201 });
 }
 
 /**
@@ -91,8 +95,8 @@ export function createGraph(name: string): Promise<GraphSummary> {
 export type Preview = EditorApi["Preview"];
 
 /** Imports a file's text as it is. */
-export function importGraph(text: string): Promise<GraphSummary> {
-  return editor.post("/api/graphs", { body: text, status: 201 });
+export function importGraph(text: string, folder?: Place): Promise<GraphSummary> {
+  return editor.post("/api/graphs", { query: { folder }, body: text, status: 201 });
 }
 
 /** An edit of the graph's own document: whoever has it open sees it. */
@@ -100,9 +104,9 @@ export function renameGraph(id: string, name: string): Promise<GraphSummary> {
   return editor.patch("/api/graphs/{graph_id}", { path: inGraph(id), body: { name } });
 }
 
-/** Copy a graph under another name; edits of one do not touch the other. */
-export async function duplicateGraph(id: string, name: string): Promise<GraphSummary> {
-  const made = await importGraph(await graphText(id));
+/** Copy a graph under another name into its folder; edits of one do not touch the other. */
+export async function duplicateGraph(graph: GraphSummary, name: string): Promise<GraphSummary> {
+  const made = await importGraph(await graphText(graph.id), graph.folder);
   try {
     return await renameGraph(made.id, name);
   } catch (error) {
@@ -148,6 +152,7 @@ export async function refreshGraphs(client: QueryClient): Promise<void> {
   await Promise.all([
     client.invalidateQueries({ queryKey: queryKeys.graphs, exact: true }),
     client.invalidateQueries({ queryKey: queryKeys.deleted }),
+    client.invalidateQueries({ queryKey: queryKeys.folders }),
   ]);
 }
 

@@ -1,8 +1,9 @@
-/** Graphs as cards: searched, sorted, by label; each says how it is and who is in it. */
+/** Graphs of a folder as cards: searched, sorted, by label; each says how it is and who is in it. */
 import { NativeSelect, TextInput } from "@mantine/core";
 import { IconSearch } from "@tabler/icons-react";
-import { useMemo, useState } from "react";
+import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
+import { type Folder, folderPath } from "../api/folders";
 import type { GraphSummary } from "../api/graphs";
 import { newestRun } from "../api/live-socket";
 import { useLive } from "../api/page-link";
@@ -20,7 +21,14 @@ import { isolated } from "../words/isolated";
 import style from "./graph-cards.module.css";
 import { GraphCounts } from "./graph-counts";
 import { GraphMenu } from "./graph-menu";
-import { allLabels, type GraphOrder, lastRuns, ORDERS, selectGraphs } from "./graph-selection";
+import {
+  allLabels,
+  type GraphOrder,
+  graphsInFolder,
+  lastRuns,
+  ORDERS,
+  selectGraphs,
+} from "./graph-selection";
 import home from "./home.module.css";
 
 /** Decoration, and the reading and laying out of graphs with it: the list is there without. */
@@ -60,9 +68,11 @@ interface GraphCardProps {
   graph: GraphSummary;
   names: readonly string[];
   last: Run | null;
+  /** The names on the way to its folder, where it is in another one than the one on screen. */
+  place: string;
 }
 
-function GraphCard({ graph, names, last }: GraphCardProps) {
+function GraphCard({ graph, names, last, place }: GraphCardProps) {
   const now = useNow(20_000);
   const at = instant(graph.updated_at);
   const { robots = [], labels = [], people = [] } = graph;
@@ -76,6 +86,11 @@ function GraphCard({ graph, names, last }: GraphCardProps) {
         <div className={home.body}>
           <h3 className={home.name}>{graph.name || "Untitled"}</h3>
           <p className={home.description}>{graph.description || "No description yet"}</p>
+          {place !== "" && (
+            <p className={`${style.marks} truncate`}>
+              In <bdi>{place}</bdi>
+            </p>
+          )}
           {(robots.length > 0 || labels.length > 0) && (
             <p className={style.marks}>
               {robots.slice(0, FEW).map((robot) => (
@@ -110,16 +125,28 @@ function GraphCard({ graph, names, last }: GraphCardProps) {
   );
 }
 
-export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
+interface Props {
+  graphs: readonly GraphSummary[];
+  folders: readonly Folder[];
+  /** The one on screen; null: the graphs that are in none. */
+  folder: string | null;
+  /** Stands before the graphs, and not before what a search or a label finds in all folders inside. */
+  children: ReactNode;
+}
+
+export function GraphCards({ graphs, folders, folder, children }: Props) {
   const { now: live, runner } = useLive();
   const listed = useRuns(runner).data;
   const [search, setSearch] = useState("");
   const [label, setLabel] = useState<string | null>(null);
   const [order, setOrder] = useKept<GraphOrder>("aa.graphs-by", "changed");
   const runs = useMemo(() => lastRuns([...(listed ?? []), ...live.runs.values()]), [listed, live]);
-  const labels = allLabels(graphs);
+  const below = graphsInFolder(graphs, folders, folder, true);
+  const labels = allLabels(below);
   const wish = { search, label: label !== null && labels.includes(label) ? label : null, order };
-  const shown = selectGraphs(graphs, wish, runs);
+  const deep = search.trim() !== "" || wish.label !== null;
+  const here = deep ? below : graphsInFolder(graphs, folders, folder, false);
+  const shown = selectGraphs(here, wish, runs);
   const names = graphs.map(({ name }) => name);
   return (
     <>
@@ -158,9 +185,15 @@ export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
         />
       </search>
       <p className="visually-hidden" role="status">
-        {search === "" ? "" : `${shown.length} of ${graphs.length} graphs`}
+        {search === "" ? "" : `${shown.length} of ${below.length} graphs`}
       </p>
-      {shown.length === 0 && (
+      {!deep && children}
+      {!deep && shown.length === 0 && (
+        <p className="quiet-12">
+          {folder === null ? "Every graph is in a folder." : "No graph is in this folder itself."}
+        </p>
+      )}
+      {deep && shown.length === 0 && (
         <Empty icon={<IconSearch size={22} />} title="No graph says that">
           Names, descriptions, robots, labels and the people in them are searched.
         </Empty>
@@ -172,6 +205,7 @@ export function GraphCards({ graphs }: { graphs: readonly GraphSummary[] }) {
             graph={graph}
             names={names}
             last={newestRun(live, graph.id) ?? runs.get(graph.id) ?? null}
+            place={deep && graph.folder !== folder ? folderPath(folders, graph.folder) : ""}
           />
         ))}
       </div>

@@ -1,9 +1,17 @@
-/** Menu of a graph: rename, duplicate, export, delete and restore. */
+/** Menu of a graph: rename, duplicate, move to a folder, export, delete and restore. */
 import { Button, Menu } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import { IconCopy, IconDots, IconPencil, IconShare3, IconTrash } from "@tabler/icons-react";
+import {
+  IconCopy,
+  IconDots,
+  IconFolderSymlink,
+  IconPencil,
+  IconShare3,
+  IconTrash,
+} from "@tabler/icons-react";
 import { type QueryClient, useQueryClient } from "@tanstack/react-query";
 import { type ComponentProps, useState } from "react";
+import { fileGraph } from "../api/folders";
 import {
   deleteGraph,
   duplicateGraph,
@@ -67,6 +75,8 @@ function offerBack(client: QueryClient, graph: GraphSummary): void {
 
 const RenameDialog = lazyPart(() => import("./rename-dialog").then((part) => part.RenameDialog));
 
+const MoveDialog = lazyPart(() => import("./folder-dialogs").then((part) => part.MoveDialog));
+
 const RenamedUses = lazyPart(() =>
   import("../canvas/renamed-uses").then((part) => part.RenamedUses),
 );
@@ -77,6 +87,7 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
   const client = useQueryClient();
   const mayEdit = useMay("edit");
   const [renaming, setRenaming] = useState<boolean | null>(null);
+  const [moving, setMoving] = useState<boolean | null>(null);
   const [renamed, setRenamed] = useState<Renamed | null>(null);
   const rename = async (name: string) => {
     const graphs = client.getQueryData<GraphSummary[]>(queryKeys.graphs) ?? [];
@@ -93,7 +104,7 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
     return done;
   };
   const duplicate = () =>
-    attempt(client, "Not duplicated", () => duplicateGraph(graph.id, copyName(graph.name, names)));
+    attempt(client, "Not duplicated", () => duplicateGraph(graph, copyName(graph.name, names)));
   const remove = async () => {
     const done = await attempt(client, "Not deleted", () => deleteGraph(graph.id));
     if (done) offerBack(client, graph);
@@ -127,6 +138,13 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
             Duplicate
           </Menu.Item>
           <Menu.Item
+            leftSection={<IconFolderSymlink size={15} />}
+            disabled={!mayEdit}
+            onClick={() => setMoving(true)}
+          >
+            Move to folder …
+          </Menu.Item>
+          <Menu.Item
             component="a"
             href={serverPath(`/api/graphs/${encodeURIComponent(graph.id)}/umrf`)}
             download={`${graph.name || "graph"}.umrf.graph.json`}
@@ -151,6 +169,15 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
             opened={renaming}
             onClose={() => setRenaming(false)}
             onRename={rename}
+          />
+        )}
+        {moving !== null && (
+          <MoveDialog
+            name={graph.name}
+            from={graph.folder ?? null}
+            move={(into) => fileGraph(graph.id, into)}
+            opened={moving}
+            onClose={() => setMoving(false)}
           />
         )}
         {renamed !== null && (

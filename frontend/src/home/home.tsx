@@ -1,7 +1,9 @@
-/** The first page: every graph, and how to begin. */
+/** The first page: every graph by folders, and how to begin. */
 import { Button, Skeleton } from "@mantine/core";
 import { IconAlertTriangle, IconFileImport, IconPlus } from "@tabler/icons-react";
 import type { ReactNode } from "react";
+import { useSearch } from "wouter";
+import { folderWay, useFolders } from "../api/folders";
 import { useGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
 import { useMay } from "../api/people";
@@ -14,6 +16,13 @@ const DeletedGraphs = boundedPart(
   () => import("./deleted-graphs").then((part) => part.DeletedGraphs),
   { waiting: null },
 );
+
+const FolderHead = boundedPart(() => import("./folders").then((part) => part.FolderHead), {
+  waiting: null,
+});
+const FolderCards = boundedPart(() => import("./folders").then((part) => part.FolderCards), {
+  waiting: null,
+});
 
 interface Props {
   onNew: () => void;
@@ -45,17 +54,26 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
   const mayEdit = useMay("edit");
   const graphs = useGraphs();
   const list = graphs.data ?? [];
+  const known = useFolders();
+  const folders = known.data ?? [];
+  const asked = new URLSearchParams(useSearch()).get("folder");
+  const way = folderWay(folders, asked);
+  const folder = way.at(-1)?.id ?? null;
   return (
     <main className="page">
       <div className={style.inner}>
         <div className={style.hello}>
-          <div>
-            <h2 className={style.title}>What should the robots do?</h2>
-            <p className={style.lead}>
-              Draw a task as a graph of actions, say what follows each outcome, run it in the
-              simulator, and look at what happened. The examples below show one idea each.
-            </p>
-          </div>
+          {folder === null ? (
+            <div>
+              <h2 className={style.title}>What should the robots do?</h2>
+              <p className={style.lead}>
+                Draw a task as a graph of actions, say what follows each outcome, run it in the
+                simulator, and look at what happened. The examples below show one idea each.
+              </p>
+            </div>
+          ) : (
+            <FolderHead way={way} folders={folders} />
+          )}
           {mayEdit && (
             <div className="flex gap-50">
               <Button leftSection={<IconFileImport size={16} />} onClick={onImport}>
@@ -77,7 +95,10 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
             {kept}
           </>
         )}
-        {graphs.isSuccess && list.length === 0 && (
+        {asked !== null && known.isSuccess && folder === null && (
+          <p role="status">This folder is not there any more. Its graphs are where it was.</p>
+        )}
+        {graphs.isSuccess && list.length === 0 && folders.length === 0 && (
           <Empty
             icon={<IconPlus size={22} />}
             title="No graph yet"
@@ -94,7 +115,11 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
               : "Graphs of others appear here."}
           </Empty>
         )}
-        {list.length > 0 && <GraphCards graphs={list} />}
+        {graphs.isSuccess && list.length + folders.length > 0 && (
+          <GraphCards key={folder} graphs={list} folders={folders} folder={folder}>
+            <FolderCards folder={folder} folders={folders} />
+          </GraphCards>
+        )}
         {graphs.isSuccess && (
           <div className={style.foot}>
             <DeletedGraphs />

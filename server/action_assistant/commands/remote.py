@@ -16,6 +16,7 @@ from action_assistant.commands.client import (
     print_json,
     running,
 )
+from action_assistant.commands.folders import folder_id, known_folders
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line, told
 
@@ -41,6 +42,9 @@ def _add_export(export: argparse.ArgumentParser) -> None:
 def _add_graphs(graphs: argparse.ArgumentParser) -> None:
     add_server(graphs, "--json")
     graphs.add_argument("--json", action="store_true", help="as JSON, for programs")
+    graphs.add_argument(
+        "--folder", metavar="FOLDER", help="only those in it: path or id; / for those in none"
+    )
     graphs.set_defaults(handler=_graphs)
 
 
@@ -114,13 +118,19 @@ def _export(options: argparse.Namespace) -> int:
 def _graphs(options: argparse.Namespace) -> int:
     with running(options) as server:
         answer = server.editor("GET", "/api/graphs")
+        listed = answer.json()
+        if options.folder is not None:
+            folder = folder_id(known_folders(server), options.folder)
+            listed = [graph for graph in listed if graph.get("folder") == folder]
     if options.json:
-        print_json(answer.json())
+        print_json(listed)
         return 0
     from action_assistant.editor.catalogue.catalogue import GraphView
 
+    chosen = {graph["id"] for graph in listed}
     for graph in decoded(answer, list[GraphView]):
-        print(one_line(f"{graph.id}  {graph.updated_at:{_TIME}}  {graph.name}"))
+        if graph.id in chosen:
+            print(one_line(f"{graph.id}  {graph.updated_at:{_TIME}}  {graph.name}"))
     return 0
 
 

@@ -5,6 +5,7 @@ from typing import Any
 from litestar import Request
 
 from action_assistant.editor.catalogue.catalogue import Catalogue
+from action_assistant.editor.catalogue.folders import Folders
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.catalogue.versions import Versions
@@ -59,6 +60,7 @@ class EditorServices:
         self.catalogue = Catalogue(
             journal, self.rooms, self.graph_reader, self.graph_checks, workers.files
         )
+        self.folders = Folders(journal)
         self.versions = Versions(journal, self.graph_reader, self.graph_checks)
         self.library = Library(journal, self.graph_reader)
         self.library_edits = LibraryEdits(

@@ -12,7 +12,7 @@ written_by: Final = written_by_table(EDITOR)
 #: A graph of the catalogue, or an action of the library (`kind`). `name` and `description` follow the
 #: document. A draft was made of the graph `draft_of` after its change `drafted_seq`; what both are compared
 #: with is `base_graph` after its change `base_seq`; `merged_seq` is the change up to which the draft was
-#: merged.
+#: merged. `folder`: the folder in which the graph lies.
 graph: Final = Table(
     "graph",
     EDITOR,
@@ -29,7 +29,18 @@ graph: Final = Table(
     Column("drafted_seq", BigInteger),
     Column("base_seq", BigInteger),
     Column("merged_seq", BigInteger),
+    Column("folder", Text),
     Index(None, "draft_of"),
+)
+#: A folder of graphs. `parent`: the folder in which it lies.
+folder: Final = Table(
+    "folder",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("parent", Text),
+    Column("made_at", BigInteger, nullable=False),
+    Column("made_by", Text, nullable=False),
 )
 #: A published version. Its UMRF stands in the body of the event `(stream, event_seq)`.
 version: Final = Table(

@@ -584,6 +584,13 @@ export interface EditorApi {
         overwritten?: boolean;
     };
     /**
+     * Filing
+     * @description A folder into which a graph is moved; null: out of all folders.
+     */
+    Filing: {
+        folder: string | null;
+    };
+    /**
      * FlatCopy
      * @description A request to flatten a graph after its change `seq` into a new graph called `name`.
      */
@@ -628,6 +635,18 @@ export interface EditorApi {
         code: "actors" | "allowed-values" | "asks-beside" | "begins-again" | "between" | "bypass" | "crash" | "entries" | "exits" | "faulty" | "inputs" | "left-running" | "loop" | "name" | "never-ends" | "otherwise" | "outputs" | "recursion" | "renaming" | "response" | "selection" | "signature" | "spontaneous" | "stops" | "too-large" | "undecided" | "values" | "ways-in" | "ways-out";
         message: string;
         at: EditorApi["HierarchyLevel"][];
+    };
+    /**
+     * Folder
+     * @description A folder of graphs. `parent`: the folder in which it lies, if any. `graphs`: how many graphs
+     *     lie in it, without those in the folders inside of it.
+     */
+    Folder: {
+        id: string;
+        name: string;
+        parent?: string;
+        /** @default 0 */
+        graphs?: number;
     };
     /**
      * GoneBack
@@ -690,7 +709,7 @@ export interface EditorApi {
      *     `damaged`: the first change that cannot be read; the graph stays in the state before it, and
      *     cannot be changed. `people`: who is in it now. `problems`: counts of the check; `wrong` and
      *     `to_fill_in`: counts for people, in which related problems count once. `drafts`: the number of
-     *     its drafts.
+     *     its drafts. `folder`: the id of the folder in which it lies.
      */
     GraphView: {
         id: string;
@@ -721,6 +740,7 @@ export interface EditorApi {
         draft_of?: EditorApi["DraftOf"];
         /** @default 0 */
         drafts?: number;
+        folder?: string;
     };
     /**
      * Guest
@@ -1029,6 +1049,7 @@ export interface EditorApi {
         draft_of?: EditorApi["DraftOf"];
         /** @default 0 */
         drafts?: number;
+        folder?: string;
         reading?: EditorApi["ImportReport"];
     };
     /**
@@ -1107,6 +1128,13 @@ export interface EditorApi {
         authors: EditorApi["PersonRef"][];
     };
     /**
+     * MovingFolder
+     * @description A folder into which another one is moved; null: out of all folders.
+     */
+    MovingFolder: {
+        parent: string | null;
+    };
+    /**
      * NewDraft
      * @description A request for a draft: its name, and the change of the graph that it begins with (missing:
      *     the last one).
@@ -1116,6 +1144,15 @@ export interface EditorApi {
         name?: string;
         /** @default null */
         seq?: number | null;
+    };
+    /**
+     * NewFolder
+     * @description A request for a folder in `parent`; null: in no folder.
+     */
+    NewFolder: {
+        name: string;
+        /** @default null */
+        parent?: string | null;
     };
     /**
      * NodeResultEvent
@@ -1535,6 +1572,13 @@ export interface EditorApi {
         ][];
     };
     /**
+     * RenamingFolder
+     * @description Another name of a folder.
+     */
+    RenamingFolder: {
+        name: string;
+    };
+    /**
      * Restoring
      * @description The change to whose state the graph is restored; with `of` only the action, arrow or note
      *     with this key is.
@@ -1870,6 +1914,20 @@ export interface EditorPaths {
     "/api/graphs/{graph_id}/rewriting": {
         post: EditorOperations["getRewriting"];
     };
+    "/api/folders": {
+        get: EditorOperations["listFolders"];
+        post: EditorOperations["makeFolder"];
+    };
+    "/api/folders/{folder_id}": {
+        delete: EditorOperations["removeFolder"];
+        patch: EditorOperations["renameFolder"];
+    };
+    "/api/folders/{folder_id}/parent": {
+        put: EditorOperations["moveFolder"];
+    };
+    "/api/graphs/{graph_id}/folder": {
+        put: EditorOperations["fileGraph"];
+    };
     "/api/graphs/{graph_id}/history": {
         get: EditorOperations["getHistory"];
     };
@@ -2191,6 +2249,7 @@ interface EditorOperations {
         parameters: {
             query?: {
                 preview?: boolean;
+                folder?: string | null;
             };
         };
         requestBody: {
@@ -2352,6 +2411,97 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["TextEdit"];
+                };
+            };
+        };
+    };
+    listFolders: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Folder"][];
+                };
+            };
+        };
+    };
+    makeFolder: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["NewFolder"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["Folder"];
+                };
+            };
+        };
+    };
+    removeFolder: {
+        parameters: {
+            path: {
+                folder_id: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    renameFolder: {
+        parameters: {
+            path: {
+                folder_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["RenamingFolder"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Folder"];
+                };
+            };
+        };
+    };
+    moveFolder: {
+        parameters: {
+            path: {
+                folder_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["MovingFolder"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Folder"];
+                };
+            };
+        };
+    };
+    fileGraph: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Filing"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["GraphView"];
                 };
             };
         };

@@ -2,7 +2,7 @@
 import { notifications } from "@mantine/notifications";
 import { useQueryClient } from "@tanstack/react-query";
 import { useCallback } from "react";
-import { useLocation } from "wouter";
+import { useLocation, useSearch } from "wouter";
 import {
   createGraph,
   type GraphSummary,
@@ -42,17 +42,20 @@ export interface NewGraphs {
 
 export function useNewGraphs(): NewGraphs {
   const client = useQueryClient();
-  const [, go] = useLocation();
+  const [path, go] = useLocation();
+  const search = useSearch();
+  // The folder on screen, as the page of graphs has it in its address.
+  const folder = path === "/" ? new URLSearchParams(search).get("folder") : null;
   const create = useCallback(async () => {
     try {
       const known = client.getQueryData<readonly GraphSummary[]>(queryKeys.graphs) ?? [];
-      const graph = await createGraph(freshName(known.map(({ name }) => name)));
+      const graph = await createGraph(freshName(known.map(({ name }) => name)), folder);
       void refreshGraphs(client);
       go(`/graphs/${graph.id}`);
     } catch (error) {
       complain("No new graph", error);
     }
-  }, [client, go]);
+  }, [client, go, folder]);
   const take = useCallback(
     async (files: readonly File[]) => {
       if (files.length === 0) return;
@@ -63,7 +66,7 @@ export function useNewGraphs(): NewGraphs {
           import("./take-files"),
         ]);
         const { tell, end } = progressOf(files.length);
-        const found = await takeFiles(files, tell).finally(end);
+        const found = await takeFiles(files, tell, folder).finally(end);
         after();
         tellTaken(found, after);
         const place = placeAfter(found);
@@ -72,7 +75,7 @@ export function useNewGraphs(): NewGraphs {
         complain("Nothing was imported", error);
       }
     },
-    [client, go],
+    [client, go, folder],
   );
   const choose = useCallback(async () => take(await chooseFiles()), [take]);
   return { create: () => void create(), choose: () => void choose(), take };

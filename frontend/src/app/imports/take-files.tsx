@@ -47,13 +47,13 @@ async function previewOf(text: string): Promise<{ kind: TakenFile["kind"]; previ
 }
 
 /** Null: somebody did not want it. */
-async function take(file: File): Promise<TakenFile | KnownFile | null> {
+async function take(file: File, folder: string | null): Promise<TakenFile | KnownFile | null> {
   if (file.size > MOST_BYTES) throw new Error("The file is larger than 10 MB.");
   const text = await file.text();
   const { kind, preview } = await previewOf(text);
   const plain = kind === "graph" ? isPlain(preview) : isPlainAction(preview);
   if (!plain && !(await importReviews.ask(file.name, preview))) return null;
-  if (kind === "graph") return { kind, made: await importGraph(text) };
+  if (kind === "graph") return { kind, made: await importGraph(text, folder) };
   try {
     return { kind, made: await importAction(text) };
   } catch (error) {
@@ -67,6 +67,7 @@ async function take(file: File): Promise<TakenFile | KnownFile | null> {
 export async function takeFiles(
   files: readonly File[],
   tell: (done: number) => void,
+  folder: string | null = null,
 ): Promise<TakenFiles> {
   const taken: TakenFile[] = [];
   const known: KnownFile[] = [];
@@ -74,7 +75,7 @@ export async function takeFiles(
   for (const [i, file] of files.entries()) {
     tell(i);
     try {
-      const found = await take(file);
+      const found = await take(file, folder);
       if (found !== null && "made" in found) taken.push(found);
       else if (found !== null) known.push(found);
     } catch (error) {

@@ -95,8 +95,8 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/graphs",
-        summary="Make a graph of a UMRF file of any dialect, or an empty one of {name}; "
-        "with `preview` only say what a file would become, and store nothing",
+        summary="Make a graph of a UMRF file of any dialect, or an empty one of {name}, in a "
+        "`folder`; with `preview` only say what a file would become, and store nothing",
         operation_id="createGraph",
         guards=[Needs("edit")],
         opt=reads(JsonObject),
@@ -107,13 +107,16 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         request_max_body_size=BODY_LIMIT,
     )
     async def create_graph(
-        request: Asking, preview: bool = False
+        request: Asking, preview: bool = False, folder: str | None = None
     ) -> Response[MadeGraph] | Response[Preview]:
         if preview:
             found = await _previewed(app_state.services, await request.body())
             return Response(encoded(Preview, found), status_code=200)
         services, person = await app_state.acting(request)
-        made, told = await services.catalogue.create(await request.body(), person.id)
+        if folder is not None:
+            await services.folders.require(folder)
+        body = await request.body()
+        made, told = await services.catalogue.create(body, person.id, folder=folder)
         return made_graph(made, told)
 
     @get("/api/graphs/{graph_id:str}", summary="One graph", operation_id="getGraph")

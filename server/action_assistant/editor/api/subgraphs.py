@@ -115,7 +115,8 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
 
     @post(
         "/api/graphs/{graph_id:str}/subgraphs",
-        summary="Make a new graph of chosen actions; the graph around it is changed by who asks",
+        summary="Make a new graph of chosen actions, in the folder of the graph around it, which is "
+        "changed by who asks",
         operation_id="makeSubGraph",
         guards=[Needs("edit")],
     )
@@ -126,7 +127,12 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         async with making:
             chosen = await _chosen(services, graph_id, data)
             found = await services.workers.files(subgraph_file, *chosen)
-            made, _ = await services.catalogue.bring(found.umrf, person.id, keys=found.keys)
+            made, _ = await services.catalogue.bring(
+                found.umrf,
+                person.id,
+                keys=found.keys,
+                folder=await services.catalogue.folder_of(graph_id),
+            )
         body = MadeSubGraph(made, encoded(tuple[KeyChange, ...], found.changes))
         return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
@@ -211,7 +217,8 @@ def _flat(app_state: EditorState) -> list[ControllerRouterHandler]:
         whole = await _whole(services, graph_id, data.seq)
         await services.people.seen(person)
         text = await services.graph_reader.ask(flat_text, *whole, data.name)
-        made, _ = await services.catalogue.create(text, person.id)
+        folder = await services.catalogue.folder_of(graph_id)
+        made, _ = await services.catalogue.create(text, person.id, folder=folder)
         return Response(made, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
     return [get_flat, make_flat]

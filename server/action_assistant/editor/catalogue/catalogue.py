@@ -46,7 +46,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     `damaged`: the first change that cannot be read; the graph stays in the state before it, and
     cannot be changed. `people`: who is in it now. `problems`: counts of the check; `wrong` and
     `to_fill_in`: counts for people, in which related problems count once. `drafts`: the number of
-    its drafts.
+    its drafts. `folder`: the id of the folder in which it lies.
     """
 
     id: str
@@ -67,6 +67,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     kind: h.DocumentKind = "graph"
     draft_of: DraftOf | None = None
     drafts: int = 0
+    folder: str | None = None
 
 
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -124,20 +125,23 @@ class Catalogue:
         views = [await self._view(row) for row in rows]
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
-    async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
-        """Make a graph. `body` is either an object with a name and a description, for an empty
-        graph, or a UMRF file. Return the graph, and the JSON of an `ImportReport` if a file was
-        read, else None. Raise BadInput, NotUmrf or TooLarge, with the place in the file, if the
-        file cannot be read; then nothing is stored."""
+    async def create(
+        self, body: bytes, author: str, *, folder: str | None = None
+    ) -> tuple[GraphView, bytes | None]:
+        """Make a graph in the folder with this id, if any. `body` is either an object with a name
+        and a description, for an empty graph, or a UMRF file. Return the graph, and the JSON of an
+        `ImportReport` if a file was read, else None. Raise BadInput, NotUmrf or TooLarge, with the
+        place in the file, if the file cannot be read; then nothing is stored."""
         try:
             wanted = msgspec.json.decode(body, type=NewGraph)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
-            return await self.bring(body, author)
+            return await self.bring(body, author, folder=folder)
         name, description = fit(wanted.name, wanted.description)
         graph = Graph(name=name, description=description, direction="right")
         made = h.draft(h.CREATED, author, h.GraphCreated(name, description))
         about = info_of(graph, check(graph))
-        return await self._add(document_edits.first(graph), about, [made], author), None
+        drafts = [made, *_filed(folder, author)]
+        return await self._add(document_edits.first(graph), about, drafts, author), None
 
     async def bring(
         self,
@@ -145,11 +149,13 @@ class Catalogue:
         author: str,
         *,
         keys: tuple[Key, ...] = (),
+        folder: str | None = None,
         run_in_worker: RunInWorker | None = None,
     ) -> tuple[GraphView, bytes]:
-        """Make a graph from a UMRF file (`body`), which the log stores unchanged. `keys`: the keys
-        of its actions in order; without them actions get new ones. Return the graph and the JSON of
-        an `ImportReport`. Raise BadInput, NotUmrf or TooLarge if the file cannot be read."""
+        """Make a graph from a UMRF file (`body`), which the log stores unchanged, in the folder
+        with this id, if any. `keys`: the keys of its actions in order; without them actions get new
+        ones. Return the graph and the JSON of an `ImportReport`. Raise BadInput, NotUmrf or
+        TooLarge if the file cannot be read."""
         found = await (run_in_worker or self._run_in_worker)(importing.imported, body, keys)
         about = found.about
         made = h.draft(
@@ -158,7 +164,16 @@ class Catalogue:
             h.GraphCreated(about.name, about.description, found.dialect, found.notes),
         )
         file = Draft(h.IMPORTED, author, body)
-        return await self._add(found.update, about, [made], author, file), found.reading
+        drafts = [made, *_filed(folder, author)]
+        return await self._add(found.update, about, drafts, author, file), found.reading
+
+    async def folder_of(self, graph: str) -> str | None:
+        """Return the id of the folder in which a graph lies. A draft lies where its graph does."""
+        row = await self._row(graph)
+        if row.draft_of is not None:
+            row = await self._row(row.draft_of, deleted=True)
+        folder: str | None = row.folder
+        return folder
 
     async def describe(
         self, graph: str, author: str, *, name: str | None, description: str | None
@@ -309,7 +324,13 @@ class Catalogue:
             if row.draft_of is None
             else DraftOf(row.draft_of, row.drafted_seq, row.draft_name),
             drafts=row.drafts,
+            folder=row.folder,
         )
+
+
+def _filed(folder: str | None, author: str) -> list[Draft]:
+    """Return the event that puts a new graph into a folder; nothing without a folder."""
+    return [] if folder is None else [h.draft(h.FILED, author, h.GraphFiled(folder))]
 
 
 def _there(

@@ -1,7 +1,8 @@
 """The events of graphs, versions and people: kinds, bodies, and the tables they fold into.
 
 The stream `graph/ID` holds the document and nothing else, so that its `seq` counts changes of the
-document. Everything else about a graph is in `about/ID`; names of people are in `people`.
+document. Everything else about a graph is in `about/ID`; names of people are in `people`, and
+folders of graphs in `folders`.
 """
 
 import re
@@ -10,7 +11,7 @@ from datetime import UTC, datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
 import msgspec
-from sqlalchemy import Executable, delete, insert, update
+from sqlalchemy import Executable, ScalarSelect, delete, insert, select, update
 
 from action_assistant.journal.events import Draft, Event
 from action_assistant.schema import editor_tables
@@ -48,9 +49,14 @@ INVITED: Final = "invitation.made.v1"
 ACCEPTED: Final = "invitation.accepted.v1"
 REVOKED: Final = "invitation.revoked.v1"
 EPOCH: Final = "epoch.begun.v1"
+FILED: Final = "graph.filed.v1"
+FOLDER_MADE: Final = "folder.made.v1"
+FOLDER_CHANGED: Final = "folder.changed.v1"
+FOLDER_REMOVED: Final = "folder.removed.v1"
 
 PEOPLE: Final = "people"
 INVITATIONS: Final = "invitations"
+FOLDERS: Final = "folders"
 #: Not people: what this program does by itself, and the graphs that come with it.
 SERVER: Final = "server"
 EXAMPLES: Final = "examples"
@@ -192,6 +198,29 @@ class VersionPublished(msgspec.Struct, frozen=True):
     tree_digest: str | None = None
 
 
+class GraphFiled(msgspec.Struct, frozen=True):
+    """The graph was moved into a folder, or out of all folders (None)."""
+
+    folder: str | None
+
+
+class FolderState(msgspec.Struct, frozen=True):
+    """The folder `id` was made, renamed or moved: it has this name and lies in `parent` from now
+    on, or in no folder (None)."""
+
+    id: str
+    name: str
+    parent: str | None
+
+
+class FolderRemoved(msgspec.Struct, frozen=True):
+    """The folder `id` was removed. Its graphs and folders went into the folder `into`; None: into
+    no folder."""
+
+    id: str
+    into: str | None
+
+
 class PersonNamed(msgspec.Struct, frozen=True):
     """The author of the event has this name from now on."""
 
@@ -272,7 +301,45 @@ def fold(event: Event) -> Sequence[Executable]:
         ]
     if event.stream == INVITATIONS:
         return _invitation(event)
+    if event.stream == FOLDERS:
+        return _folder(event)
     return ()
+
+
+def _folder(event: Event) -> Sequence[Executable]:
+    folder, graph = editor_tables.folder, editor_tables.graph
+    match event.kind:
+        case "folder.made.v1":
+            made = _read(event, FolderState)
+            row: dict[str, Any] = {
+                "id": made.id,
+                "name": made.name,
+                "parent": _existing(made.parent),
+                "made_at": event.at,
+                "made_by": event.author,
+            }
+            return [insert(folder).values(row)]
+        case "folder.changed.v1":
+            now = _read(event, FolderState)
+            this = update(folder).where(folder.c.id == now.id)
+            return [this.values(name=now.name, parent=_existing(now.parent))]
+        case "folder.removed.v1":
+            gone = _read(event, FolderRemoved)
+            into = _existing(gone.into)
+            return [
+                update(graph).where(graph.c.folder == gone.id).values(folder=into),
+                update(folder).where(folder.c.parent == gone.id).values(parent=into),
+                delete(folder).where(folder.c.id == gone.id),
+            ]
+        case _:
+            return ()
+
+
+def _existing(folder: str | None) -> ScalarSelect[str]:
+    """Return the id of a folder as a query that gives NULL if there is no such folder. So no row
+    refers to a folder that was removed by somebody else a moment before."""
+    named = editor_tables.folder.alias("named")
+    return select(named.c.id).where(named.c.id == folder).scalar_subquery()
 
 
 def _invitation(event: Event) -> Sequence[Executable]:
@@ -333,6 +400,8 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
             base: dict[str, Any] = {"base_graph": drafted.origin, "base_seq": drafted.seq}
             of = {"draft_of": drafted.origin, "draft_name": drafted.name}
             return [this.values(**of, **base, drafted_seq=drafted.seq)]
+        case "graph.filed.v1":
+            return [this.values(folder=_existing(_read(event, GraphFiled).folder))]
         case "graph.merged.v1":
             return _merged(_read(event, GraphMerged))
         case "graph.deleted.v1":

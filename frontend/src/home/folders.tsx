@@ -1,0 +1,182 @@
+/** Folders of graphs: the way to the one on screen, and those inside of it. */
+import { Button, Menu } from "@mantine/core";
+import {
+  IconChevronRight,
+  IconDots,
+  IconFolder,
+  IconFolderMinus,
+  IconFolderPlus,
+  IconFolderSymlink,
+  IconPencil,
+} from "@tabler/icons-react";
+import { Fragment, useState } from "react";
+import { Link, useLocation } from "wouter";
+import { type Folder, foldersWithin, moveFolder } from "../api/folders";
+import { useMay } from "../api/people";
+import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
+import { counted } from "../words/counted";
+import { isolated } from "../words/isolated";
+import style from "./folders.module.css";
+
+const FolderNameDialog = lazyPart(() =>
+  import("./folder-dialogs").then((part) => part.FolderNameDialog),
+);
+const MoveDialog = lazyPart(() => import("./folder-dialogs").then((part) => part.MoveDialog));
+const RemoveDialog = lazyPart(() => import("./folder-dialogs").then((part) => part.RemoveDialog));
+
+const placeOf = (id: string | null | undefined) => (id ? `/?folder=${id}` : "/");
+
+interface MenuProps {
+  folder: Folder;
+  folders: readonly Folder[];
+  /** The folder is the one on screen: who removes it goes to the one around it. */
+  here?: boolean;
+}
+
+function FolderMenu({ folder, folders, here = false }: MenuProps) {
+  const [, go] = useLocation();
+  const [asked, setAsked] = useState<"rename" | "move" | "remove" | null>(null);
+  const [opened, setOpened] = useState(false);
+  const ask = (dialog: typeof asked) => {
+    setAsked(dialog);
+    setOpened(true);
+  };
+  const dialog = { opened, onClose: () => setOpened(false) };
+  return (
+    <>
+      <Menu>
+        <Menu.Target>
+          <button
+            type="button"
+            className={style.more}
+            aria-label={`More about the folder ${isolated(folder.name)}`}
+          >
+            <IconDots size={16} aria-hidden />
+          </button>
+        </Menu.Target>
+        <Menu.Dropdown>
+          <Menu.Item leftSection={<IconPencil size={15} />} onClick={() => ask("rename")}>
+            Rename …
+          </Menu.Item>
+          <Menu.Item leftSection={<IconFolderSymlink size={15} />} onClick={() => ask("move")}>
+            Move to folder …
+          </Menu.Item>
+          <Menu.Item leftSection={<IconFolderMinus size={15} />} onClick={() => ask("remove")}>
+            Remove the folder …
+          </Menu.Item>
+        </Menu.Dropdown>
+      </Menu>
+      <OverlayBoundary>
+        {asked === "rename" && <FolderNameDialog folder={folder} {...dialog} />}
+        {asked === "move" && (
+          <MoveDialog
+            name={folder.name}
+            from={folder.parent ?? null}
+            not={foldersWithin(folders, folder.id)}
+            move={(into) => moveFolder(folder.id, into)}
+            {...dialog}
+          />
+        )}
+        {asked === "remove" && (
+          <RemoveDialog
+            folder={folder}
+            folders={folders}
+            onRemoved={() => here && go(placeOf(folder.parent))}
+            {...dialog}
+          />
+        )}
+      </OverlayBoundary>
+    </>
+  );
+}
+
+/** The folder on screen: its name, the way to it, and its menu. */
+export function FolderHead({
+  way,
+  folders,
+}: {
+  way: readonly Folder[];
+  folders: readonly Folder[];
+}) {
+  const mayEdit = useMay("edit");
+  const folder = way.at(-1);
+  if (folder === undefined) return null;
+  return (
+    <div className="min-w-0">
+      <nav aria-label="Way to this folder" className={style.way}>
+        <Link to="/">All graphs</Link>
+        {way.slice(0, -1).map(({ id, name }) => (
+          <Fragment key={id}>
+            <IconChevronRight size={13} aria-hidden />
+            <Link to={placeOf(id)}>{name}</Link>
+          </Fragment>
+        ))}
+      </nav>
+      <div className="row gap-50">
+        <IconFolder size={22} aria-hidden className="flex-none" />
+        <h2 className={style.title}>
+          <span className="visually-hidden">Folder </span>
+          {folder.name}
+        </h2>
+        {mayEdit && <FolderMenu folder={folder} folders={folders} here />}
+      </div>
+    </div>
+  );
+}
+
+/** The folders in a folder (null: those in none), and the way to a new one. */
+export function FolderCards({
+  folder,
+  folders,
+}: {
+  folder: string | null;
+  folders: readonly Folder[];
+}) {
+  const mayEdit = useMay("edit");
+  // Null until it was asked for: from then on it stays, and gives the focus back when it closes.
+  const [making, setMaking] = useState<boolean | null>(null);
+  const inside = (id: string | null) => folders.filter((each) => (each.parent ?? null) === id);
+  const shown = inside(folder);
+  if (!mayEdit && shown.length === 0) return null;
+  return (
+    <section aria-label="Folders" className={style.folders}>
+      {shown.length > 0 && (
+        <ul className={`${style.cards} list-reset`}>
+          {shown.map((each) => {
+            const below = inside(each.id).length;
+            return (
+              <li key={each.id} className={style.card}>
+                <Link to={placeOf(each.id)} className={style.open}>
+                  <IconFolder size={20} aria-hidden className="flex-none" />
+                  <span className="fill">
+                    <bdi className="block truncate weight-600">{each.name}</bdi>
+                    <span className="faint-11_5">
+                      {counted(each.graphs ?? 0, "graph")}
+                      {below > 0 && ` · ${counted(below, "folder")}`}
+                    </span>
+                  </span>
+                </Link>
+                {mayEdit && <FolderMenu folder={each} folders={folders} />}
+              </li>
+            );
+          })}
+        </ul>
+      )}
+      {mayEdit && (
+        <Button
+          variant="subtle"
+          color="gray"
+          leftSection={<IconFolderPlus size={16} aria-hidden />}
+          onClick={() => setMaking(true)}
+        >
+          New folder
+        </Button>
+      )}
+      <OverlayBoundary>
+        {making !== null && (
+          <FolderNameDialog parent={folder} opened={making} onClose={() => setMaking(false)} />
+        )}
+      </OverlayBoundary>
+    </section>
+  );
+}
