@@ -18,6 +18,7 @@ from pycrdt.websocket.websocket import HttpxWebsocket
 from action_assistant.cli import main
 from action_assistant.commands.client import Server
 from action_assistant.commands.remote import insisting, stopped_as, verdict
+from action_assistant.commands.runs import press
 from action_assistant.runner.runs.views import RunShown
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
@@ -369,3 +370,22 @@ def test_folders_are_made_by_path_and_graphs_are_put_into_them(
         refused = product.cli("folders", *words)
         assert (refused.returncode, why in refused.stderr) == (1, True), refused.stderr
     product.cli("folders", "remove", "Lab")
+
+
+def test_an_order_without_an_answer_is_sent_once_more_with_the_same_request_id() -> None:
+    heard: list[dict[str, str]] = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        heard.append(json.loads(request.content))
+        if len(heard) == 1:
+            raise httpx.ReadTimeout("no answer", request=request)
+        return httpx.Response(202, json={})
+
+    with httpx.Client(transport=httpx.MockTransport(answer), base_url="http://editor") as client:
+        server = Server(client, "http://runner")
+        press(server, "/api/runs/12/go_on", {"since": "2026-01-01T00:00:00Z"})
+        press(server, "/api/runs/12/go_on", {"since": "2026-01-01T00:00:00Z"})
+    first, again, other = heard
+    assert first == again
+    assert first["since"] == other["since"]
+    assert first["request_id"] != other["request_id"]

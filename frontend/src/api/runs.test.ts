@@ -1,5 +1,5 @@
-import { expect, test } from "vitest";
-import { abilitiesOf, currentAlarm, type Run } from "./runs";
+import { expect, test, vi } from "vitest";
+import { abilitiesOf, currentAlarm, giveOutcome, letGoOn, type Run } from "./runs";
 
 const alarm = (code: string, second: number) => ({
   code,
@@ -24,4 +24,44 @@ test("that nothing moves is said for as long as nothing does", () => {
 test("the simulator can what the robot can that it plays", () => {
   expect(abilitiesOf(run([]))).toBe("simulator");
   expect(abilitiesOf({ ...run([]), like: "David" })).toBe("David");
+});
+
+/** Sends requests to nobody; `answers` gives the answer to each, null for one that gets lost. */
+function sentTo(answers: (Response | null)[]): Record<string, unknown>[] {
+  const sent: Record<string, unknown>[] = [];
+  vi.stubGlobal("fetch", (_: unknown, init: RequestInit) => {
+    sent.push(JSON.parse(String(init.body)));
+    const answer = answers.shift() ?? null;
+    return answer === null ? Promise.reject(new TypeError("no answer")) : Promise.resolve(answer);
+  });
+  return sent;
+}
+
+const json = (status: number, body: unknown) =>
+  new Response(JSON.stringify(body), { status, headers: { "content-type": "application/json" } });
+const taken = () => json(202, {});
+const refusal = () => json(409, { type: "conflict", title: "No", status: 409, detail: "No." });
+const lost = null;
+const since = "2026-01-01T00:00:00Z";
+
+test("a press whose answer got lost is sent again with the same request id", async () => {
+  const sent = sentTo([lost, taken(), taken()]);
+  await expect(letGoOn("http://runner", "12", since)).rejects.toThrow();
+  await letGoOn("http://runner", "12", since);
+  await letGoOn("http://runner", "12", since);
+  const ids = sent.map(({ request_id }) => request_id);
+  expect(ids[0]).toBe(ids[1]);
+  expect(ids[0]).toBeTruthy();
+  expect(ids[2]).not.toBe(ids[0]);
+});
+
+test("a press that was refused, and one of another thing, has a request id of its own", async () => {
+  const sent = sentTo([refusal(), lost, taken(), lost, lost]);
+  await expect(letGoOn("http://runner", "12", since)).rejects.toThrow("No.");
+  await expect(letGoOn("http://runner", "12", since)).rejects.toThrow();
+  await letGoOn("http://runner", "12", "2026-01-01T00:00:09Z");
+  const word = { action: "Scan_0", outcome: "true", reason: " I saw it. ", piece: "12.3" } as const;
+  await expect(giveOutcome("http://runner", "12", word)).rejects.toThrow();
+  await expect(giveOutcome("http://runner", "12", { ...word, outcome: "false" })).rejects.toThrow();
+  expect(new Set(sent.map(({ request_id }) => request_id)).size).toBe(5);
 });

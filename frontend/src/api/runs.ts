@@ -1,8 +1,10 @@
 /** Runs as the runner tells them. */
 
 import { useQuery } from "@tanstack/react-query";
+import { newAid } from "../graph/document-keys";
 import { isolated } from "../words/isolated";
 import { runnerAt } from "./client";
+import { isOutcomeUnknown } from "./http";
 import { enginesOf, type LedOrder } from "./led-runs";
 import { getRun, type Run } from "./run-stop";
 import type { RunnerApi } from "./schema/runner";
@@ -159,9 +161,32 @@ export function useRun(runner: string | undefined, id: string) {
   });
 }
 
+/** Request ids of presses whose answers got lost, by what was pressed. */
+const unanswered = new Map<string, string>();
+
+/**
+ * Sends a press with a request id of its own. If its answer gets lost, the next press of the same
+ * thing is sent with the same id, so that the two count once.
+ */
+async function sendPress<T>(what: string, send: (request: string) => Promise<T>): Promise<T> {
+  const request = unanswered.get(what) ?? newAid();
+  unanswered.set(what, request);
+  try {
+    const answer = await send(request);
+    unanswered.delete(what);
+    return answer;
+  } catch (error) {
+    if (!isOutcomeUnknown(error)) unanswered.delete(what);
+    throw error;
+  }
+}
+
 /** Let a held run go on, if it is still held since this moment. Robots may begin to move. */
 export function letGoOn(runner: string, run: string, since: string): Promise<Run> {
-  return runnerAt(runner).post("/api/runs/{run}/go_on", { path: { run }, body: { since } });
+  return sendPress(`go on ${run} ${since}`, (request) => {
+    const body = { since, request_id: request };
+    return runnerAt(runner).post("/api/runs/{run}/go_on", { path: { run }, body });
+  });
 }
 
 /** An outcome by the word of a person. */
@@ -171,8 +196,11 @@ export type SaidOutcome = RunnerApi["WordRequest"]["outcome"];
 export function giveOutcome(
   runner: string,
   run: string,
-  said: RunnerApi["WordRequest"],
+  said: Omit<RunnerApi["WordRequest"], "request_id">,
 ): Promise<Run> {
-  const body = { ...said, reason: said.reason.trim() };
-  return runnerAt(runner).post("/api/runs/{run}/outcome", { path: { run }, body });
+  const word = { ...said, reason: said.reason.trim() };
+  return sendPress(`outcome ${run} ${JSON.stringify(word)}`, (request) => {
+    const body = { ...word, request_id: request };
+    return runnerAt(runner).post("/api/runs/{run}/outcome", { path: { run }, body });
+  });
 }

@@ -3,6 +3,8 @@
 import argparse
 import asyncio
 import sys
+import time
+import uuid
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
@@ -32,6 +34,7 @@ if TYPE_CHECKING:  # slow to load, and most calls do not need it
 
 
 _TIME: Final = "%Y-%m-%dT%H:%M:%S"
+_AGAIN_S: Final = 1.0  # after which an order without an answer is sent once more
 
 
 def _add_runs(runs: argparse.ArgumentParser) -> None:
@@ -89,9 +92,20 @@ def _go_on(options: argparse.Namespace) -> int:
         held = server.runner("GET", path).json()["held"]
         if held is None:
             raise RequestRefused("The run is not held; it goes on already.")
-        server.runner("POST", f"{path}/go_on", json={"since": held["since"]})
+        press(server, f"{path}/go_on", {"since": held["since"]})
     print(one_line(f"it goes on; it was held: {held['why']}"))
     return 0
+
+
+def press(server: Server, path: str, body: dict[str, str]) -> None:
+    """Send an order that may move robots. If no answer comes, send it once more with the same request
+    id, so that the two count once. Raise CannotStart if there is no answer then either."""
+    press = body | {"request_id": str(uuid.uuid4())}
+    try:
+        server.runner("POST", path, json=press)
+    except CannotStart:
+        time.sleep(_AGAIN_S)
+        server.runner("POST", path, json=press)
 
 
 def _runs(options: argparse.Namespace) -> int:

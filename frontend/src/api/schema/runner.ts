@@ -505,11 +505,14 @@ export interface RunnerApi {
     /**
      * GoOnRequest
      * @description Lets a held run go on. `since`: the `since` of `held`, as the person saw it; a run that has gone
-     *     on meanwhile has another one.
+     *     on meanwhile has another one. `request_id`: names this press; if it has counted already, a repeat
+     *     changes nothing and is answered with the run as it is now.
      */
     GoOnRequest: {
         /** Format: date-time */
         since: string;
+        /** @default  */
+        request_id?: string;
     };
     /**
      * GraphFile
@@ -1870,7 +1873,7 @@ export interface RunnerApi {
      * WordRequest
      * @description The outcome of an action in a conducted run by the word of a person, with the reason. `action`:
      *     its full name; `piece`: the run of its piece that the person has seen, so that the word counts for
-     *     no later visit.
+     *     no later visit; `request_id`: as in `GoOnRequest`.
      */
     WordRequest: {
         action: string;
@@ -1879,6 +1882,8 @@ export interface RunnerApi {
         reason: string;
         /** @default  */
         piece?: string;
+        /** @default  */
+        request_id?: string;
     };
     /**
      * WritableGraph

@@ -8,6 +8,7 @@ from typing import Final, Protocol
 import anyio
 import msgspec
 
+from action_assistant.errors import Conflict
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.links.led_calls import LedCourse
@@ -73,13 +74,15 @@ class Leading(msgspec.Struct, frozen=True, kw_only=True):
 class Word(msgspec.Struct, frozen=True, kw_only=True):
     """The outcome of an action as a person has stated it, because the states of the robot do not
     show it. `by`: the person; `piece`: the id of the run that carried the action out, "" for the
-    newest one; `origin`: the connection by which the person stated it, None if it is not known."""
+    newest one; `origin`: the connection by which the person stated it, None if it is not known;
+    `request_id`: the id of the request, "" if it has none."""
 
     outcome: Precondition
     by: Author
     reason: str
     piece: str = ""
     origin: Origin | None = None
+    request_id: str = ""
 
 
 class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
@@ -117,6 +120,7 @@ class Step:
         self.alarms: set[tuple[str, str]] = set()  # those of its piece that were passed on
         self.word: Word | None = None
         self.decided = anyio.Event()  # it is to end, or a person has given its outcome
+        self.told = anyio.Event()  # its outcome is told to the run
         self.over = anyio.Event()  # its piece has ended
         self.rested = anyio.Event()  # set once `has_rested` is true
         self._waiting = anyio.CancelScope()  # while nothing was sent
@@ -165,6 +169,26 @@ class Step:
         else:
             with acting_for(self.word.by.id, self.word.origin):
                 tell(ended, self.word.by.id)
+        self.told.set()
+
+    def take_word(self, word: Word) -> None:
+        """Take the outcome from a person. Raise Conflict unless the robot is proven or was seen at
+        rest, its states tell no outcome, and no other word has come before."""
+        piece = self.run.id if self.run is not None else ""
+        if word.piece not in {"", piece}:
+            raise Conflict(f"{self.node} has begun again since then.", where={"path": "/piece"})
+        if self.is_open:
+            raise Conflict(
+                f"{self.node} on {self.engine} is not known to be at rest. Look at the robot, and "
+                "confirm that first.",
+                where={"path": "/action", "run": piece},
+            )
+        if "ended" not in self.troubles or self.word is not None:
+            raise Conflict(
+                f"The outcome of {self.node} is known already.", where={"path": "/action"}
+            )
+        self.word = word
+        self.decided.set()
 
     def renew(self) -> None:
         """Forget a piece that was not sent, so that another one can be sent for the same step."""

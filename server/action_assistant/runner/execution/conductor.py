@@ -566,7 +566,8 @@ class Conductor:
         if outcome == "on_stopped" and step.lacks_output:
             outcome = "on_false" if self._values.tells_false_by_rest(step) else "on_true"
         if outcome is None or outcome == "on_stopped":
-            self._trouble(step, "ended", f"{where} has ended without an outcome: {run.state}.")
+            ended = f"{where} has ended without an outcome: {run.state}. {run.detail}"
+            self._trouble(step, "ended", ended.rstrip())
             if not step.is_stopped:
                 self._rests.show(run, asks=True)
         elif why := self._values.why_unknown(step):
@@ -637,7 +638,7 @@ class Conductor:
             self._gate.hold(held)
             self._run.tell(held)
 
-    async def go_on(self, author: Author) -> None:
+    async def go_on(self, author: Author, request_id: str) -> None:
         """Wait until every robot that has a step has answered, then let a held run go on. Raise
         Conflict if one may begin no piece or no engine leads the run, or if it is held no more."""
         if self._is_past_help:
@@ -652,27 +653,20 @@ class Conductor:
             raise Conflict("The run has gone on, or was stopped, meanwhile.")
         for step in self._steps.values():
             step.troubles &= {"ended"}
-        self._run.tell(Released(at=self._clock_us(), author=author), author.id)
+        released = Released(
+            at=self._clock_us(), author=author, since=held.at, request_id=request_id
+        )
+        self._run.tell(released, author.id)
         self._gate.release()
 
-    def give_word(self, node: str, word: Word) -> None:
-        """Take the outcome of an action (`node`) that a person states. Raise Conflict unless the
-        robot is at rest, its states show no outcome, and none was stated before."""
+    def give_word(self, node: str, word: Word) -> anyio.Event:
+        """Take the outcome of an action (`node`) that a person states; return an event that is set
+        once the run has it. Raise Conflict if the action waits for none, or as `Step.take_word`."""
         step = next((each for each in self._steps.values() if each.node == node), None)
         if step is None or step.run is None:
             raise Conflict(f"{node} waits for no outcome.", where={"path": "/action"})
-        if word.piece not in {"", step.run.id}:
-            raise Conflict(f"{node} has begun again since then.", where={"path": "/piece"})
-        if step.is_open:
-            raise Conflict(
-                f"{node} on {step.engine} is not known to be at rest. Look at the robot, and confirm "
-                "that first.",
-                where={"path": "/action", "run": step.run.id},
-            )
-        if "ended" not in step.troubles or step.word is not None:
-            raise Conflict(f"The outcome of {node} is known already.", where={"path": "/action"})
-        step.word = word
-        step.decided.set()
+        step.take_word(word)
+        return step.told
 
     def moves_again(self, piece: OpenRun) -> None:
         """Follow a piece that had ended and moves again, until it has ended: raise an alarm, and

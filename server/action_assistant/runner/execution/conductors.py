@@ -2,12 +2,14 @@
 
 import logging
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractAsyncContextManager, nullcontext
 from typing import Final, Literal
 from weakref import WeakValueDictionary
 
+import anyio
 import msgspec
 
-from action_assistant.errors import Conflict
+from action_assistant.errors import Conflict, OutcomeUnknown
 from action_assistant.runner.execution.conducted_steps import (
     CONDUCTED_FACTS,
     Leading,
@@ -45,6 +47,7 @@ from action_assistant.umrf.semantics import Returned
 log: Final = logging.getLogger(__name__)
 
 _PAGE: Final = 500  # events read at once
+_STORED_S: Final = 5  # for which a person waits until the journal has an outcome by word
 
 
 class Conductors:
@@ -149,22 +152,35 @@ class Conductors:
         led = frozenset(first.led.players if first.led is not None else ())
         return self._simulator(CONDUCTED_FACTS, first.script, self._runtime.clock_us, led=led)
 
-    async def go_on(self, run: str, author: Author) -> None:
+    def once(self, run: str, request_id: str) -> AbstractAsyncContextManager[None]:
+        """Hold the lock of a request of a person on this run until the end of the block, so that a
+        repeat of it waits for the first one; a request without an id has no lock."""
+        return self._claims.once(f"{run} {request_id}") if request_id else nullcontext()
+
+    async def go_on(self, run: str, author: Author, request_id: str) -> None:
         """Let the held run with the id `run` go on, in the name of `author`; wait for the answers
         of its robots. Raise Conflict if nothing can lead it any more, or one of its robots may
         begin no piece."""
         conductor = self._open.get(run)
         if conductor is None:
             raise Conflict(f"{UNREAD}: only Stop is left.")
-        await conductor.go_on(author)
+        await conductor.go_on(author, request_id)
 
-    def give_word(self, run: str, node: str, word: Word) -> None:
+    async def give_word(self, run: str, node: str, word: Word) -> None:
         """Take the outcome of an action (`node`: its full name) of the run with the id `run`, as a
-        person states it in `word`. Raise Conflict if no outcome is asked for."""
+        person states it in `word`, and store it. Raise Conflict if no outcome is asked for,
+        OutcomeUnknown if it is not stored within 5 s."""
         conductor = self._open.get(run)
         if conductor is None:
             raise Conflict("Only the outcome of an action in a run that is led can be given.")
-        conductor.give_word(node, word)
+        stored = self._runs.by_id[run].recorder.flushed
+        told = conductor.give_word(node, word)
+        try:
+            with anyio.fail_after(_STORED_S):
+                await told.wait()
+                await stored()
+        except TimeoutError:
+            raise OutcomeUnknown("It could not be stored yet, and is tried further.") from None
 
     def _see(self, opened: OpenRun) -> None:
         """Notify the conductor of a piece that had ended and been closed, and moves again.

@@ -77,6 +77,7 @@ class PieceValues:
             reason=step.word.reason if step.word is not None else "",
             outputs=given.values,
             unset=given.unset,
+            request_id=step.word.request_id if step.word is not None else "",
         )
 
     def lacking(self, ended: PieceEnded) -> str:

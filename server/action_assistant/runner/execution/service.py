@@ -34,8 +34,8 @@ from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended
 from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal, whole_of
 from action_assistant.runner.runs.recorder import RunRecorder
-from action_assistant.runner.runs.run import Run
-from action_assistant.runner.runs.views import time
+from action_assistant.runner.runs.run import Press, Run, go_on_press, outcome_press
+from action_assistant.runner.runs.views import microseconds, time
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import (
     GoOnRequest,
@@ -257,9 +257,32 @@ class ExecutionService:
 
     async def go_on(self, run: str, asked: GoOnRequest, author: Author) -> Run:
         """Let a held conducted run go on, which may start actions on its robots; return the run.
-        `asked`: since when the person saw it held. Raise NotFound if there is no such run, Conflict
-        if it is over, being stopped, not held since that time, or one of its robots does not answer
-        or may begin nothing."""
+        `asked`: since when the person saw it held. A repeat of a request that was carried out
+        changes nothing, and returns the run as it is now. Raise NotFound if there is no such run,
+        Conflict if it is over, being stopped, not held since that time, or one of its robots does
+        not answer or may begin nothing."""
+        press = go_on_press(author, microseconds(asked.since))
+        async with self._conductors.once(run, asked.request_id):
+            found = await self._repeated(run, asked.request_id, press)
+            return found or await self._go_on(run, asked, author)
+
+    async def _repeated(self, run: str, request_id: str, press: Press) -> Run | None:
+        """Return the run as it is now if a press with this request id has counted in it; None if none
+        has. Raise NotFound if there is no such run, Conflict if the request id belongs to another
+        press."""
+        if not request_id:
+            return None
+        found = await self.find(run)
+        known = found.pressed.get(request_id)
+        if known is None:
+            return None
+        if not known.is_repeated_by(press):
+            raise Conflict(
+                "This request_id belongs to another request.", where={"path": "/request_id"}
+            )
+        return found
+
+    async def _go_on(self, run: str, asked: GoOnRequest, author: Author) -> Run:
         opened = await self._movable(run)
         held = opened.run.held
         if held is None:
@@ -271,23 +294,31 @@ class ExecutionService:
             )
         if opened.run.desired == "stopped":
             raise Conflict("The run is being stopped.")
-        await self._conductors.go_on(run, author)
+        await self._conductors.go_on(run, author, asked.request_id)
         return opened.run
 
     async def give_outcome(self, run: str, asked: WordRequest, author: Author) -> Run:
         """Take the outcome of an action in a conducted run from a person, where the robot does not
-        show it; return the run. Raise NotFound if there is no such run, Conflict if no outcome is
-        asked for."""
-        opened = await self._movable(run)
+        show it, and store it; return the run. A repeat of a request that was carried out changes
+        nothing. Raise NotFound if there is no such run, Conflict if no outcome is asked for,
+        OutcomeUnknown if it is not stored within 5 s."""
+        outcome = _OUTCOMES[asked.outcome]
+        press = outcome_press(author, asked.action, outcome, asked.piece, asked.reason)
         word = Word(
-            outcome=_OUTCOMES[asked.outcome],
+            outcome=outcome,
             by=author,
             reason=asked.reason,
             piece=asked.piece,
             origin=origin_of(author.id),
+            request_id=asked.request_id,
         )
-        self._conductors.give_word(run, asked.action, word)
-        return opened.run
+        async with self._conductors.once(run, asked.request_id):
+            found = await self._repeated(run, asked.request_id, press)
+            if found is not None:
+                return found
+            opened = await self._movable(run)
+            await self._conductors.give_word(run, asked.action, word)
+            return opened.run
 
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
         """Record that a person has seen a run at rest (nothing moves), where its engine cannot

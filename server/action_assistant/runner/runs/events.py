@@ -368,7 +368,8 @@ class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     that was asked for after its end ("shape"), by a person's statement ("word"), or because nothing
     of it was ever sent ("unsent"). `hash`: the SHA-256 of that answer. `outputs`: the values that
     the action gave, as JSON by flat name; `unset`: outputs that it did not set, or that nobody saw
-    where a person gave the outcome; both empty where no answer can show them."""
+    where a person gave the outcome; both empty where no answer can show them. `request_id`: the id
+    of the person's request, "" if it has none."""
 
     kind: ClassVar[str] = "run.piece_ended.v1"
 
@@ -383,6 +384,7 @@ class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     reason: str = ""
     outputs: dict[str, str] = {}
     unset: tuple[str, ...] = ()
+    request_id: str = ""
 
 
 class Held(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -396,13 +398,16 @@ class Held(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     by: Author | None = None
 
 
-class Released(msgspec.Struct, frozen=True, kw_only=True):
-    """A person let a held run go on."""
+class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """A person let a held run go on. `since`: when it was held; 0 in events of earlier versions;
+    `request_id`: names the press, "" where the caller gave none."""
 
     kind: ClassVar[str] = "run.released.v1"
 
     at: int
     author: Author
+    since: int = 0
+    request_id: str = ""
 
 
 class Unknown(msgspec.Struct, frozen=True):

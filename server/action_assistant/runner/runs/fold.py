@@ -50,7 +50,15 @@ from action_assistant.runner.runs.events import (
     Unconfirmed,
     Unknown,
 )
-from action_assistant.runner.runs.run import Alarm, Intervention, Run, Said
+from action_assistant.runner.runs.run import (
+    Alarm,
+    Intervention,
+    Press,
+    Run,
+    Said,
+    go_on_press,
+    outcome_press,
+)
 from action_assistant.runner.runs.visits import (
     KEPT,
     ActionRun,
@@ -171,7 +179,8 @@ def follow(run: Run, event: RunEvent) -> Run:
         case Held():
             return replace(run, held=event)
         case Released():
-            return replace(run, held=None)
+            press = go_on_press(event.author, event.since)
+            return _pressed(replace(run, held=None), event.request_id, press)
         case PieceEnded():
             return _piece_ended(run, event)
         case PieceBegan():
@@ -410,12 +419,23 @@ def _piece_ended(run: Run, event: PieceEnded) -> Run:
         word = Said(visit=visit, by=event.by, at=event.at, reason=event.reason)
         words = (*run.said.get(event.node, ()), word)[-KEPT:]
         run = replace(run, said=run.said | {event.node: words})
+    if event.by is not None:
+        press = outcome_press(event.by, event.node, event.outcome, event.piece, event.reason)
+        run = _pressed(run, event.request_id, press)
     known = run.rests.get(event.piece)
     if known is None:
         return run
     if not known.rests and event.how == "shape":
         return _piece_rest(run, replace(known, state="proven", at=event.at, since=event.at))
     return replace(run, rests=run.rests | {event.piece: replace(known, asks=False)})
+
+
+def _pressed(run: Run, request: str, press: Press) -> Run:
+    """Keep a press of a person with its request id, if it has one; of many only the newest."""
+    if not request:
+        return run
+    kept = tuple(run.pressed.items())[1 - KEPT :]
+    return replace(run, pressed=dict(kept) | {request: press})
 
 
 def _going(event: PieceBegan) -> PieceRest:

@@ -78,6 +78,30 @@ class Said(msgspec.Struct, frozen=True, kw_only=True):
     reason: str
 
 
+class Press(msgspec.Struct, frozen=True):
+    """An order of a person to a conducted run. `by`: the id of the person; `what`: the kind of order
+    and its details, as `go_on_press` and `outcome_press` write them; "" stands for any."""
+
+    by: str
+    what: tuple[str, ...]
+
+    def is_repeated_by(self, later: "Press") -> bool:
+        """Return whether a later press of the same request id is the same order of the same person."""
+        pairs = zip(self.what, later.what, strict=False)
+        return self.by == later.by and all(new in {"", old} for old, new in pairs)
+
+
+def go_on_press(by: Author, since: int) -> Press:
+    """Return the press that lets a run go on which was held at `since` (microseconds UTC)."""
+    return Press(by.id, ("go on", str(since)))
+
+
+def outcome_press(by: Author, action: str, outcome: str, piece: str, reason: str) -> Press:
+    """Return the press that gives the outcome of an action by word. `piece`: the id of its piece;
+    `outcome`: as `Precondition`, such as "on_true"."""
+    return Press(by.id, ("outcome", action, outcome, piece, reason))
+
+
 class Run(msgspec.Struct, frozen=True, kw_only=True):
     """The state of one run, folded from its events. Times are microseconds UTC."""
 
@@ -103,6 +127,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     #: Of a conducted run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a conducted run
+    #: The newest presses of people on a conducted run that counted, by their request ids.
+    pressed: dict[str, Press] = {}
     desired: Desired = "running"
     incarnation: str | None = None  # None: nothing has been sent, as far as is known
     process: EngineProcess | None = None  # of the engine, where it can be seen to end

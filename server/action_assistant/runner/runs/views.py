@@ -265,6 +265,12 @@ def time(us: int) -> datetime:
     return _EPOCH + timedelta(microseconds=us)
 
 
+def microseconds(moment: datetime) -> int:
+    """Convert a datetime to microseconds UTC; one without an offset counts as UTC."""
+    aware = moment if moment.tzinfo is not None else moment.replace(tzinfo=UTC)
+    return (aware - _EPOCH) // timedelta(microseconds=1)
+
+
 def summary(run: Run, *, recorded: bool = True) -> RunSummary:
     """Return the view of a run without its actions. `recorded`: all of its events are stored."""
     return RunSummary(**_fields(run, recorded))

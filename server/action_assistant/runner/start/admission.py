@@ -46,6 +46,9 @@ T = TypeVar("T")
 
 _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 
+#: Made by the client, once per press; "" from a client that repeats nothing.
+_PressId = Annotated[str, msgspec.Meta(max_length=200)]
+
 _MOST_SHOWN: Final = 20  # problems in one refusal
 _MOST_ENGINES: Final = 20  # of one group
 _MOST_KEPT: Final = 40  # errors, and warnings, that a prepared start keeps
@@ -80,20 +83,23 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Lets a held run go on. `since`: the `since` of `held`, as the person saw it; a run that has gone
-    on meanwhile has another one."""
+    on meanwhile has another one. `request_id`: names this press; if it has counted already, a repeat
+    changes nothing and is answered with the run as it is now."""
 
     since: datetime
+    request_id: _PressId = ""
 
 
 class WordRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The outcome of an action in a conducted run by the word of a person, with the reason. `action`:
     its full name; `piece`: the run of its piece that the person has seen, so that the word counts for
-    no later visit."""
+    no later visit; `request_id`: as in `GoOnRequest`."""
 
     action: str
     outcome: Literal["true", "false", "error"]
     reason: Annotated[str, msgspec.Meta(min_length=1, max_length=1000)]
     piece: str = ""
+    request_id: _PressId = ""
 
 
 class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
