@@ -22,6 +22,7 @@ import { serverNow } from "../clock/server-clock";
 import { scriptOf } from "../dry-run/script";
 import { useSeed } from "../editor/dry-run/use-seed";
 import { Editor, useEditorSummary } from "../editor/editor";
+import { robotNames } from "../graph/robots";
 import { templatesOf, useKnownActions, usePlaceable } from "../home/known-actions";
 import { Sidebar } from "../home/sidebar";
 import { askedDryRun, useReplay } from "../review/replay";
@@ -37,6 +38,7 @@ import { roomUrl } from "../sync/room-connection";
 import { RoomProvider, useLinkPart, useRoom, useThrottledGraph } from "../sync/use-room";
 import { useStableCallback } from "../ui/hooks";
 import { boundedPart, lazyPart } from "../ui/lazy-part";
+import { NAME_RANK, useNameColors } from "../ui/name-colors";
 import { instant } from "../ui/times";
 import { useNewGraphs } from "./imports/new-graphs";
 import { Nowhere, PageBar, PageFrame, useTitle } from "./page-frame";
@@ -165,7 +167,9 @@ function Inside({ id }: { id: string }) {
   // biome-ignore lint/correctness/useExhaustiveDependencies: another run is shown as it is now
   useEffect(() => seek(null), [newest, seek]);
   const begun = useLinkPart(({ seq }) => seq > 0);
-  const seed = useSeed(runner, askedDryRun(useSearch()), useThrottledGraph(), begun);
+  const graph = useThrottledGraph();
+  useNameColors(NAME_RANK.actors, robotNames(graph.actions));
+  const seed = useSeed(runner, askedDryRun(useSearch()), graph, begun);
   const mayStart = useMay("simulate");
   const gone = useLinkPart(
     ({ state, why, seq }) => state === "refused" && why === "no-such-graph" && seq === 0,

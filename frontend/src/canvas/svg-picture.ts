@@ -4,8 +4,8 @@ import { type Note, notesOf } from "../graph/edit/notes";
 import type { Direction, Graph, Key, Position, Precondition } from "../graph/model";
 import { spokenNote } from "../graph/note-links";
 import { cardRows } from "../graph/parameters/card-rows";
-import { type HandOver, handOverLabel, robotOf } from "../graph/robots";
-import { colorOfName, firstLetter } from "../ui/name-colors";
+import { type HandOver, handOverLabel, robotNames, robotOf } from "../graph/robots";
+import { colorsAmong, firstLetter } from "../ui/name-colors";
 import { type Bundle, bundlesOf, type HandOvers, handOversIn, pillWord } from "./arrows/bundles";
 import { pathOf } from "./arrows/line-path";
 import { routed } from "./arrows/routes";
@@ -67,6 +67,7 @@ class Painter {
   private readonly sizes: Sizes;
   private readonly direction: Direction;
   private readonly color: (token: string) => string;
+  private readonly robotColor: (robot: string) => string;
 
   constructor(
     graph: Graph,
@@ -77,6 +78,7 @@ class Painter {
     this.sizes = sizes;
     this.direction = graph.direction;
     this.color = color;
+    this.robotColor = colorsAmong(robotNames(graph.actions));
     const options = {
       places: new Map(places),
       selected: new Set<string>(),
@@ -155,7 +157,7 @@ class Painter {
   private card({ id, position: { x, y }, data }: Extract<CanvasNode, { type?: "action" }>): string {
     const { action } = data;
     const { width, height } = this.size(id, "action");
-    const robot = this.paint(colorOfName(action.actor));
+    const robot = this.paint(this.robotColor(action.actor));
     const ink = `fill="${this.paint("--ink")}"`;
     const dash = action.missing ? ` stroke-dasharray="5 4"` : "";
     const lines = cardRows(action.inputs, data.givers)
@@ -274,7 +276,7 @@ class Painter {
   /** Draws both robots of an arrow between two, each as a letter in its colour, right of x. */
   private hand(hand: HandOver, x: number, y: number): string {
     const letter = (robot: string, left: number) =>
-      `<rect x="${left}" y="${y - 7}" width="14" height="14" rx="4" fill="${this.paint(colorOfName(robot))}"/>` +
+      `<rect x="${left}" y="${y - 7}" width="14" height="14" rx="4" fill="${this.paint(this.robotColor(robot))}"/>` +
       this.text(
         robot === "" ? "·" : firstLetter(robot),
         left + 7,

@@ -14,7 +14,7 @@ import { StateLabel } from "../status/state-label";
 import { Empty } from "../ui/empty";
 import { useKept } from "../ui/hooks";
 import { boundedPart } from "../ui/lazy-part";
-import { colorOfName, initials } from "../ui/name-colors";
+import { colorOfName, initials, nameColors } from "../ui/name-colors";
 import { ago, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
@@ -77,7 +77,7 @@ function GraphCard({ graph, names, last, place }: GraphCardProps) {
   const at = instant(graph.updated_at);
   const { robots = [], labels = [], people = [] } = graph;
   return (
-    <article className={home.card}>
+    <article className={home.card} style={nameColors(robots)}>
       <Link to={`/graphs/${graph.id}`} className="block ink-inherit no-underline">
         <div className={home.preview}>
           <GraphPreview graph={graph.id} seq={graph.seq} />

@@ -8,11 +8,12 @@ import {
   useRef,
   useState,
 } from "react";
+import { enginesOf } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import type { ActionRun, Run } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
 import { keyOf } from "../../ui/keys";
-import { colorOfName } from "../../ui/name-colors";
+import { colorOfName, NAME_RANK, useNameColors } from "../../ui/name-colors";
 import { duration, instant, stopwatch, useNow } from "../../ui/times";
 import { type Progress, progressOf, progressOfAction, type Tone } from "../progress";
 import { endUnknownSince, silentSinceOf, useUnsure } from "../silence";
@@ -279,6 +280,9 @@ function Groups({ track, axis, named, overs, inside, ...props }: GroupsProps) {
   ));
 }
 
+/** Return the names of the robots that a track shows: of its lanes, and the engines of its run. */
+const namesIn = ({ run, lanes }: Track): string[] => [...robotsOf(lanes), ...enginesOf(run)];
+
 export function Timeline(props: Props) {
   const { run, lanes, onSeek, cursor = null, signs = NOTHING, gaps = NOTHING } = props;
   const tracks: readonly Track[] = [props, ...(props.others ?? NOTHING)];
@@ -286,6 +290,7 @@ export function Timeline(props: Props) {
   const axis = useAxis(tracks);
   const goes = tracks.some((track) => track.run.ended_at === null);
   const silentSince = run.ended_at === null ? (props.silentSince ?? null) : null;
+  useNameColors(NAME_RANK.run, tracks.flatMap(namesIn));
   const shown = useMemo(() => openLanes(lanes, inside.open), [lanes, inside.open]);
   const list = useNewestInView(shown, run, run.ended_at === null && cursor === null);
   const overs = useMemo(() => handOversOf(run, lanes), [run, lanes]);
