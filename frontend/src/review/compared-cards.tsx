@@ -41,6 +41,9 @@ function RunRow({ number, ghost, summary }: RowProps) {
             <StateLabel key={visit} still tone={result} word={often ? "" : result} />
           ))}
           <span>{rangeText(summary.took)}</span>
+          {summary.said !== undefined && (
+            <span className={style.none}>{often ? `${summary.said} by word` : "by word"}</span>
+          )}
         </>
       )}
     </span>

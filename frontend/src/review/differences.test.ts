@@ -160,6 +160,14 @@ test("visits of one action are told together, their durations as the range of th
   ]);
 });
 
+test("results that a person gave by word are counted apart in an action's summary", () => {
+  const said = { by: { id: "ben", name: "Ben" }, at: "2026-01-01T00:00:00Z", reason: "I saw it" };
+  const word = step("Close_0", { visit: 2, b: { ...visit(5, 6, "true", 7), said } as Visit });
+  const [found] = comparedActions(comparison([closes, word]));
+  expect(found?.a).not.toHaveProperty("said");
+  expect(found?.b).toMatchObject({ results: ["false", "true"], said: 1 });
+});
+
 test("what is inside of an action stands below it, and what differs there is told with the way", () => {
   const outer = step("Fetch_0", {
     a: visit(0, 9, "true"),

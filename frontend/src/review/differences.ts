@@ -22,6 +22,8 @@ export interface DurationRange {
 export interface ActionSummary {
   /** `true`, `false`, `error`, `stopped`, or `unknown`, in the order of its visits. */
   readonly results: readonly string[];
+  /** The number of these results that persons gave by word; missing where no person did. */
+  readonly said?: number;
   /** All its visits together; null where an end was not seen. */
   readonly took: DurationRange | null;
 }
@@ -48,8 +50,10 @@ function summaryOf(visits: readonly Visit[]): ActionSummary | null {
   if (visits.length === 0) return null;
   const ranges = visits.map(rangeOf);
   const known = ranges.every((range) => range !== null);
+  const said = visits.filter((visit) => visit.said).length;
   return {
     results: visits.map(({ result }) => result ?? "unknown"),
+    ...(said > 0 ? { said } : {}),
     took: known
       ? {
           least: ranges.reduce((sum, range) => sum + range.least, 0),

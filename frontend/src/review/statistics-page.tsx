@@ -47,20 +47,49 @@ function RunBars({ runs }: { runs: Statistics["runs"] }) {
   );
 }
 
+type ResultName = "true" | "false" | "error" | "stopped" | "unknown";
+
+interface ResultPart {
+  readonly result: ResultName;
+  readonly count: number;
+  /** Persons gave these results by word; no answer has shown them. */
+  readonly said: boolean;
+}
+
+/** Return the visits of an action by result: those seen, those that persons said, and the rest. */
+export function resultParts(action: ActionStatistics): ResultPart[] {
+  const partsOf = (counts: Record<string, number>, said: boolean) =>
+    Object.entries(counts).map(([name, count]) => ({ result: name as ResultName, count, said }));
+  const rest = { result: "unknown", count: action.unknown, said: false } as const;
+  const all = [...partsOf(action.results, false), ...partsOf(action.said ?? {}, true), rest];
+  return all.filter(({ count }) => count > 0);
+}
+
+const partWords = ({ result, count, said }: ResultPart): string =>
+  `${count} ${result}${said ? " by word" : ""}`;
+
 function ResultBar({ action }: { action: ActionStatistics }) {
-  const known = Object.entries(action.results) as [
-    "true" | "false" | "error" | "stopped",
-    number,
-  ][];
-  const { unknown } = action;
-  const parts = [...known, ...(unknown > 0 ? ([["unknown", unknown]] as const) : [])];
-  const text = parts.map(([name, count]) => `${count} ${name}`).join(", ");
+  const parts = resultParts(action);
+  const text = parts.map(partWords).join(", ");
+  const said = parts.filter((part) => part.said);
   return (
-    <span className={style.results} role="img" aria-label={text} title={text}>
-      {parts.map(([name, count]) => (
-        <i key={name} data-tone={name} style={{ flexGrow: count, color: toneColor[name] }} />
-      ))}
-    </span>
+    <>
+      <span className={style.results} role="img" aria-label={text} title={text}>
+        {parts.map(({ result, count, said }) => (
+          <i
+            key={`${result} ${said}`}
+            data-tone={result}
+            data-said={said || undefined}
+            style={{ flexGrow: count, color: toneColor[result] }}
+          />
+        ))}
+      </span>
+      {said.length > 0 && (
+        <span className="quiet-xs" aria-hidden>
+          {said.map(partWords).join(", ")}
+        </span>
+      )}
+    </>
   );
 }
 
@@ -144,8 +173,19 @@ function visitCount({ visits, at_least }: ActionStatistics): string {
   return at_least ? `at least ${visits}` : String(visits);
 }
 
+const failedOf = (counts: Record<string, number> | undefined): number =>
+  (counts?.error ?? 0) + (counts?.false ?? 0);
+
+/** Failures that were seen, and those that persons gave by word. */
 function failures(action: ActionStatistics): number {
-  return (action.results.error ?? 0) + (action.results.false ?? 0);
+  return failedOf(action.results) + failedOf(action.said);
+}
+
+/** Return how many visits of an action failed, in words: those by word are told apart. */
+export function failureWords(action: ActionStatistics): string {
+  const said = failedOf(action.said);
+  const words = `${failures(action)} of ${visitCount(action)} visits`;
+  return said === 0 ? words : `${words}, ${said} of these by word`;
 }
 
 function Found({ found }: { found: Statistics }) {
@@ -183,7 +223,7 @@ function Found({ found }: { found: Statistics }) {
                   <b>
                     <ActionWay action={action} />
                   </b>{" "}
-                  {failures(action)} of {visitCount(action)} visits
+                  {failureWords(action)}
                 </li>
               ))}
             </ul>
