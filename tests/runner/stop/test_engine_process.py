@@ -15,10 +15,12 @@ from action_assistant.runner.links.engine_process import (
     indexes_by,
     process,
 )
+from action_assistant.runner.links.port import EngineLog
 from runner.harness import (
     ANN,
     Harness,
     Robot,
+    clock_us,
     engine,
     order,
     sequence,
@@ -104,6 +106,38 @@ async def test_a_run_ends_with_the_process_of_its_engine(child: subprocess.Popen
             assert (told.state, told.proof_at) == ("error", None)
             assert told.at_rest is not None
             assert told.at_rest.by is None
+        tasks.cancel_scope.cancel()
+
+
+@pytest.mark.parametrize(
+    ("line", "before_s", "is_named"),
+    [
+        ("std::bad_alloc", 1, True),
+        ("map::at", 1, True),
+        ("Graph 'patrol' finished.", 1, False),
+        ("std::bad_alloc", 60, False),
+    ],
+)
+@virtual
+async def test_an_engine_that_logs_an_exception_and_ends_is_lost_with_these_words(
+    child: subprocess.Popen[bytes], line: str, before_s: float, is_named: bool
+) -> None:
+    robot = WithProcess(engine({"*": [{"never": True}]}), process(child.pid))
+    harness = Harness({"David": robot})
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(robot.engine.run)
+        async with harness.runner() as control:
+            run = (await control.start(order(sequence(), engine="David"), ANN)).run.id
+            await anyio.sleep(2)
+            robot.subscribers.tell(EngineLog(at=clock_us(), text=line))
+            await anyio.sleep(before_s)
+            child.kill()
+            child.wait()
+            await until(lambda: run not in control.open)
+            told = await control.find(run)
+            assert told.state == "lost"
+            assert ("Its log said before" in told.detail) is is_named
+            assert (line in told.detail) is is_named
         tasks.cancel_scope.cancel()
 
 

@@ -274,7 +274,8 @@ class Monitor:
         if len({run.incarnation, answer.incarnation} - {None, ""}) > 1:
             if not run.lost:
                 changes.alarm("engine_restarted", "The engine was restarted: look at the robot.")
-                changes.lose("The engine was restarted while the run went on.")
+                why = "The engine was restarted while the run went on."
+                changes.lose(why + changes.last_words())
             return
         own = next((each for each in answer.graphs if each.graph == name), None)
         if own is None or own.run != run.id:

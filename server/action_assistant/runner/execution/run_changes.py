@@ -1,6 +1,7 @@
 """The changes of one run: events, each with the run as it is after that event. Nothing is shown or stored
 here, so whoever decides what an engine's answer means returns a value of this kind."""
 
+import re
 from collections.abc import Iterator
 from typing import Final, NamedTuple
 
@@ -25,6 +26,13 @@ LOOK_AT_IT: Final = "Look at the robot; its hardware stop is the one to use."
 _WITHOUT_END: Final = frozenset(
     {"H7", "H8"}
 )  # hazards after which a run goes nowhere, although the engine goes on
+#: Words by which an engine's log shows an exception of C++, after which the engine may abort.
+_EXCEPTION: Final = re.compile(
+    r"std::|\b(map|vector|deque|basic_string)::|Duplicate entry detected|terminate called"
+)
+_LAST_WORDS_US: Final = (
+    10_000_000  # before its end is noticed; older lines are about something else
+)
 _RESULTS: Final = {"HALTED": "on_halted", "STOPPED": "on_stopped", "ERROR": "on_error"}
 
 
@@ -103,7 +111,15 @@ class RunChanges:
             if process is None
             else f"The engine's process, {process.pid} on this computer, has ended."
         )
-        self._rests_by_itself(how)
+        self._rests_by_itself(how + self.last_words())
+
+    def last_words(self) -> str:
+        """Return the exception that the engine's log showed right before now, as a further sentence;
+        "" if it showed none: then nobody knows why the engine has ended."""
+        since = self._clock_us() - _LAST_WORDS_US
+        lines = (line for line in reversed(self.run.log) if line.at >= since)
+        said = next((line.text for line in lines if _EXCEPTION.search(line.text)), "")
+        return f" Its log said before: “{said}”." if said else ""
 
     def threads_ended(self) -> None:
         """End the run, since no thread that the engine began for it is left."""
