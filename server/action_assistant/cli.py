@@ -248,7 +248,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt:
         return 130
-    except BrokenPipeError:  # somebody piped us into `head`
+    except BrokenPipeError:  # the output goes to a program that has ended, such as `head`
         sys.stderr.close()
         return 0
     return code

@@ -107,7 +107,7 @@ LEVELS: Final[tuple[Level, ...]] = get_args(Level)
 
 _FORM: Final = "ACTION_ASSISTANT_LOG_FORMAT"
 _LEVEL: Final = "ACTION_ASSISTANT_LOG_LEVEL"
-#: They tell much, of no use to whoever runs this; some of it, such as header fields, is secret.
+#: Loggers that write much of no use to administrators; some of it, such as header fields, is secret.
 _QUIET: Final = ("uvicorn.error", "httpx", "httpcore", "websockets", "asyncio")
 
 log: Final = logging.getLogger("action_assistant")

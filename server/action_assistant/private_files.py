@@ -122,7 +122,7 @@ def _is_open(path: Path) -> bool:
 def _close(path: Path) -> None:
     try:
         path.chmod(0o700 if path.is_dir() else 0o600)
-    except OSError:  # somebody else's; `doctor` tells
+    except OSError:  # another user's; `doctor` reports it
         return
 
 

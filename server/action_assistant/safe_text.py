@@ -29,7 +29,7 @@ _TURNING: Final = re.compile(f"[{_DIRECTING}{_LEFTWARD}]")
 _WORDS: Final = f"[{_LEFTWARD}]+(?:[ _.-]?[0-9]*[ _.-]?[{_LEFTWARD}]+)*"
 _ISOLATED: Final = re.compile(f"\u200e?\u2068({_WORDS})\u2069\u200e?")
 _TURNED: Final = re.compile(f"\u2068({_WORDS})\u2069|({_WORDS})|([{_DIRECTING}])")
-#: What lets somebody in, wherever it stands, and how much of it may be shown.
+#: Secrets that let a person in, as patterns, and the part of each that may be shown.
 _SECRETS: Final[tuple[tuple[re.Pattern[str], str], ...]] = (
     (re.compile(r"\b([A-Za-z0-9]{12})\.[\w-]{43}(?![\w-])"), r"\1.…"),  # an invitation
     (re.compile(r"(?i)\b(bearer\s+)[^\s,;'\"]+"), r"\1…"),

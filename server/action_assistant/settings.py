@@ -159,7 +159,7 @@ def take_secrets_from_files(environ: MutableMapping[str, str] = os.environ) -> N
         if not text or len(text.splitlines()) > 1:
             raise CannotStart(f"{name} is {path!r}, which has to hold one line.")
         environ[secret] = text
-        del environ[name]  # a process that we start would find both
+        del environ[name]  # a process that this one starts would find both
 
 
 def port(environ: Mapping[str, str] = os.environ) -> int:

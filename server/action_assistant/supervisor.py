@@ -100,7 +100,7 @@ class Child:
     ) -> None:
         self.name = name
         self.port = port
-        self._settings = settings  # everybody may read arguments; environments are ours alone
+        self._settings = settings  # all users may read arguments, but not the environment
         self._interpreter = interpreter
         self._arguments = arguments
         self._process: subprocess.Popen[bytes] | None = None

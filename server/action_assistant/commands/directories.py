@@ -11,7 +11,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, Final, NamedTuple, Protocol, Self
 
-#: Larger files are not read: no server takes one, and nobody's memory holds all of them.
+#: Larger files are not read: no server accepts them, and they could fill the memory.
 _LARGEST: Final = 256 << 20
 
 #: True if the system can name files relative to an open folder.
@@ -105,7 +105,7 @@ class HeldDirectory:
     def read(self, name: str) -> tuple[bytes, int]:
         """Return the content and the mode of a regular file. Raise OSError for any other entry."""
         flags = os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC
-        _refuse_special(self.status(name))  # opening a device may do something
+        _refuse_special(self.status(name))  # opening a device may have effects
         with os.fdopen(os.open(name, flags, dir_fd=self._at), "rb") as file:
             return _whole(file.fileno()), _mode(file.fileno())
 

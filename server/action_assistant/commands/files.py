@@ -190,7 +190,7 @@ def _given(paths: Sequence[Path]) -> dict[str, Graph]:
         try:
             reading = codec.read(file_text(path))
         except codec.Unreadable:
-            continue  # told when it is checked itself
+            continue  # reported when that file is checked
         if reading.dialect not in ACTION_DIALECTS and not checks.refused_by_parser(reading):
             found.setdefault(reading.graph.name, reading.graph)
     return found

@@ -327,6 +327,6 @@ def _runner(options: argparse.Namespace) -> int:
         port=chosen.port,
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.page_port),
-        direct=settings.direct_sockets(),  # for the turns of its sockets: nobody takes one over
+        direct=settings.direct_sockets(),  # for a fair order of its sockets; none is taken over
     )
     return 0

@@ -355,7 +355,7 @@ class QuietSocket(HttpxWebsocket):
 
 
 def _watch(options: argparse.Namespace) -> int:
-    with suppress(KeyboardInterrupt):  # how it is meant to end
+    with suppress(KeyboardInterrupt):  # the usual way to end the command
         with running(options) as server:
             graph = server.graph_id(options.graph)
         anyio.run(_follow, options, graph)
@@ -426,7 +426,7 @@ def _raise_if_final(why: Exception, *, again: bool) -> None:
             raise RequestRefused(sentence(why.response))
         case WebSocketDisconnect() if why.code in _CLOSED:
             raise RequestRefused(_CLOSED[why.code])
-        case CannotStart() if again:  # somebody else listens there; our server may come back
+        case CannotStart() if again:  # another program listens there; the server may come back
             return
         case ExceptionGroup() | WebSocketDisconnect():
             return

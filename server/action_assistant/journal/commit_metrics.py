@@ -34,7 +34,7 @@ _BUCKETS: Final = (
 
 _REMEMBERED: Final = 100  # commits
 _KNOWN: Final = 20  # of them, before anything follows from how long they took
-_SLOW_S: Final = 0.02  # of which nobody sees anything
+_SLOW_S: Final = 0.02  # too short to be noticed
 _MOST_SLOW: Final = 5  # of those remembered
 _FAR_TOO_SLOW_S: Final = 0.1
 #: The share of the time that commits on the loop may take; beyond it the thread commits.

@@ -123,7 +123,7 @@ class Journal(JournalReader):
         self._at_once = at_once
         self._writer = Writer(database, session, fold, self._written)
         self._jobs: list[Job[Any]] = []  # of this turn of the loop, for one transaction
-        self._untold = 0  # jobs that the writer's thread was given, of which nobody was told yet
+        self._untold = 0  # jobs given to the writer's thread whose results were not reported yet
         self._followers: set[Follower] = set()
         self._closed = False
         self._probe = JournalProbe(branch, self.derive, self._ask, lambda: self._writer.is_alive)
@@ -367,7 +367,7 @@ class Journal(JournalReader):
         future: asyncio.Future[T] = self._loop.create_future()
 
         def done(result: T | None, error: BaseException | None) -> None:
-            if future.done():  # whoever waited was cancelled
+            if future.done():  # the waiting task was cancelled
                 pass
             elif error is None:
                 future.set_result(cast("T", result))
@@ -407,7 +407,7 @@ class Journal(JournalReader):
         for job, (result, error, events) in outcomes:
             try:
                 job.done(result, error)
-            except Exception:  # whose outcome it is: all others wait for theirs
+            except Exception:  # a fault in one caller must not keep results from the others
                 log.exception("the outcome of a job was not heard")
             for follower in self._followers:
                 follower.hear(events)

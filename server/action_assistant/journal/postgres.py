@@ -269,7 +269,7 @@ class Postgres:
     def _engine(self, server: dict[str, str], **options: Any) -> AsyncEngine:
         return create_async_engine(
             self._url,
-            isolation_level="AUTOCOMMIT",  # BEGIN and COMMIT are ours to say
+            isolation_level="AUTOCOMMIT",  # this module sends BEGIN and COMMIT itself
             connect_args={
                 "timeout": _CONNECT,
                 "command_timeout": _ANSWER,
@@ -310,4 +310,4 @@ async def _quietly(closing: Awaitable[None]) -> None:
     try:
         await closing
     except (asyncpg.PostgresError, asyncpg.InterfaceError, SQLAlchemyError, OSError):
-        return  # it is gone, which is what was wanted
+        return  # it has gone, as intended

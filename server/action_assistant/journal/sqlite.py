@@ -74,7 +74,7 @@ class SqliteSession:
             f"sqlite:///{path}",
             module=driver,
             poolclass=NullPool,
-            isolation_level="AUTOCOMMIT",  # BEGIN and COMMIT are ours to say
+            isolation_level="AUTOCOMMIT",  # this module sends BEGIN and COMMIT itself
             connect_args={"timeout": _WAIT, "check_same_thread": False},
         )
         self.connection = self._engine.connect()

@@ -133,7 +133,7 @@ class Transaction:
             if self._entered:
                 self._store(self._own)
                 self._session.say("RELEASE SAVEPOINT job")
-        except Exception as error:  # the job's own; whoever waits for it gets it
+        except Exception as error:  # of the job alone: its caller gets it
             if isinstance(error, database.faults) and (self._storing or database.lost(error)):
                 raise
             self._own.clear()
@@ -279,8 +279,8 @@ class Writer:
         try:
             session, transaction = self._connected()
             session.run(lambda: self._together(transaction, jobs, done))
-        except Exception as error:  # whatever it is, the thread lives on, and all who wait hear it
-            # After a failed commit nobody knows what the disk holds: begin again from there.
+        except Exception as error:  # the thread lives on, and all callers get the error
+            # After a failed commit it is unknown what the disk holds: read it again.
             ours = not isinstance(error, self._database.faults)
             log.error("%s was not written: %s", self._database.name, cause_of(error), exc_info=ours)
             self._disconnect()

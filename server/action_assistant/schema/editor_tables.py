@@ -61,7 +61,7 @@ version: Final = Table(
     Index(None, "graph", "at"),
     Index(None, "digest"),
 )
-#: Somebody who acted here, under the name they last gave.
+#: A person who acted here, under the last name that they gave.
 person: Final = Table(
     "person",
     EDITOR,

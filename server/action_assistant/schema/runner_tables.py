@@ -61,7 +61,7 @@ run: Final = Table(
     Index(None, "archived_at", "ended_at"),
     Index("ix_run_failed", "number", sqlite_where=text(str(FAILED).replace("run.", ""))),
 )
-#: A robot that somebody registered, under its wake word.
+#: A registered robot, under its wake word.
 robot: Final = Table(
     "robot",
     RUNNER,

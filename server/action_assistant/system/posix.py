@@ -10,7 +10,7 @@ from typing import Any, Final
 from action_assistant.errors import CannotStart
 
 _MOST_DESCRIPTORS: Final = 1 << 16  # that are asked for where there is no limit
-_WINDOWS_DESCRIPTORS: Final = 512  # where nobody says
+_WINDOWS_DESCRIPTORS: Final = 512  # where the system does not tell
 
 
 def _module(name: str) -> Any:

@@ -207,7 +207,7 @@ REFUSED: Final = frozenset(name for name, code in CODES.items() if code.kind == 
 STRUCTURAL: Final[frozenset[str]] = REFUSED | {
     name for name, code in CODES.items() if code.kind == "structural"
 }
-#: Codes of errors that nobody can override: structural ones, and those that are sent to no robot.
+#: Codes of errors that cannot be overridden: structural ones, and those that are sent to no robot.
 FINAL: Final[frozenset[str]] = STRUCTURAL | {
     name for name, code in CODES.items() if code.kind == "unsendable"
 }

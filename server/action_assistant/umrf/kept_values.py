@@ -32,7 +32,7 @@ from action_assistant.umrf.semantics.values import RemapUnknown, renamed, slots_
 #: first: a keeper that comes after the action whose values it holds outlives no library that made them.
 KEEPER: Final = "ZzKeepValues"
 KEEPER_PACKAGE: Final = "zz_keep_values"
-#: The required input of a keeper that nobody gives.
+#: The required input of a keeper that never gets a value.
 NEVER: Final = "never_given"
 #: Outputs that one keeper takes. It has an input of each native type for each of them.
 _OUTPUTS_EACH: Final = 4

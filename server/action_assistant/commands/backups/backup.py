@@ -40,12 +40,12 @@ from action_assistant.system import posix
 from action_assistant.web.auth.keys import TOKEN_FILE
 
 _LOCK: Final = ".action-assistant.lock"
-_COMMAND_TIMEOUT_S: Final = 6 * 3600.0  # that a command may take
-_RETRY_S: Final = 15 * 60.0  # after which a backup that failed is tried again
-_WAIT_FOR_JOURNALS_S: Final = 10.0  # after which a folder without journals is looked at again
+_COMMAND_TIMEOUT_S: Final = 6 * 3600.0  # for the command that takes a backup elsewhere
+_RETRY_S: Final = 15 * 60.0  # until a failed backup is tried again
+_WAIT_FOR_JOURNALS_S: Final = 10.0  # until a folder without journals is read again
 _JOURNALS: Final = ("editor.db", "editor.database", "runner.db")
-_MOST_SAID: Final = 500  # characters of what a command said
-_NICE: Final = 19  # the least of a processor
+_MOST_SAID: Final = 500  # characters of a command's output
+_NICE: Final = 19  # the lowest priority
 
 
 def _add_backup(backup: argparse.ArgumentParser) -> None:
@@ -197,7 +197,7 @@ def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, O
             progress.end()
             off_site = _taken_away(plan.after, target)
             backup_state.made(plan.data, msgspec.structs.replace(done.made, off_site=off_site))
-            if not done.made.missing:  # else an older one may have what this one lacks
+            if not done.made.missing:  # otherwise an older backup may have the missing part
                 ours = (path for path in plan.into.iterdir() if not _is_anothers(path, done))
                 for path in superfluous(ours, parse_retention(plan.keep), datetime.now(UTC)):
                     path.unlink(missing_ok=True)

@@ -52,7 +52,7 @@ ASIDE: Final = "before-restore-"
 #: The prefix of folders that `move` leaves behind.
 MOVED: Final = "before-move-"
 _MAGIC: Final = b"SQLite format 3\0"
-_PAGES: Final = 5_000  # copied between two words about it
+_PAGES: Final = 5_000  # copied between two reports of progress
 _AT_WORK: Final = ".at-work"
 
 
@@ -103,7 +103,7 @@ def tables_copied(source: Path, target: Path, name: str, progress: Progress) -> 
         closing(sqlite3.connect(target)) as here,
     ):
         target.chmod(0o600)
-        there.execute("BEGIN")  # else it would begin again with each commit of somebody else
+        there.execute("BEGIN")  # otherwise each commit of another process restarts it
         there.execute("SELECT count(*) FROM sqlite_master").fetchone()
         there.backup(here, pages=_PAGES, progress=tell, sleep=0)
 
@@ -224,13 +224,15 @@ def sweep(parent: Path, prefix: str) -> None:
     that a process still uses stay."""
     for left in parent.glob(f"{prefix}*"):
         if left.is_symlink() or (left / _AT_WORK).is_symlink():
-            continue  # nothing of ours: it may be a folder of everybody's, such as /tmp
+            continue  # a foreign file: the folder may be a shared one, such as /tmp
         try:
             held = opener(str(left / _AT_WORK), os.O_RDWR | os.O_CREAT)
         except OSError:
-            continue  # it has just gone, or is another user's
+            continue  # it was just removed, or is another user's
         try:
-            if posix.lock_file(held):  # kept until all is gone, for whoever is just beginning there
+            if posix.lock_file(
+                held
+            ):  # held until all is removed, in case another call begins there
                 shutil.rmtree(left, ignore_errors=True)
         finally:
             os.close(held)

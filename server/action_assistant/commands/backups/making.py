@@ -200,7 +200,7 @@ def _fill(packer: Packer, data: Path, folder: Path, progress: Progress) -> tuple
             else:
                 packer.file(f"{FILES}/{name}", path)
         except FileNotFoundError:
-            continue  # it went into an archive, or was kept long enough
+            continue  # it was archived, or removed by retention
     if given:
         packer.text(f"{FILES}/{TOKEN_FILE}", f"{given}\n".encode())
     if f"{FILES}/{TOKEN_FILE}" not in packer.files and _links(folder / "editor.db"):

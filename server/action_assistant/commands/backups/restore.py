@@ -171,7 +171,7 @@ def _begin(
 
     before = _under(mark)
     if elsewhere and before is not None and _is_there(url, before, about):
-        return  # an interrupted restore got so far
+        return  # an interrupted restore has done this already
     _write(mark, _end_of(folder, about))
     if not elsewhere:
         return
@@ -193,7 +193,7 @@ def _under(mark: Path) -> RestoreUnderWay | None:
     except FileNotFoundError:
         return None
     except msgspec.DecodeError:
-        return RestoreUnderWay("", 0, "")  # cut short by what interrupted it
+        return RestoreUnderWay("", 0, "")  # the interruption cut it short
 
 
 def _end_of(folder: Path, about: BackupManifest) -> RestoreUnderWay:
@@ -232,7 +232,7 @@ def _placed(folder: Path, name: str, data: Path) -> bool:
     if target.exists():
         return target.is_file() and sha256_of(target) == sha256_of(source)
     if top == FILES and whole in WHOLE and target != data / whole:
-        return False  # of one folder come all files from here, or none
+        return False  # a folder is taken over as a whole or not at all
     for parent in reversed(target.parents):
         parent.mkdir(mode=0o700, exist_ok=True)
     _move(source, target)

@@ -198,7 +198,7 @@ def _source(data: Path, known: str, given: str | None) -> str:
     from action_assistant.editor.log import database_location
 
     if given is not None and database_location.same(given, known):
-        return given  # the folder remembers no password
+        return given  # the folder stores no password
     if database_location.journal_of(data, None) is None:
         raise CannotStart(f"There are no graphs in {data} yet.")
     return known
@@ -250,7 +250,7 @@ def _tidy(data: Path, target: str) -> None:
     try:
         lock = own(data / "editor.db")
     except CannotStart:
-        return  # somebody works in it
+        return  # it is in use
     try:
         sweep(data, _WORK)
         _put_aside(data, keep=target)

@@ -39,7 +39,7 @@ from action_assistant.web.workers.lanes import run_here
 T = TypeVar("T")
 
 _PAGE: Final = 500  # events in a transaction
-_PAUSE: Final = 1.0  # seconds between two looks
+_PAUSE: Final = 1.0  # seconds between two queries
 _AWAY: Final = 10.0  # seconds between attempts while the database is away
 _FAULTS: Final = (DBAPIError, asyncpg.PostgresError, asyncpg.InterfaceError, OSError)
 #: The schema of Postgres that holds the copies.

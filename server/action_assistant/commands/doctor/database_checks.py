@@ -192,7 +192,7 @@ def _cut_off(connection: Connection) -> str:
 
 
 _PATIENCE_S: Final = 6.0
-_CLOCK_S: Final = 120.0  # that an event may be in the future
+_CLOCK_S: Final = 120.0  # by which an event may lie in the future
 _NEWER: Final = (
     "Install that version again, or restore a backup of before the upgrade into an empty folder."
 )

@@ -166,7 +166,7 @@ COMMANDS: Final = {"doctor": _add_doctor}
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    with suppress(CannotStart):  # told as a finding
+    with suppress(CannotStart):  # reported as a finding
         settings.take_secrets_from_files()
     port = Installation.port_of_settings() if options.port is None else options.port
     place = Installation(
@@ -216,7 +216,7 @@ def robots_answer(place: Installation) -> Iterator[Diagnostic]:
     is yielded if there is no such Python, since the check of the settings reports that."""
     try:
         interpreter = for_runner()
-    except CannotStart:  # told with the settings
+    except CannotStart:  # reported with the settings
         return
     if interpreter.remark:
         yield found(
@@ -318,7 +318,7 @@ def _registered(data: Path) -> list[Registration]:
         with engine.connect() as connection:
             rows = connection.execute(queries.all_robots()).all()
     except (sqlite3.Error, DBAPIError):
-        return []  # what is wrong with the file is said elsewhere
+        return []  # another check reports what is wrong with the file
     finally:
         engine.dispose()
     return [

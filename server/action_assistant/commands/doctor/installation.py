@@ -27,7 +27,7 @@ class Installation(msgspec.Struct, frozen=True, kw_only=True):
         """Return the editor's port by the environment; the default if that is no port."""
         try:
             return settings.port()
-        except CannotStart:  # told as a finding
+        except CannotStart:  # reported as a finding
             return 8000
 
     @property

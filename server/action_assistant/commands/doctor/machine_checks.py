@@ -328,7 +328,7 @@ def _used_since(place: Installation) -> float | None:
             database_of(f"sqlite:///{file}").look(
                 lambda each: found_at.append(oldest_at(each) or 0) if has_events(each) else None
             )
-        except CannotStart:  # told where the databases are looked at
+        except CannotStart:  # reported by the checks of the databases
             continue
     return min(found_at) / 1e6 if found_at else None
 
@@ -475,7 +475,7 @@ def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
     """Check that the folder of archives, if it exists, can be read and written, or else be created."""
     try:
         folder = settings.keep(place.data).folder
-    except CannotStart:  # told with the settings
+    except CannotStart:  # reported with the settings
         return
     problem = ""
     if folder.exists():
@@ -506,7 +506,7 @@ def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
 def disk_has_room(place: Installation) -> Iterator[Diagnostic]:
     """Check the free space on the disks of the data folder and of the folder of archives."""
     folders = [place.data]
-    with suppress(CannotStart):  # told with the settings
+    with suppress(CannotStart):  # reported with the settings
         folders.append(settings.keep(place.data).folder)
     seen: set[int] = set()
     for folder in folders:

@@ -64,7 +64,7 @@ def at_port(host: str, port: int) -> ProcessAnswer | None:
     shown = f"[{shown}]" if ":" in shown else shown
     for scheme in ("http", "https"):
         try:
-            # A certificate that is wrong is told by itself; nothing secret is sent.
+            # Another check reports a wrong certificate; nothing secret is sent.
             with client(verify=False) as asking:
                 return health(asking, f"{scheme}://{shown}:{port}")
         except httpx.HTTPError:
@@ -122,7 +122,7 @@ def certificate_fits(where: str, url: str, trust: ssl.SSLContext) -> Iterator[Di
         _shake(host, port, trust)
     except ssl.SSLCertVerificationError as error:
         yield _wrong(where, host, error, _shown_certificate(host, port))
-    except OSError:  # told by whoever asks there
+    except OSError:  # reported by the check that connects there
         return
 
 
@@ -203,7 +203,9 @@ def proxy_leads_here(place: Installation) -> Iterator[Diagnostic]:
     try:
         public = reached(place.public_url, None).public
     except CannotStart as error:
-        if place.public_url is not None:  # that of the environment is told with the settings
+        if (
+            place.public_url is not None
+        ):  # an address in the environment is reported with the settings
             yield found("setting-wrong", "--public-url", str(error), "Correct it.")
         return
     if public is None:
@@ -312,7 +314,7 @@ def _ours(
         yield from certificate_fits(where, answer.base, Certificate(place.data).trusting_too())
     try:
         keys = Keys.known(place.data)
-    except CannotStart:  # told where the token is looked at
+    except CannotStart:  # reported by the check of the token
         return
     if not is_ours(answer.base, keys, _any_certificate()):
         yield found(

@@ -117,7 +117,7 @@ class Folder:
         number = 1
         while not self._move(fresh, _copy(name, number)):
             there = self._read_or_none(_copy(name, number))
-            if there is not None and text.startswith(there):  # of a round that ended early
+            if there is not None and text.startswith(there):  # left by a round that was interrupted
                 self._at.complete(_copy(name, number), text, *rights)
                 break
             number += 1

@@ -152,7 +152,7 @@ class SyncRound:
                 return
             file = replace(
                 file, seq=file.conflict, conflict=None, copy=1
-            )  # somebody has seen to it
+            )  # a person has resolved it
         text = self._folder.read(name)
         if graph is None:
             if text is not None:
@@ -204,7 +204,7 @@ class SyncRound:
             self._folder.remember(name, SyncedFile(file.graph, seq, file.sha))
         elif self._folder.exchange(name, file.sha, seq, now):
             self._tell(f"{name}: fetched")
-        # Otherwise the next round sees what somebody has written.
+        # Otherwise the next round finds the changes of people.
 
     def _bring(self, name: str, others: Collection[str]) -> None:
         """Make a graph of the new file `name`. `others`: the ids of graphs that have no file."""
@@ -214,7 +214,7 @@ class SyncRound:
         begun = self._folder.known.get(name)
         if begun is not None and begun.sha == sha(text):
             wanted = _digest(text)
-            for graph in others:  # a round that ended early may have made it
+            for graph in others:  # an interrupted round may have made it
                 if wanted is not None and _digest(self._first_text(graph)) == wanted:
                     self._brought(name, SyncedFile(graph, _FIRST, sha(text)), text)
                     return

@@ -23,7 +23,7 @@ from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.openapi import answer
 
-_SILENCE: Final = 10.0  # seconds after which a listener is told that we are still here
+_SILENCE: Final = 10.0  # seconds of silence after which a sign of life is sent
 
 
 class Config(msgspec.Struct, frozen=True):
@@ -83,7 +83,7 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         services.colours.given(person.id)
         everyone = services.people.everyone()
         if all(known.id != person.id for known in everyone):
-            everyone.append(person)  # who has not acted yet, but wants to see themselves
+            everyone.append(person)  # a person without an action yet is listed, too
         return [Participant(p.id, p.name, services.colours.of(p.id)) for p in everyone]
 
     @get(

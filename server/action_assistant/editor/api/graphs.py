@@ -27,7 +27,7 @@ from action_assistant.web.server.openapi import answer, reads
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1)]
 
-_TOLD: Final = 50  # keys of a conflict
+_TOLD: Final = 50  # keys of a conflict that an answer lists
 
 
 class MadeGraph(GraphView, frozen=True, omit_defaults=True):

@@ -99,7 +99,7 @@ class _Directly:
         self._failure: Exception | None = None
         connection.member.on_news = self._write_soon
         connection.member.write_now = self._write_now
-        self._write_soon()  # something may wait already
+        self._write_soon()  # messages may wait already
         if (debt := connection.debt()) > 0:
             self._hold(debt)
 
@@ -162,7 +162,7 @@ class _Directly:
         self._unsent = unsent[socket.write(unsent) :] if unsent else unsent
         if not self._unsent and socket.is_writable:
             member.all_sent()
-            if member.has_news:  # behind what could not be sent earlier
+            if member.has_news:  # after the messages that could not be sent earlier
                 self._write_soon()
 
 

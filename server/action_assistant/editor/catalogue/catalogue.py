@@ -229,7 +229,7 @@ class Catalogue:
         if row.deleted_at is not None:
             try:
                 await self._journal.append(h.about_stream(graph), [h.draft(h.RECOVERED, author)])
-            finally:  # where it is not known whether that was stored, the tables tell
+            finally:  # if it is unknown whether this was stored, the tables show it
                 self._rooms.readmit(h.graph_stream(graph))
         return await self.get(graph)
 

@@ -199,7 +199,7 @@ class GraphChecks:
         try:
             info = await self._reader.ask(contents.info, sight)
         except HOPELESS as error:
-            if not isinstance(error, Crashed):  # what has died may have been in somebody's way
+            if not isinstance(error, Crashed):  # a worker that died may have held up others
                 self._hopeless.put(graph, (newest, error))
             raise
         return self._remember(graph, _About(sight.seq, max(newest, sight.seq), info))
@@ -265,7 +265,7 @@ class GraphChecks:
             about = await self._about(known.graph, known.seq)
         except (*HOPELESS, NotFound):
             return None
-        if about.info.name != name:  # renamed at this moment; whoever asks next has it
+        if about.info.name != name:  # renamed meanwhile; the next call has the new name
             return None
         return _Member(name, known.graph, about.seq), about.info
 

@@ -120,11 +120,9 @@ class GraphNames:
             task.exception()
 
     async def _refresh(self) -> None:
-        set_caller(
-            _OURSELVES
-        )  # it goes on when whoever came first has left, or has others work for them
+        set_caller(_OURSELVES)  # it goes on although the first caller has left
         async with self._refreshing:
-            self._next = None  # who comes from here on may know of more
+            self._next = None  # later callers may know of newer events
             position, seqs, abouts = await self._news()
             self._seqs |= seqs
             changed = await self._look_up(abouts)

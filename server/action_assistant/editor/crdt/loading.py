@@ -234,7 +234,7 @@ class LogTail:
     async def _check_end(self) -> None:
         newest = await self._journal.newest(self._stream)
         if (newest if self._upto is None else min(newest, self._upto)) > self.seq:
-            # Not what was added since we looked: that comes with the next look.
+            # Without the events that were added meanwhile: the next call returns them.
             if await self._ask(self.seq, 1):
                 return
             self._stop("it is missing")
@@ -270,7 +270,7 @@ def _linked(chain: bytes, stream: str, slices: Sequence[StoredColumns]) -> int:
 def _linked_of_one(chain: bytes, stream: str, events: StoredColumns) -> int:
     try:
         return linked(chain, stream, events)
-    except (AttributeError, TypeError, struct.error):  # something in them is not of its type
+    except (AttributeError, TypeError, struct.error):  # a value has a wrong type
         rows: Iterable[Sequence[Any]] = zip(*events, strict=True)
         typed = list(itertools.takewhile(lambda row: tuple(map(type, row)) == _TYPES, rows))
         return linked(chain, stream, StoredColumns(*zip(*typed, strict=True))) if typed else 0

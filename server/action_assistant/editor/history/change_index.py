@@ -39,7 +39,7 @@ log: Final = logging.getLogger(__name__)
 P = ParamSpec("P")
 T = TypeVar("T")
 
-_PERIOD: Final = 20.0  # seconds between two looks at what is behind
+_PERIOD: Final = 20.0  # seconds between two searches for indexes that are behind
 _FAR: Final = 5_000  # events behind, from which on it is not left for later
 #: Rows that one transaction stores or deletes: it takes some milliseconds, for which others wait.
 ROWS: Final = 200

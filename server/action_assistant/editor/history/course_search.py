@@ -41,8 +41,8 @@ from action_assistant.umrf.semantics.steps import (
 )
 from action_assistant.web.auth.keys import PersonRef
 
-_EACH: Final = 200  # moments that are all looked at
-_SAMPLES: Final = 64  # of more
+_EACH: Final = 200  # states that are all simulated
+_SAMPLES: Final = 64  # simulated if there are more states
 _EVENTS: Final = 4_000  # of one course
 _BUDGET_S: Final = 25.0  # of this process's time, for the samples
 #: Fields of actions that no engine reads.

@@ -113,7 +113,7 @@ def remember(data: Path, url: str) -> None:
             return
         content = msgspec.json.encode(StoredLocation(shown(url)))
         replace_file(path, content, part=path.with_name(f".{FILE}.part"))
-    except OSError as error:  # graphs can be drawn all the same; the next start tries again
+    except OSError as error:  # the editor works all the same; the next start tries again
         log.warning("cannot write %s: %s", path, error.strerror)
 
 

@@ -64,7 +64,7 @@ async def living_in(journal: Journal, data: Path) -> AsyncIterator[str]:
     mark = data / MARK
     try:
         epoch = await _epoch(journal, mark)
-    except Unavailable as error:  # reading goes on; whoever comes is told another epoch next time
+    except Unavailable as error:  # reading goes on; pages get another epoch next time
         log.error("no epoch could be begun: %s", error.detail)
         epoch = secrets.token_hex(8)
     await _remember(journal, mark)

@@ -27,7 +27,7 @@ log: Final = logging.getLogger(__name__)
 
 T = TypeVar("T")
 
-LONGEST: Final = 0.01  # seconds; nobody sees it, and a busy room needs a fifth of the work
+LONGEST: Final = 0.01  # seconds; people do not notice it, and a busy room needs a fifth of the work
 SHORTEST: Final = 0.001  # seconds in which what people do at the same time arrives
 _BUSY: Final = 0.7  # share of its processor that the loop works, from which on windows are longest
 _MEASURED_S: Final = 0.1  # over which that share is measured
@@ -46,7 +46,7 @@ class TurnEnd:
 
     def __init__(self) -> None:
         self._loop = asyncio.get_running_loop()
-        self._context = Context()  # it is done for nobody
+        self._context = Context()  # the work belongs to no request
         self._work: list[Callable[[], None]] = []
 
     def do(self, work: Callable[[], None]) -> None:
@@ -301,7 +301,7 @@ async def _done_for(
             raise TooSlow(OVERLONG) from error
         except Crashed as error:
             crashes += 1
-            if crashes == _CRASHES:  # the first one may have been for want of memory
+            if crashes == _CRASHES:  # the first one may have lacked memory
                 raise Malformed("an update that ends the process") from error
         except TooLarge as error:
             raise TooSlow(f"This change cannot be taken: {error.detail}") from error

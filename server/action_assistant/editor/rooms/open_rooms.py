@@ -140,7 +140,7 @@ class Rooms:
         return await asyncio.shield(loading)  # others may wait for it too
 
     async def _load(self, stream: str) -> Room:
-        outlive_connection()  # others may wait for it too, when whoever came first has left
+        outlive_connection()  # others may wait for it, even if the first caller has left
         try:
             loaded = await load(self._journal, stream, run_in_worker=self._run_in_worker)
             room = self._rooms[stream] = Room(
@@ -155,7 +155,7 @@ class Rooms:
                 self.metrics,
             )
             self.metrics.opened += 1
-            if stream not in self._holders:  # whoever came was gone before it was loaded
+            if stream not in self._holders:  # the socket had left before it was loaded
                 self._unload_later(stream)
             return room
         finally:

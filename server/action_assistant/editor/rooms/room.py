@@ -236,7 +236,7 @@ def _send_document(request: SyncRequest, replica: Replica, seq: int) -> None:
 
 
 def _answer_read(request: ReadRequest, replica: Replica, seq: int) -> None:
-    if request.done.done():  # nobody waits any more
+    if request.done.done():  # the caller has left
         return
     try:
         request.done.set_result(request.see(replica, seq))
@@ -271,7 +271,7 @@ class Room:
         self._replica = loaded.replica
         self._snapshots: Final = RoomSnapshots(stream, journal, loaded.kept)
         self.damaged: Final = loaded.damaged
-        #: False from the moment in which somebody begins to delete the graph.
+        #: False from the moment at which the deletion of the graph begins.
         self.graph_exists = True
         self._on_end = on_end
         self._window = window
@@ -375,7 +375,7 @@ class Room:
             await self._snapshots.store_now(self.seq, self._replica)
         if is_needed() or self._waiting or self._ended:
             return
-        self._on_end(self)  # from here on whoever comes opens another room
+        self._on_end(self)  # from here on a new socket opens another room
         await self.stop()
 
     async def stop(self) -> None:

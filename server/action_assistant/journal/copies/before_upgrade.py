@@ -31,9 +31,9 @@ log: Final = logging.getLogger(__name__)
 FOLDER: Final = "before-upgrade"
 _KEPT: Final = 3  # of each journal, and so many revisions
 _ROOM: Final = 64 << 20  # bytes that have to be left on the disk
-_PAGES: Final = 5_000  # copied between two words about it
+_PAGES: Final = 5_000  # copied between two reports of progress
 _ROWS: Final = 64  # in memory: an event has up to a MiB
-_EVERY: Final = 1.0  # seconds between two words
+_EVERY: Final = 1.0  # seconds between two reports of progress
 _STAMP: Final = "%Y%m%d-%H%M%S"
 _COLUMNS: Final = (*Event.__struct_fields__, "chain")
 
@@ -113,7 +113,7 @@ def _written(target: Path, connection: Connection, branch: Branch, revision: str
     events."""
     for left in target.parent.glob(
         f".{branch}_*.part*"
-    ):  # of one that was killed: we are alone here
+    ):  # left by a killed process; no other one works here
         left.unlink()
     part = target.with_name(f".{target.name}.part")
     try:

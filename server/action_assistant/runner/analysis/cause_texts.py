@@ -30,7 +30,7 @@ from action_assistant.safe_text import sentence
 NOBODY: Final = "Somebody"
 _NAMED: Final = 3  # actions in one sentence
 _TENTH_US: Final = 100_000
-_SAME_S: Final = 0.101  # bounds that are no further apart are told as one figure
+_SAME_S: Final = 0.101  # bounds that are no further apart are written as one figure
 
 
 def cause_sentence(cause: Cause, run: Run) -> str:

@@ -339,7 +339,7 @@ async def _read(
                 await socket.close(code=_TOO_SLOW, reason="too slow")
                 break
     except (WebSocketDisconnect, WebSocketException, OSError):
-        pass  # the page has gone; nothing of it is kept
+        pass  # the page has gone
     scope.cancel()
 
 

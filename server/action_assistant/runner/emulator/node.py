@@ -149,7 +149,7 @@ class EmulatorNode:
         """Handle one message, if one arrives within `wait_s`."""
         try:
             self._executor.spin_once(timeout_sec=wait_s)
-        except (RuntimeError, SystemError) as error:  # whoever asked has left before the answer
+        except (RuntimeError, SystemError) as error:  # the caller has left before the answer
             if not self._context.ok():
                 raise
             log.warning("an answer could not be sent: %s", error.__cause__ or error)

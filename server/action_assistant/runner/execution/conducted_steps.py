@@ -116,7 +116,7 @@ class Step:
         self.is_led = True  # its task goes on
         self.has_not_left = False  # its piece was refused before it left, or by its robot
         self.lacks_output = False
-        self.troubles: set[str] = set()  # those that were told
+        self.troubles: set[str] = set()  # those that were reported
         self.alarms: set[tuple[str, str]] = set()  # those of its piece that were passed on
         self.word: Word | None = None
         self.decided = anyio.Event()  # it is to end, or a person has given its outcome

@@ -114,7 +114,7 @@ class Conductors:
         opened = self.open(first, run, texts, self._engine_for(first), seq=seq, left=left)
         if run.desired != "stopped":
             self._open[run.id].hold("The runner was restarted while it led this run.")
-        for piece, last in left.again:  # opened, each is told to the conductor (`_see`)
+        for piece, last in left.again:  # each reports itself to the conductor (`_see`) once opened
             link = self._robots.link(piece.engine)
             self._runs.drive(self._runs.open(piece, link, owns_link=False, seq=last))
         self._runs.drive(opened)

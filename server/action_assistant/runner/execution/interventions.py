@@ -91,7 +91,7 @@ async def modify(
     if engine is not None:
         await approvals.require(engine.registration, ready.digest, author.id)
         await _require_matched(engine, ready.umrf, run_in_worker)
-    _require_moving(opened.run)  # somebody may have stopped it meanwhile
+    _require_moving(opened.run)  # it may have been stopped meanwhile
     if ready.name != run.graph_name:
         raise Conflict(
             f"The run is of {run.graph_name}; a graph called {ready.name} cannot take its place.",

@@ -111,7 +111,7 @@ class Monitor:
         self._start = refusals.StartLog(run)
         self._absent: float | None = None  # since when answers lack a start that was refused
         self._standstill = stall.Standstill()
-        self._stalled_as: object = None  # the actions when a standstill was told last
+        self._stalled_as: object = None  # the actions when a standstill was last reported
         self._lacking: str | None = None  # what the graph that was sent lacks to begin
         self._parts = SubGraphs()
         self._loading = LoadingWatch(run.graph_name, meddled=run.reshaped)
@@ -119,7 +119,7 @@ class Monitor:
         self._threads = EngineThreads()
         self._reads = False  # while a job reads arrows of graphs
         self._loads_since: float | None = None
-        self._loading_reported_at = 0.0  # seconds of loading at which that is told again
+        self._loading_reported_at = 0.0  # seconds of loading at which that is reported again
         self._answered = False  # by a get, since the last feedback
         self._exact = exact
         self._rest = RestProof(exact=exact)
@@ -528,7 +528,7 @@ class Monitor:
     async def _report_stall(self, run: Run, run_in_worker: RunInWorker) -> Finding:
         try:
             text = await run_in_worker(stall.packed_alarm_text, stall.packed(run), self.umrf)
-        except Refused:  # nobody can read the graph now; what is known must be said all the same
+        except Refused:  # the graph cannot be read now; report what is known all the same
             text = stall.alarm_text(run, None)
         if not self._standstill.lasts:
             return Finding()

@@ -65,7 +65,7 @@ log: Final = logging.getLogger(__name__)
 
 _HAND_OVER_S: Final = 5.0
 _UNCONFIRMED_S: Final = 2.0
-_SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms nobody
+_SWITCH_OFF_S: Final = 10.0  # a simulated engine that does not obey harms no one
 _GET_S: Final = 1.0  # an engine that is not busy answers within milliseconds
 _NO_TURN: Final = (
     "It was not sent: its turn among the starts on its domain did not come within 5 seconds."
@@ -265,7 +265,7 @@ class OpenRun:
         """Apply and store changes that were derived from the present state of the run."""
         known = self.run
         for event, author, after in changes:
-            # Whoever saw the change before this one may have stopped the run: that is kept.
+            # An earlier watcher of this change may have stopped the run: that is kept.
             self.run = known = after if self.run is known else follow(self.run, event)
             self.recorder.put(event, author or self.run.engine)
             if self.run.end is not None:

@@ -15,7 +15,7 @@ from action_assistant.umrf.semantics.values import Opaque, Slot, slots_of
 
 #: Characters of one value. A longer one is cut and ends with an ellipsis: it is for people.
 LONGEST: Final = 300
-#: Parameters of one action; engines are machines that anybody may own.
+#: The most parameters of one action: an engine is not trusted to send fewer.
 MOST: Final = 100
 
 #: Flat name (`pose::x`) → JSON text of the value.

@@ -57,7 +57,7 @@ _CHANGES: Final = 100  # in one report, which the runner takes in without a paus
 MOST: Final = 64
 #: The limit for those with behaviours, each of which may have many processes.
 MOST_WITH_BEHAVIOURS: Final = 8
-_WAITING: Final = 16_384  # bytes on the way; an answer comes after what was said before it
+_WAITING: Final = 16_384  # bytes under way; an answer comes after all earlier reports
 _NICE: Final = 10
 _REST: Final = 3  # simulated runs pause for so many times the time that a report took
 _START_S: Final = 4.0  # less than a start may take

@@ -140,7 +140,7 @@ class RunnerFacts:
         is_piece = whole != run
         match event.kind:
             case "run.requested.v1":
-                # Runs recorded elsewhere were started by nobody here.
+                # Imported runs were not started by people of this runner.
                 if is_piece or body.request_id.startswith("example/"):
                     return None
                 return _started(run, body)

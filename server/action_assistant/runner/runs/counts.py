@@ -54,7 +54,7 @@ def _is_exact(run: Run, name: str, action: ActionRun) -> bool:
     if "/" in name and run.led is not None:
         return False  # a robot shows what is inside of a piece, and may miss visits
     if action.by == "" and action.visits:
-        return True  # told by transitions
+        return True  # shown by transitions
     if "/" in name:
         return False
     if not action.visits and action.state == "UNINITIALIZED":

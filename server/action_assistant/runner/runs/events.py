@@ -111,7 +111,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     inner_laps: dict[str, Laps] = {}  # of the graphs inside, by name
     behaviours: bool = False  # whether the simulator had Python behaviours
     subgraphs: tuple[RunSubgraph, ...] = ()  # all graphs inside, by value
-    tree_digest: str | None = None  # of the graph together with them; None: nobody told
+    tree_digest: str | None = None  # of the graph together with them; None if unknown
     led: Led | None = None  # of a conducted run
     piece: PieceOf | None = None  # of a piece, which is no run of its own for people
 

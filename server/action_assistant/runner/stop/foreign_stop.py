@@ -67,7 +67,7 @@ class _ForeignStop:
         self.life = life
         self.why = why
         self.patience = anyio.CancelScope(deadline=anyio.current_time() + _PATIENCE_S)
-        self.disturbed = False  # by a command of somebody else since the last answer
+        self.disturbed = False  # by a command of another program since the last answer
         self.rest = RestProof(exact=False)
         self.loading = LoadingWatch(graph)
         self.doubts = DoubtfulErrors(reached=True)

@@ -29,7 +29,7 @@ from action_assistant.web.workers.lanes import RunInWorker
 
 _NAMED: Final = 3
 _LEARNT: Final = 20  # newest loading times of one action that are kept
-_ENOUGH: Final = 3  # loading times from which on a usual one is told
+_ENOUGH: Final = 3  # loading times after which a usual one is reported
 _EXACT_US: Final = 2_000_000  # a begin that is known less exactly gives no loading time
 _DRAINED: Final = frozenset({"FINISHED", "HALTED"})
 

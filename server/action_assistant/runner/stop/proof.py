@@ -33,7 +33,7 @@ async def send_stop(link: Link, graph: str) -> str:
         return str(why) or "not sent"
     except TimeoutError:
         return "the message could not be handed over within a second"
-    except Exception as error:  # whatever fails in a link, the next stop has to be sent
+    except Exception as error:  # the next stop has to be sent although the link failed
         log.exception("a stop of %s may or may not have left", graph)
         return f"the link failed: {error!r}"
     return ""

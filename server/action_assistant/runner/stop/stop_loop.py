@@ -50,7 +50,7 @@ class StopLoop:
         """Request the Stop in the name of `author`, and return the event to record; None if this is
         the same press again, which may arrive several times on several ways. `stop_id`: the id of
         the press."""
-        # Unlike `anyio.current_time` this needs no task: whoever presses Stop is heard.
+        # Unlike `anyio.current_time` this needs no task: Stop works from any caller.
         now, (who, when) = asyncio.get_running_loop().time(), self._asked
         is_new = who != author.id or (stop_id not in self._ids and now - when > _ONE_PRESS_S)
         if is_new:

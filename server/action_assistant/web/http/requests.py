@@ -15,7 +15,7 @@ from action_assistant.logs import begin
 
 log: Final = logging.getLogger(__name__)
 
-#: Under this name the state of a request says whether a proxy that is believed has sent it.
+#: The key, in the state of a request, that is set if a trusted proxy has sent it.
 PROXIED: Final = "proxied"
 HEADER: Final = b"x-request-id"
 
@@ -66,7 +66,7 @@ class Requests:
         try:
             if kind == ScopeType.HTTP:
                 await self._answer(scope, receive, send)
-            else:  # its messages go the shortest way
+            else:  # a WebSocket: its messages are passed on without a wrapper
                 await self._app(scope, receive, send)
                 self._count_stranger(scope)
         finally:

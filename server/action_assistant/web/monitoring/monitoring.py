@@ -40,7 +40,7 @@ from action_assistant.web.monitoring.storage import StorageWatch, backups_shown
 from action_assistant.web.workers.lanes import Lane
 
 _TICK_S: Final = 0.25
-_REMEMBERED: Final = 240  # ticks: a minute
+_REMEMBERED: Final = 240  # measurements: a minute
 _BUCKETS: Final = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10)
 
 

@@ -65,7 +65,7 @@ class StorageWatch:
             while True:
                 try:
                     await self.look()
-                except Exception:  # whoever only watches must not end a process
+                except Exception:  # a fault in monitoring must not end a process
                     self.found = None
                     log.exception("storage was not looked at")
                 await anyio.sleep(_LOOK_S)
@@ -77,7 +77,7 @@ class StorageWatch:
             disk = await to_thread.run_sync(shutil.disk_usage, self._data, abandon_on_cancel=True)
         except OSError as error:
             log.warning("the disk of %s cannot be looked at: %s", self._data, error.strerror)
-            self.found = None  # what was once so is not what is
+            self.found = None  # an old measurement says nothing about now
             return
         if self._reads_backups:
             self.backups = await to_thread.run_sync(backup_state, self._data)

@@ -14,7 +14,7 @@ from action_assistant.settings import EVERYWHERE, LOOPBACK
 
 _ANYWHERE: Final = frozenset({"0.0.0.0", "::", EVERYWHERE})
 _LOOK_AGAIN_S: Final = 5.0
-#: Interfaces to containers and virtual machines of this computer: nobody comes by them.
+#: Interfaces to containers and virtual machines of this computer: no person uses them.
 _INNER: Final = ("docker", "br-", "veth", "virbr", "cni", "podman", "lxc", "lxd")
 
 

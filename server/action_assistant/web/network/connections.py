@@ -24,7 +24,7 @@ _MOST_STRANGERS: Final = 2_048
 _SILENT_S: Final = 10.0  # until a request has come, with a handshake before it
 _SWEEP_S: Final = 1.0
 _AT_ONCE: Final = 50  # accepted between two turns of the loop
-_LOOKED_AT: Final = 16  # of somebody's oldest ones, for one that nothing is being done for
+_LOOKED_AT: Final = 16  # oldest connections of a holder that are searched for an idle one
 _PAUSE_S: Final = 0.05  # when the system has no descriptor left
 
 Peer = tuple[str, int]
@@ -223,7 +223,10 @@ class Connections:
                 ssl=context,
                 ssl_handshake_timeout=_SILENT_S if context is not None else None,
             )
-        except (OSError, asyncio.CancelledError):  # gone before it was there, or no handshake
+        except (
+            OSError,
+            asyncio.CancelledError,
+        ):  # closed before it was open, or the handshake failed
             wire.close()
 
     def _keep(self, work: Coroutine[Any, Any, None]) -> None:

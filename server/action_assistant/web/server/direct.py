@@ -128,9 +128,9 @@ class DirectSocket(WebSocketProtocol):
         #: Bytes of a message of several frames that has begun; None where none has.
         self._in_pieces: int | None = None
         self._pieces = 0  # of that message
-        self._is_held = False  # its receiver wants to hear nothing now
+        self._is_held = False  # the receiver has paused reading
         self._held_until = 0.0  # in the time of the loop
-        self._waits = False  # until others had their turn
+        self._waits = False  # until other tasks had their turn
         self._late_ping: bytes | None = None  # the newest, of who reads nothing
         self._limit: Final = self.config.ws_max_size
 
@@ -165,7 +165,7 @@ class DirectSocket(WebSocketProtocol):
     def take_over(self, receiver: MessageReceiver) -> None:
         """Send every message to `receiver` from now on. Call it after the handshake."""
         self._receiver = receiver
-        self.scope["headers"] = []  # whoever is let in was asked for everything
+        self.scope["headers"] = []  # the headers were read before the socket was accepted
         self._go_on()
 
     def let_go(self) -> None:
@@ -266,7 +266,7 @@ class DirectSocket(WebSocketProtocol):
 
     def may_be_unread(self) -> bool:
         """Return whether the answer to the last ping may be received but not read yet."""
-        # What came while nobody listened takes its time also after that.
+        # Bytes that were received during the pause are handled in turns, too.
         was_held = self._is_held or self._held_until >= self.ping_sent_at
         return was_held or self._waits or super().may_be_unread()
 
@@ -286,7 +286,7 @@ class DirectSocket(WebSocketProtocol):
             if end > len(self._rest):
                 return
             frame = bytes(self._rest[:end])
-            del self._rest[:end]  # whoever hears it may have us go on
+            del self._rest[:end]  # the receiver may resume reading in this call
             self._deal_with(frame, start)
         else:
             self._waits = True
@@ -351,7 +351,7 @@ class DirectSocket(WebSocketProtocol):
         while self._receiver is not None and not self._is_held and not self.queue.empty():
             event = self.queue.get_nowait()
             if event["type"] == "websocket.receive":
-                self._read_on()  # the usual way has nobody read until this one is fetched
+                self._read_on()  # uvicorn reads nothing until this message was fetched
                 self._receiver.heard(event.get("bytes"))
             elif event["type"] == "websocket.disconnect":
                 self._receiver.gone()

@@ -159,7 +159,7 @@ def _describe(operation: dict[str, Any], handler: HTTPRouteHandler, types: "_Typ
         content = {"application/json": types.asked(kind)}
         operation["requestBody"] = {"content": content, "required": kind is body}
     answers = operation["responses"]
-    answers.pop("400", None)  # Litestar's own form of it, which nobody is told
+    answers.pop("400", None)  # Litestar's own form of it, which is never sent
     answers["default"] = {
         "description": "Refused",
         "content": {PROBLEM_JSON: types.answered(ProblemDetails)},

@@ -22,9 +22,9 @@ from action_assistant.public_url import RUNNER, Network
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.http.requests import PROXIED
 
-#: Under this name the state of a request has the path at which the page lies for whoever asks.
+#: The key, in the state of a request, of the path at which the client sees the page.
 MOUNT: Final = "mount"
-#: Under this name the state of a request has what wants to be told for whom a proxy asks.
+#: The key, in the state of a request, of the function to call with the address of a proxy's client.
 ASKED: Final = "asked"
 _CALLS: Final = frozenset({"http", "websocket"})
 _WITH_PORT: Final = re.compile(r"\[(.+)\](?::\d+)?|([0-9.]+):\d+")

@@ -218,7 +218,7 @@ class CallProcess:
         self._output = CallOutput(call.outputs)
         self._commands = bytearray()
         self._order = b""
-        self._wrong = ""  # why the call is killed
+        self._wrong = ""  # the reason for which the call is killed
         self._closed = False
         self._nudge = os.eventfd(0, os.EFD_NONBLOCK | os.EFD_CLOEXEC)
         self._thread = threading.Thread(target=self._live, name="behaviour", daemon=True)

@@ -90,7 +90,7 @@ class Supervisor:
         except BlockingIOError:
             return 0
         except OSError:
-            return len(text)  # the process has ended: nobody will read this
+            return len(text)  # the process has ended, and reads nothing more
 
     @property
     def patience(self) -> float | None:

@@ -256,7 +256,7 @@ class Ros2Link:
             try:
                 await self.get()
             except NoAnswer:
-                return  # the standing tells that
+                return  # `standing` shows that
         self._look()
 
     def listen(self, hear: Callable[[Report], None]) -> AbstractContextManager[None]:
