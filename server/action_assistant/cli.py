@@ -110,6 +110,11 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         described=True,
         posix=True,
     ),
+    "incident": CommandEntry(
+        "incident",
+        "keep a run from being archived, and write all that is known of it into one file",
+        described=True,
+    ),
     "service": CommandEntry(
         "services.service",
         "serve whenever the computer runs, by systemd: install, uninstall, status, upgrade",

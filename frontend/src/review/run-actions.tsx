@@ -5,13 +5,17 @@ import {
   IconChartBar,
   IconDownload,
   IconFlask,
+  IconLifebuoy,
   IconPrinter,
   IconRouteAltLeft,
 } from "@tabler/icons-react";
+import { useState } from "react";
 import { Link } from "wouter";
+import { useMay } from "../api/people";
 import { exportUrl } from "../api/review";
 import type { Run } from "../api/runs";
 import { stopwatch } from "../ui/times";
+import { IncidentDialog } from "./incident-dialog";
 import { dryRunMoment, dryRunUrl } from "./replay";
 import { type RepeatActions, RunMenu } from "./run-menu";
 import style from "./run-page.module.css";
@@ -57,38 +61,53 @@ function LinkButton({ to, name, icon: Icon, small = false }: LinkButtonProps) {
 }
 
 function ExportButton({ runner, run }: Pick<Props, "runner" | "run">) {
+  const [keeps, setKeeps] = useState(false);
+  const mayKeep = useMay("share");
   return (
-    <Menu position="bottom-end" withinPortal>
-      <Menu.Target>
-        <Button
-          variant="default"
-          aria-label="Export"
-          title="Export"
-          leftSection={<IconDownload size={15} aria-hidden />}
-          className={style.action ?? ""}
-        >
-          <span className={style.word}>Export</span>
-        </Button>
-      </Menu.Target>
-      <Menu.Dropdown>
-        {FORMATS.map(([format, label]) => (
-          <Menu.Item
-            key={format}
-            component="a"
-            href={runner === undefined ? undefined : exportUrl(runner, run.id, format)}
+    <>
+      <Menu position="bottom-end" withinPortal>
+        <Menu.Target>
+          <Button
+            variant="default"
+            aria-label="Export"
+            title="Export"
             leftSection={<IconDownload size={15} aria-hidden />}
+            className={style.action ?? ""}
           >
-            {label}
+            <span className={style.word}>Export</span>
+          </Button>
+        </Menu.Target>
+        <Menu.Dropdown>
+          {FORMATS.map(([format, label]) => (
+            <Menu.Item
+              key={format}
+              component="a"
+              href={runner === undefined ? undefined : exportUrl(runner, run.id, format)}
+              leftSection={<IconDownload size={15} aria-hidden />}
+            >
+              {label}
+            </Menu.Item>
+          ))}
+          <Menu.Item
+            leftSection={<IconPrinter size={15} aria-hidden />}
+            onClick={() => setTimeout(() => window.print(), 0)}
+          >
+            Record on paper (print or PDF)
           </Menu.Item>
-        ))}
-        <Menu.Item
-          leftSection={<IconPrinter size={15} aria-hidden />}
-          onClick={() => setTimeout(() => window.print(), 0)}
-        >
-          Record on paper (print or PDF)
-        </Menu.Item>
-      </Menu.Dropdown>
-    </Menu>
+          {mayKeep && (
+            <Menu.Item
+              leftSection={<IconLifebuoy size={15} aria-hidden />}
+              onClick={() => setKeeps(true)}
+            >
+              Keep as an incident …
+            </Menu.Item>
+          )}
+        </Menu.Dropdown>
+      </Menu>
+      {keeps && runner !== undefined && (
+        <IncidentDialog runner={runner} run={run} onClose={() => setKeeps(false)} />
+      )}
+    </>
   );
 }
 

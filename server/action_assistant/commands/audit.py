@@ -183,7 +183,7 @@ def _print_csv(rows: Iterable[AuditRow]) -> None:
 def csv_text(lines: Iterable[Iterable[object]]) -> str:
     """Return CSV in which no cell is taken for a formula."""
     out = io.StringIO()
-    writer = csv.writer(out)
+    writer = csv.writer(out, lineterminator="\n")
     for line in lines:
         writer.writerow([_cell(cell) for cell in line])
     return out.getvalue()

@@ -22,7 +22,7 @@ from action_assistant.schema.log_tables import NAMES, log_tables, written_by_tab
 
 RUNNER: Final = MetaData(naming_convention=NAMES)
 runner_event, runner_head, runner_snapshot = log_tables(RUNNER)
-written_by_table(RUNNER)
+runner_written_by: Final = written_by_table(RUNNER)
 #: Runs that ended badly: a list of them must not read all the others. Of an index, so word for word.
 FAILED: Final[ColumnElement[bool]] = literal_column(
     "(run.state IN ('error', 'refused', 'lost', 'halted') OR run.result = 'on_error')"

@@ -212,16 +212,20 @@ export interface RunnerApi {
         kind: "edits" | "graphs" | "other" | "people" | "refused" | "robots" | "sessions" | "starts" | "stops" | "strangers";
         event: string;
         text: string;
-        person?: RunnerApi["PersonRef"];
-        from?: RunnerApi["Origin"];
+        /** @default null */
+        person?: RunnerApi["PersonRef"] | null;
+        /** @default null */
+        from?: RunnerApi["Origin"] | null;
         /** @default  */
         graph?: string;
         /** @default  */
         graph_name?: string;
-        seq?: number;
+        /** @default null */
+        seq?: number | null;
         /** @default  */
         run?: string;
-        run_number?: number;
+        /** @default null */
+        run_number?: number | null;
         /** @default [] */
         robots?: string[];
     };
@@ -646,6 +650,17 @@ export interface RunnerApi {
         /** Format: date-time */
         at: string;
         body: unknown;
+    };
+    /**
+     * IncidentRequest
+     * @description The body of a request to keep a run as an incident. `editor_audit`: the rows of the editor's
+     *     audit about its graph, which the runner cannot ask for; they count as told by the client.
+     */
+    IncidentRequest: {
+        /** @default  */
+        reason?: string;
+        /** @default [] */
+        editor_audit?: RunnerApi["AuditRow"][];
     };
     /**
      * IndexFolderState
@@ -2039,6 +2054,9 @@ export interface RunnerPaths {
     "/api/runs/{run}/raw": {
         get: RunnerOperations["getRawMessages"];
     };
+    "/api/runs/{run}/incident": {
+        post: RunnerOperations["keepIncident"];
+    };
     "/api/comparison": {
         get: RunnerOperations["compareRuns"];
     };
@@ -2817,6 +2835,25 @@ interface RunnerOperations {
             200: {
                 content: {
                     "application/json": RunnerApi["RawMessages"];
+                };
+            };
+        };
+    };
+    keepIncident: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["IncidentRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/zip": string;
                 };
             };
         };

@@ -117,6 +117,16 @@ class RunArchived(msgspec.Struct, frozen=True):
     pieces: tuple[ArchivedPiece, ...] = ()
 
 
+class IncidentKept(msgspec.Struct, frozen=True, kw_only=True):
+    """An owner keeps a run as an incident: it is never archived."""
+
+    kind: ClassVar[str] = "run.incident_kept.v1"
+
+    at: int
+    author: Author
+    reason: str = ""
+
+
 def stream_about(run: str) -> str:
     """Return the name of the stream of annotations of a run."""
     return f"{_PREFIX}{run}"
@@ -127,9 +137,9 @@ def is_about(stream: str) -> bool:
     return stream.startswith(_PREFIX)
 
 
-def draft(event: Marked | SummedUp | RunArchived) -> Draft:
+def draft(event: Marked | SummedUp | RunArchived | IncidentKept) -> Draft:
     """Encode an annotation of a run for the journal."""
-    author = event.author.id if isinstance(event, Marked) else ""
+    author = event.author.id if isinstance(event, Marked | IncidentKept) else ""
     return draft_of(event, author)
 
 

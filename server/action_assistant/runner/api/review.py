@@ -22,12 +22,15 @@ from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import RawMessages
 from action_assistant.runner.archives.retention import SweepResult
+from action_assistant.runner.review import audit_facts
+from action_assistant.runner.review.incident import IncidentRequest, window
 from action_assistant.runner.review.service import RunMarks
 from action_assistant.runner.review.stored_runs import CauseShown, Format, StoredRuns
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.start.admission import decoded
 from action_assistant.umrf.json.text import UmrfGraph
+from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.server.openapi import FileBytes, answer, reads
 
@@ -53,6 +56,10 @@ class ScriptRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     umrf: SentGraph
     action: str | None = None
     fault: expected_runs.Fault | None = None
+
+
+#: Bytes of a request that brings the audit of the editor along.
+_INCIDENT_BODY: Final = 4_000_000
 
 
 class ArchiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -184,7 +191,35 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         text = await services.worker_queries.text(StoredRuns.raw, run, here, utc_us())
         return json_of(text, RawMessages)
 
-    return [film, found_causes, umrf, marks, mark, script, fit, export, raw]
+    return [film, found_causes, umrf, marks, mark, script, fit, export, raw, _incident(services)]
+
+
+def _incident(services: RunnerServices) -> ControllerRouterHandler:
+    @post(
+        "/api/runs/{run:str}/incident",
+        operation_id="keepIncident",
+        status_code=200,
+        summary="Keep a run from being archived, and get all that is known of it as a ZIP file",
+        guards=[Needs("share")],
+        responses={200: answer(FileBytes, media="application/zip")},
+        request_max_body_size=_INCIDENT_BODY,
+    )
+    async def incident(run: str, data: IncidentRequest, request: _Asking) -> Response[bytes]:
+        found = await services.control.find(run)
+        author, now = author_of(request), utc_us()
+        await services.review_service.keep_incident(run, data.reason, author)
+        since, until = window(found.requested_at, found.ended_at, now)
+        wanted = AuditFilter(since=since, until=until, limit=1000)
+        audit = await services.run_in_worker(
+            audit_facts.rows_in_worker, services.journal.address, wanted
+        )
+        content = await services.worker_queries.value(
+            StoredRuns.incident_file, run, data, author.name or author.id, now, audit
+        )
+        head = {"content-disposition": f'attachment; filename="incident-{found.number}.zip"'}
+        return Response(content, media_type="application/zip", headers=head)
+
+    return incident
 
 
 async def _lines(queries: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:

@@ -15,7 +15,7 @@ from typing import Any, Final
 
 import anyio
 import msgspec
-from sqlalchemy import Row, Select, exists, literal, or_, select
+from sqlalchemy import ColumnElement, Row, Select, exists, literal, or_, select
 
 from action_assistant.errors import Conflict, Refused
 from action_assistant.journal.events import Addition
@@ -147,8 +147,8 @@ class Retention:
             )
             return Addition(annotations.stream_about(row.id), (annotations.draft(archived),))
 
-        if await self._journal.query(_pinned(row.id)):
-            raise Conflict("Somebody has pinned it meanwhile.")
+        if await self._journal.query(_kept(row.id)):
+            raise Conflict("Somebody has pinned it, or keeps it as an incident, meanwhile.")
         self._may_be_unfinished = True
         by = await self._journal.take_out(removed, recorded, parts=parts)
         for number, each in enumerate((removed, *parts), by):
@@ -236,14 +236,24 @@ def _due(before: int, most: int) -> Select[Any]:
             run.c.ended_at < before,
             review.c.summed,
             or_(review.c.pinned.is_(None), ~review.c.pinned),
+            ~_is_incident(run.c.id),
         )
         .order_by(run.c.ended_at)
         .limit(most)
     )
 
 
-def _pinned(run_id: str) -> Select[Any]:
-    return select(review.c.run).where(review.c.run == run_id, review.c.pinned)
+def _kept(run_id: str) -> Select[Any]:
+    """Return the query for a run that is never archived: pinned, or kept as an incident."""
+    pinned = exists().where(review.c.run == run.c.id, review.c.pinned)
+    return select(run.c.id).where(run.c.id == run_id, or_(pinned, _is_incident(run.c.id)))
+
+
+def _is_incident(run_id: ColumnElement[str]) -> ColumnElement[bool]:
+    """Return whether an owner keeps a run as an incident, by the events about it."""
+    stream = literal(annotations.stream_about("")) + run_id
+    event = runner_event.c
+    return exists().where(event.stream == stream, event.kind == annotations.IncidentKept.kind)
 
 
 def _unfinished() -> Select[Any]:

@@ -15,7 +15,14 @@ from action_assistant.runner.runs.history import whole_of
 from action_assistant.schema.runner_tables import run as runs
 from action_assistant.web.audit import events as audit
 from action_assistant.web.audit.facts import described
-from action_assistant.web.audit.rows import AuditFilter, AuditKind, AuditPage, Fact, audit_page
+from action_assistant.web.audit.rows import (
+    AuditFilter,
+    AuditKind,
+    AuditPage,
+    AuditRow,
+    Fact,
+    audit_page,
+)
 from action_assistant.web.auth.caller import Origin
 from action_assistant.web.auth.keys import PersonRef
 
@@ -30,6 +37,7 @@ _NEVER: Final = (
 )
 #: Authors that are no people: an arrow of a graph, or the runner itself, stops a step.
 _NOBODY: Final = frozenset({"graph", "runner"})
+_MOST: Final = 20_000  # rows of one list
 _OUTCOMES: Final = {"on_true": "true", "on_false": "false", "on_error": "error"}
 
 
@@ -77,6 +85,7 @@ _SAID: Final[Mapping[str, tuple[AuditKind, str]]] = {
     "run.released.v1": ("starts", "let the held {run} go on"),
     "run.handed_over.v1": ("robots", "handed {run} over"),
     "run.marked.v1": ("starts", "marked {run}"),
+    "run.incident_kept.v1": ("starts", "keeps {run} as an incident"),
     "expectation.saved.v1": ("starts", "saved the expected course {name}"),
     "expectation.retired.v1": ("starts", "removed the expected course {name}"),
     "robot.registered.v1": ("robots", "registered {robot}, or changed its registration"),
@@ -249,3 +258,21 @@ def page_in_worker(address: str, wanted: AuditFilter) -> bytes:
     Raise Unavailable if it cannot be read."""
     question: Callable[[Connection], AuditPage] = partial(page, wanted)
     return msgspec.json.encode(ask_from_worker(address, question))
+
+
+def rows_in_worker(address: str, wanted: AuditFilter) -> bytes:
+    """Return the newest `_MOST` rows of the audit of the runner as a JSON list. `address`: the URL of
+    the runner's database. For workers. Raise Unavailable if it cannot be read."""
+
+    def rows(connection: Connection) -> list[AuditRow]:
+        found: list[AuditRow] = []
+        before: int | None = None
+        while len(found) < _MOST:
+            now = page(msgspec.structs.replace(wanted, before=before), connection)
+            found += now.rows
+            before = now.before
+            if before is None:
+                break
+        return found
+
+    return msgspec.json.encode(ask_from_worker(address, rows))

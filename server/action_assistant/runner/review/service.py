@@ -70,6 +70,14 @@ class ReviewService:
         await self._journal.append(annotations.stream_about(run_id), [annotations.draft(marked)])
         return await self.marks(run_id)
 
+    async def keep_incident(self, run_id: str, reason: str, author: Author) -> None:
+        """Keep a run as an incident, so that it is never archived. Raise NotFound if there is no such
+        run, Unavailable if the journal cannot be written."""
+        if not await self._journal.newest(stream_of(run_id)):
+            raise NotFound("There is no such run.")
+        kept = annotations.IncidentKept(at=self._clock_us(), author=author, reason=reason.strip())
+        await self._journal.append(annotations.stream_about(run_id), [annotations.draft(kept)])
+
     async def marks(self, run_id: str) -> RunMarks:
         """Return the marks of a run: pin, note and labels."""
         rows = await self._journal.query(select(review).where(review.c.run == run_id))

@@ -8,6 +8,7 @@ import msgspec
 from sqlalchemy import ColumnElement, Row, Select, select
 
 from action_assistant.errors import BadInput, Conflict, NotFound
+from action_assistant.journal.chain import NOTHING, Head
 from action_assistant.journal.events import Event
 from action_assistant.runner.analysis import annotations, expected_runs, exports, statistics
 from action_assistant.runner.analysis.cause_texts import cause_sentence
@@ -23,19 +24,29 @@ from action_assistant.runner.archives.raw_messages import (
     raw_of,
     stream_of_raw,
 )
+from action_assistant.runner.review import incident
+from action_assistant.runner.review.incident import IncidentRequest
 from action_assistant.runner.robots.recordings import Recording, hours
+from action_assistant.runner.robots.robot_events import stream_of_robot
 from action_assistant.runner.runs import queries, views, word_index
 from action_assistant.runner.runs.events import Author, Observed, decode, said_in
 from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import Sent, SentSubgraph, read_sent, sent_of
-from action_assistant.schema.runner_tables import expectation, runner_event
+from action_assistant.schema.runner_tables import (
+    expectation,
+    robot,
+    runner_event,
+    runner_head,
+    runner_written_by,
+)
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from action_assistant.web.auth.caller import without_origin
 
 _LAST: Final = 1_000  # runs in one statistics
+_NEAR: Final = 20_000  # events of a robot in the file of an incident
 _CAUSES: Final = 10  # in one answer
 _ROWS: Final = 400  # parameters of one query
 _PAGE: Final = 500  # events read at once
@@ -246,6 +257,78 @@ class StoredRuns:
             ]
             return exports.mcap(events, pieces)
         return b"".join(exports.lines(run_id, events))
+
+    async def incident_file(
+        self, run_id: str, asked: IncidentRequest, author: str, now: int, audit: bytes
+    ) -> bytes:
+        """Return all that is known of a run as a ZIP file. `author`: the name of the person who makes
+        it; `now`: µs UTC; `audit`: the rows of the audit in that time, as JSON. Raise NotFound if
+        there is no such run, TooLarge if that is too much for one file."""
+        found, first = await self.known(run_id), await self._history.requested(run_id)
+        parts: dict[str, bytes] = {}
+        proofs: list[incident.StreamProof] = []
+        for each in (run_id, *await self._journal.pieces(run_id)):
+            events = await self._journal.read(stream_of(each))
+            lines, end = incident.event_lines(events)
+            parts[f"events/{len(proofs):03d}.jsonl"] = lines
+            proofs.append(incident.proof_of(stream_of(each), end, await self._end(each)))
+        graphs = list(incident.graph_files(first))
+        for number, (_, _, umrf) in enumerate(graphs):
+            parts[f"graphs/{number:03d}.umrf.graph.json"] = umrf.encode()
+        since, until = incident.window(first.at, found.ended_at, now)
+        robots = [await self._robot_facts(each, since, until) for each in found.robots]
+        parts["robots.json"] = msgspec.json.format(msgspec.json.encode(robots))
+        parts["audit.json"] = audit
+        parts["audit-of-editor.json"] = msgspec.json.encode(asked.editor_audit)
+        writers = await self.rows(select(runner_written_by).order_by(runner_written_by.c.since))
+        return incident.packed(
+            incident.Incident(
+                run=run_id,
+                number=found.number,
+                made_at=incident.made_at(now),
+                made_by=author,
+                reason=asked.reason.strip(),
+                is_over=found.end is not None,
+                graph_name=first.graph_name,
+                version=first.version,
+                digest=first.digest,
+                engine=first.engine,
+                robots=tuple(found.robots),
+                graphs=tuple((name, digest) for name, digest, _ in graphs),
+                streams=tuple(proofs),
+                software=incident.software([row._asdict() for row in writers]),
+            ),
+            parts,
+        )
+
+    async def _end(self, run_id: str) -> Head:
+        """Return the end of the stream of a run as the log has it, also of an archived one."""
+        head = runner_head.c
+        rows = await self.rows(select(head.seq, head.chain).where(head.stream == stream_of(run_id)))
+        return Head(rows[0].seq, bytes(rows[0].chain)) if rows else NOTHING
+
+    async def _robot_facts(self, name: str, since: int, until: int) -> incident.RobotFacts:
+        """Return the registration of a robot, and what was recorded of it in a time (µs UTC)."""
+        registered = await self.rows(select(robot).where(robot.c.name == name))
+        event = runner_event.c
+        near = select(
+            event.stream, event.seq, event.kind, event.author, event.at, event.body
+        ).where(
+            event.stream.in_((stream_of_robot(name), stream_of_raw(name))),
+            event.at >= since,
+            event.at <= until,
+        )
+        rows = await self.rows(near.order_by(event.position).limit(_NEAR))
+        return incident.RobotFacts(
+            name,
+            registered[0]._asdict() if registered else None,
+            tuple(
+                incident.RobotLine(
+                    row.stream, row.seq, row.kind, row.author, row.at, incident.body_of(row.body)
+                )
+                for row in rows
+            ),
+        )
 
     async def lines(self, run_id: str, after: int) -> tuple[int, bytes]:
         """Return a page of the stored events after number `after`, as lines of JSON, and the number
