@@ -182,6 +182,7 @@ def print_json(value: object) -> None:
 
 
 def refused(why: str) -> int:
-    """Print why a part of a command was refused, and return its exit code. Other refusals are raised."""
+    """Print the reason `why` for which a part of a command was refused, and return the exit code of
+    the command (1)."""
     print(f"action-assistant: {why}", file=sys.stderr)
     return 1

@@ -36,8 +36,8 @@ class Directory(Protocol):
         """Return the status of the entry `name`; of a link the status of the link itself."""
 
     def below(self, name: str, *, make: bool) -> "Directory":
-        """Open the folder `name` inside this one; with `make` create it if it is missing. The
-        caller closes it."""
+        """Open the folder `name` inside this one and return it; with `make` create it if it is
+        missing. The caller closes it."""
 
     def read(self, name: str) -> tuple[bytes, int]:
         """Return the content and the mode (permissions) of the file `name`."""
@@ -69,8 +69,8 @@ class Directory(Protocol):
 
 
 def opened(root: Path) -> Directory:
-    """Open the existing folder `root`, whose own path may lead through a symbolic link. Raise
-    OSError if it cannot be opened."""
+    """Open the existing folder `root`, and return it. Its own path may lead through a symbolic
+    link. Raise OSError if it cannot be opened."""
     return HeldDirectory.opened(root) if HOLDS else NamedDirectory.opened(root)
 
 
@@ -82,7 +82,7 @@ class HeldDirectory:
 
     @classmethod
     def opened(cls, root: Path) -> Self:
-        """Open the folder at the path `root`. Raise OSError if it cannot be opened."""
+        """Open the folder at the path `root`, and return it. Raise OSError if it cannot be opened."""
         return cls(os.open(root, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC))
 
     def names(self) -> list[str]:
@@ -94,7 +94,8 @@ class HeldDirectory:
         return os.stat(_component(name), dir_fd=self._at, follow_symlinks=False)
 
     def below(self, name: str, *, make: bool) -> Self:
-        """Open the subdirectory `name`; with `make` create it first. Raise OSError for a link."""
+        """Open the subdirectory `name` and return it; with `make` create it if it is missing. Raise
+        OSError for a link."""
         _component(name)
         if make:
             with suppress(FileExistsError):
@@ -112,8 +113,8 @@ class HeldDirectory:
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write a new file as the protocol says, and flush it to disk. Raise FileExistsError where
-        the name is taken."""
+        """Write a new file as `Directory.write_new` says, and flush it to disk. Raise
+        FileExistsError if the name is taken."""
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
         at_first = 0o666 if mode is None else 0o600
         file = os.open(_component(name), flags, at_first, dir_fd=self._at)
@@ -182,7 +183,8 @@ class NamedDirectory:
         return (self._path / _component(name)).lstat()
 
     def below(self, name: str, *, make: bool) -> Self:
-        """Open the subdirectory `name`; with `make` create it first. Raise OSError for a link."""
+        """Open the subdirectory `name` and return it; with `make` create it if it is missing. Raise
+        OSError for a link."""
         path = self._path / _component(name)
         if make:
             path.mkdir(exist_ok=True)
@@ -204,8 +206,8 @@ class NamedDirectory:
     def write_new(
         self, name: str, content: bytes, mode: int | None, owner: Owner | None = None
     ) -> None:
-        """Write a new file as the protocol says. `owner` is ignored, since this system has no such
-        owners."""
+        """Write a new file as `Directory.write_new` says. `owner` is ignored, since this system has
+        no such owners."""
         path = self._path / _component(name)
         try:
             with path.open("xb") as out:

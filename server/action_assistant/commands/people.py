@@ -94,7 +94,8 @@ def _show(origins: Sequence[str], invitation: "Invitation") -> None:
 
 
 def _revoke(options: argparse.Namespace) -> int:
-    """Revoke a link on both processes, or in the data folder where no server answers."""
+    """Revoke a link on both processes, or in the data folder if no server answers. Return the exit
+    code."""
     try:
         with running(options) as server:
             return _revoke_at(server, options.id)

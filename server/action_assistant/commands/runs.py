@@ -190,8 +190,8 @@ def _verdicts(server: Server, options: argparse.Namespace) -> Iterator[VerifyVer
 
 
 def _now(server: Server, each: "Expectation", graph: str) -> VerifyVerdict:
-    """Compare an expected run (`each`) with the present state of its graph (an id); the verdict is
-    negative if the graph does not exist any more."""
+    """Compare an expected run (`each`) with the present state of its graph (an id), and return the
+    verdict; it is negative if the graph does not exist any more."""
     try:
         umrf = server.editor("GET", f"/api/graphs/{graph}/umrf").content
     except RequestRefused as error:

@@ -230,9 +230,7 @@ def sweep(parent: Path, prefix: str) -> None:
         except OSError:
             continue  # it was just removed, or is another user's
         try:
-            if posix.lock_file(
-                held
-            ):  # held until all is removed, in case another call begins there
+            if posix.lock_file(held):  # until all is removed, in case another call begins there
                 shutil.rmtree(left, ignore_errors=True)
         finally:
             os.close(held)

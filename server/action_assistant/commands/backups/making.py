@@ -63,8 +63,9 @@ class FinishedBackup(msgspec.Struct, frozen=True):
 def make_backup(
     data: Path, database: str | None, target: Path, progress: Progress
 ) -> FinishedBackup:
-    """Write a backup of a data folder to the file `target`. `database`: the URL of the graphs, None
-    for the folder's own. Raise CannotStart if that fails; no file is left then."""
+    """Write a backup of a data folder to the file `target`, and return its contents and findings.
+    `database`: the URL of the graphs, None for the folder's own. Raise CannotStart if that fails;
+    no file is left then."""
     begun, at, sources = time.monotonic(), time.time(), _sources(data, database)
     _check_room(data, sources, target.parent)
     with workshop(target.parent, WORK) as folder:

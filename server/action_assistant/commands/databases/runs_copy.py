@@ -88,7 +88,8 @@ async def once(copier: "RunsCopier", name: str) -> int:
 
 
 async def followed(copier: "RunsCopier") -> int:
-    """Copy new events again and again, until cancelled; wait and retry while the database is away."""
+    """Copy new events again and again, and wait and retry while the database is away. It never
+    returns, but closes `copier` when it is cancelled."""
     away = False
     try:
         while True:

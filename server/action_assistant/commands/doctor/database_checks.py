@@ -342,7 +342,7 @@ def span(seconds: float) -> str:
 
 def _on_server(data: Path, url: str) -> Iterator[Diagnostic]:
     """Check that the database `url` on a server answers, stores commits durably, and has the graphs
-    of the data folder."""
+    of the data folder. Yield the findings."""
     shown = database_location.shown(url)
     database = database_of(url)
     try:

@@ -229,8 +229,8 @@ def robots_answer(place: Installation) -> Iterator[Diagnostic]:
 
 
 def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
-    """Warn of engines, on this computer, of registered robots that index their folders again while
-    they run: such an engine may crash at a get or start (hazard H15)."""
+    """Yield a warning for each engine, on this computer, of a registered robot that indexes its
+    folders again while it runs: such an engine may crash at a get or start (hazard H15)."""
     robots = {each.name: each for each in _registered(place.data)}
     for pid, words in _engines() if robots else ():
         name = argument(words, "--actor-name")
@@ -247,7 +247,8 @@ def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
 
 
 def robots_have_names(place: Installation) -> Iterator[Diagnostic]:
-    """Warn of a robot that was registered under the name that now stands for conducted runs."""
+    """Yield a warning for a robot that was registered under the name that now stands for conducted
+    runs."""
     if any(each.name == CONDUCTED for each in _registered(place.data)):
         yield found(
             "robot-name",

@@ -39,7 +39,7 @@ _HOST: Final = re.compile(r"[A-Za-z0-9_.:\[\]-]+")
 
 
 def settings_mean_something(place: Installation) -> Iterator[Diagnostic]:
-    """Check the values of all environment variables of this program."""
+    """Check the values of all environment variables of this program; yield the findings."""
     del place
     given = {name: value for name, value in os.environ.items() if name.startswith(_PREFIX)}
     problems = [each for name in sorted(given) for each in _setting(name, given[name])]
@@ -154,7 +154,7 @@ _ASSET: Final = re.compile(r'(?:src|href)="\.?/?(assets/[^"]+)"')
 
 
 def program(place: Installation) -> Iterator[Diagnostic]:
-    """Report the versions of this program, of Python and of SQLite; never a fault."""
+    """Yield the versions of this program, of Python and of SQLite; never a fault."""
     del place
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     yield fine(
@@ -165,7 +165,7 @@ def program(place: Installation) -> Iterator[Diagnostic]:
 
 def page_is_built(place: Installation) -> Iterator[Diagnostic]:
     """Check that the built page is there and complete and, in a checkout, not older than its
-    sources."""
+    sources. Yield the findings."""
     del place
     folder = paths.page()
     index = folder / "index.html"
@@ -215,7 +215,7 @@ def _newer_source(built: float) -> Path | None:
 
 
 def descriptors_suffice(place: Installation) -> Iterator[Diagnostic]:
-    """Check that a process may have enough files and connections open."""
+    """Check that a process may have enough files and connections open; yield the finding."""
     del place
     most = posix.descriptors_allowed()
     if most < _DESCRIPTORS:
@@ -232,8 +232,8 @@ def descriptors_suffice(place: Installation) -> Iterator[Diagnostic]:
 
 
 def clock_is_possible(place: Installation) -> Iterator[Diagnostic]:
-    """Check that the clock of this computer is not earlier than the files of this program. Other
-    checks compare it with events and processes."""
+    """Check that the clock of this computer is not earlier than the files of this program; yield
+    the finding. Other checks compare it with events and processes."""
     del place
     newest = max(each.stat().st_mtime for each in Path(__file__).parent.glob("*.py"))
     if time.time() < newest - 86_400:
@@ -249,7 +249,7 @@ def clock_is_possible(place: Installation) -> Iterator[Diagnostic]:
 
 def shared_memory_is_there(place: Installation) -> Iterator[Diagnostic]:
     """Check that the shared memory that workers and ROS 2 use on Linux can be written and has
-    space."""
+    space. Yield the findings."""
     del place
     if not sys.platform.startswith("linux"):
         return
@@ -284,7 +284,7 @@ _SHOWN: Final = 5
 
 
 def backups_are_made(place: Installation) -> Iterator[Diagnostic]:
-    """Check that backups of the data folder exist and are not late."""
+    """Check that backups of the data folder exist and are not late; yield the findings."""
     state, where, now = backup_state(place.data), place.data / backups.FILE, time.time()
     if state is None:
         message = "What is known of backups cannot be read."
@@ -338,7 +338,8 @@ def _day(at: float) -> str:
 
 
 def folder_is_ours(place: Installation) -> Iterator[Diagnostic]:
-    """Check that the current user can use the data folder, and that no other user can."""
+    """Check that the current user can use the data folder, and that no other user can. Yield the
+    findings."""
     data = place.data
     if not data.exists():
         if blocked := _blocked(data):
@@ -425,7 +426,8 @@ def _listed(data: Path, paths: list[Path]) -> str:
 
 
 def token_is_there(place: Installation) -> Iterator[Diagnostic]:
-    """Check that a data folder that was served has a token, unless the environment gives one."""
+    """Check that a data folder that was served has a token, unless the environment gives one. Yield
+    the finding."""
     data, token = place.data, place.data / TOKEN_FILE
     served = any(
         (data / name).exists()
@@ -460,7 +462,8 @@ def token_is_there(place: Installation) -> Iterator[Diagnostic]:
 
 
 def nothing_was_interrupted(place: Installation) -> Iterator[Diagnostic]:
-    """Report a restore that was interrupted, after which no process of this program starts."""
+    """Yield a finding for a restore that was interrupted, after which no process of this program
+    starts."""
     mark = place.data / settings.RESTORING
     if mark.exists():
         yield found(
@@ -472,7 +475,8 @@ def nothing_was_interrupted(place: Installation) -> Iterator[Diagnostic]:
 
 
 def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
-    """Check that the folder of archives, if it exists, can be read and written, or else be created."""
+    """Check that the folder of archives, if it exists, can be read and written, or else be created.
+    Yield the findings."""
     try:
         folder = settings.keep(place.data).folder
     except CannotStart:  # reported with the settings
@@ -504,7 +508,8 @@ def archive_is_usable(place: Installation) -> Iterator[Diagnostic]:
 
 
 def disk_has_room(place: Installation) -> Iterator[Diagnostic]:
-    """Check the free space on the disks of the data folder and of the folder of archives."""
+    """Check the free space on the disks of the data folder and of the folder of archives; yield the
+    findings."""
     folders = [place.data]
     with suppress(CannotStart):  # reported with the settings
         folders.append(settings.keep(place.data).folder)

@@ -199,13 +199,12 @@ _UPGRADE: Final = {
 
 
 def proxy_leads_here(place: Installation) -> Iterator[Diagnostic]:
-    """Check that the public address of `place` leads to both processes. No secret is sent."""
+    """Check that the public address of `place` leads to both processes; yield the findings. No
+    secret is sent."""
     try:
         public = reached(place.public_url, None).public
     except CannotStart as error:
-        if (
-            place.public_url is not None
-        ):  # an address in the environment is reported with the settings
+        if place.public_url is not None:  # that of the environment is reported with the settings
             yield found("setting-wrong", "--public-url", str(error), "Correct it.")
         return
     if public is None:
@@ -276,7 +275,7 @@ _CLOCK_S: Final = 5.0
 
 def processes_fit(place: Installation) -> Iterator[Diagnostic]:
     """Check which programs listen at the ports of the editor and the runner, and which hold the
-    databases of `place`."""
+    databases of `place`. Yield the findings."""
     for name, port in place.processes:
         where = f"{place.host}:{port}"
         answer = at_port(place.host, port)

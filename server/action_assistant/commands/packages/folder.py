@@ -241,8 +241,9 @@ class PackagesPlan(msgspec.Struct, frozen=True):
 
 
 def plan(root: Path, packages: Mapping[str, Mapping[str, bytes]]) -> PackagesPlan:
-    """Plan how generated packages go into the folder `root`. `packages`: contents by package folder
-    and path. Raise CannotStart if a folder cannot be read."""
+    """Return the changes by which generated packages go into the folder `root`; nothing is written.
+    `packages`: contents by package folder and path. Raise CannotStart if a folder cannot be read.
+    """
     regenerations: dict[str, Regeneration] = {}
     there: dict[str, bytes] = {}
     barred: dict[str, str] = {}

@@ -246,10 +246,10 @@ class Catalogue:
         return await self._add(document_edits.first(graph), info, [created], author, came)
 
     async def add_draft(self, origin: str, seq: int, name: str, author: str) -> GraphView:
-        """Make a draft of the graph `origin` called `name`: a new graph with the content that
-        `origin` had after its change `seq`, under the same keys. Comments are not copied. Raise
-        NotFound if there is no such graph, Conflict if it has no such change, and Unavailable if
-        the log cannot be read or written."""
+        """Make a draft of the graph `origin` called `name`, and return it: a new graph with the
+        content that `origin` had after its change `seq`, under the same keys. Comments are not
+        copied. Raise NotFound if there is no such graph, Conflict if it has no such change, and
+        Unavailable if the log cannot be read or written."""
         row = await self._row(origin, kind="graph")
         then = await self._graph_reader.at(origin, seq)
         update, about = await self._graph_reader.ask(drafted, then)
@@ -267,9 +267,9 @@ class Catalogue:
         author: str,
         file: Draft | None = None,
     ) -> GraphView:
-        """Store a new graph. `update`: its document as one Yjs update; `of`: facts for lists;
-        `about`: events about it. A large `file` is stored before it in a commit of its own, since
-        edits of others wait for every commit."""
+        """Store a new graph, and return it as lists show it. `update`: its document as one Yjs
+        update; `of`: facts for lists; `about`: events about it. A large `file` is stored before it
+        in a commit of its own, since edits of others wait for every commit."""
         made = random_id()
         document = Draft(h.UPDATED, author, update)
         if file is not None and len(file.body) > _LARGE_FILE:

@@ -229,9 +229,9 @@ class GraphChecks:
         return found or self._uses.put(key, await self._reader.ask(contents.names, sight))
 
     async def _resolved(self, own: str, uses: Iterable[str]) -> NamedInside:
-        """Find the graphs inside of the graph called `own`, level by level, by the names of its
-        actions (`uses`). An action with the name of the graph that contains it is an ordinary
-        action, since no engine runs a graph inside itself."""
+        """Return the graphs inside of the graph called `own`, which are found level by level by the
+        names of its actions (`uses`). An action with the name of the graph that contains it is an
+        ordinary action, since no engine runs a graph inside itself."""
         found: dict[str, _Member] = {}
         hidden: set[str] = set()
         level, actions, cut = [(own, uses)], 0, False

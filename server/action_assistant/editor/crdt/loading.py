@@ -383,9 +383,9 @@ async def _followed(
     learn: bool,
     run_in_worker: RunInWorker,
 ) -> Stored:
-    """Apply the events of a stream after a snapshot, up to the event `upto` (None: all), to it;
-    without a snapshot, to an empty document. A snapshot that turns out to be unreadable is ignored.
-    `learn`: also collect what only editing needs."""
+    """Return the document of a stream: its snapshot, or an empty document without one, after the
+    events that follow up to the event `upto` (None: all). A snapshot that turns out to be
+    unreadable is ignored. `learn`: also collect what only editing needs."""
     start, document = (0, b"") if snapshot is None else (snapshot.seq, snapshot.state)
     tail = LogTail(journal, stream, start, upto)
     while events := await tail.next():

@@ -61,7 +61,7 @@ class EventColumns(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, events: Iterable[Event]) -> "EventColumns":
-        """Make columns of events; there must be at least one."""
+        """Return events, at least one, as columns."""
         rows = [(each.seq, each.kind, each.author, each.body) for each in events]
         seqs, kinds, authors, bodies = (list(column) for column in zip(*rows, strict=True))
         return cls(seqs[0], kinds, authors, bodies)
@@ -549,8 +549,8 @@ class ReplicaState(msgspec.Struct, frozen=True, array_like=True):
 
     @staticmethod
     def packed(kept: bytes) -> bytes:
-        """Compress a large encoded snapshot; all edits wait while the writer stores it. Slow: call
-        it on a thread or in a worker."""
+        """Return a large encoded snapshot compressed, since all edits wait while the writer stores
+        it. Slow: call it on a thread or in a worker."""
         return packed(kept, least=_LARGE)
 
     @staticmethod

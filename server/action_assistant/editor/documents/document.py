@@ -94,8 +94,8 @@ def read_maps(maps: Mapping[str, Mapping[str, object]]) -> Graph:
 
 
 def _owners(fields: Fields) -> dict[str, dict[str, object]]:
-    """Group fields by the part of their key before the first `|`; the inner keys are the parts
-    after it."""
+    """Return fields grouped by the part of their key before the first `|`; the inner keys are the
+    parts after it."""
     owners: dict[str, dict[str, object]] = defaultdict(dict)
     for key, value in fields.items():
         head, bar, rest = key.partition("|")

@@ -203,8 +203,8 @@ def keys_of(owner: str, field: str) -> Sequence[tuple[Root, str]]:
 
 
 def in_one_go(changes: Iterable[LoggedChange], alone: Set[int] = frozenset()) -> list[LoggedChange]:
-    """Combine consecutive changes of one key by one person, unless a change is in `alone`. A change
-    that was undone soon is dropped."""
+    """Return changes with consecutive ones of one key by one person combined, unless they are in
+    `alone` (numbers of changes). A change that was undone soon is dropped."""
     found: list[LoggedChange] = []
     for change in changes:
         last = found[-1] if found else None

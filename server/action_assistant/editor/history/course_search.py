@@ -85,8 +85,9 @@ def followed_between(
     named_at: int,
     inside: Inside,
 ) -> Followed:
-    """Search the changes of a graph between its changes `good` and `bad`, as `followed` does. Raise
-    TooLarge if there are more than `limit`. `script`, `named_at`, `inside`: as in `followed`."""
+    """Return the changes between the changes `good` and `bad` of a graph at which its simulated
+    course changes, as `followed` does. Raise TooLarge if there are more than `limit`. `script`,
+    `named_at`, `inside`: as in `followed`."""
     changes = stretch_of(connection, graph, good, bad, limit)
     base = index_queries.at(connection, graph, good)
     return followed(base, changes, script, named_at, inside=inside)
@@ -100,10 +101,11 @@ def followed(
     budget_s: float = _BUDGET_S,
     inside: Inside = NOTHING_INSIDE,
 ) -> Followed:
-    """Find the changes after which the simulated course of a graph differs from the first one, for
-    at most `budget_s` seconds of processor time. `changes`: in order of time. `base`: the value of
-    each key before them. `script`: how the actions act. `named_at`: the change after which actions
-    had the names in `script`. `inside`: the graphs inside, the same for every change."""
+    """Return the changes after which the simulated course of a graph differs from the first one;
+    search for at most `budget_s` seconds of processor time. `changes`: in order of time. `base`:
+    the value of each key before them. `script`: how the actions act. `named_at`: the change after
+    which actions had the names in `script`. `inside`: the graphs inside, the same for every change.
+    """
     past = _Past(base, changes, script, named_at, graphs_of(inside))
     if not past.moments:
         return Followed(True, True, 1, ())

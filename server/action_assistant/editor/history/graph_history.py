@@ -64,8 +64,8 @@ class EditSession(msgspec.Struct, frozen=True):
 
 
 def edit_sessions(steps: Iterable[Step]) -> list[EditSession]:
-    """Group steps, which are in order of time, into sessions, sorted by their ends. A step that is
-    no edit ends all open sessions, since it may refer to the document at that time."""
+    """Return steps, which are in order of time, grouped into sessions, sorted by their ends. A step
+    that is no edit ends all open sessions, since it may refer to the document at that time."""
     done: dict[int, EditSession] = {}
     open_of: dict[str, int] = {}
     seq = 1

@@ -366,7 +366,8 @@ def is_place_of_card(place: Place) -> bool:
 
 
 def by_owner(places: Iterable[Place]) -> dict[str, list[Place]]:
-    """Group places (root map and key) by the action, arrow or note that they describe (`owner_of`)."""
+    """Return places (root map and key) grouped by the action, arrow or note that they describe
+    (`owner_of`)."""
     found: dict[str, list[Place]] = defaultdict(list)
     for place in places:
         found[owner_of(*place)].append(place)

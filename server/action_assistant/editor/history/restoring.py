@@ -220,9 +220,9 @@ class Restoring:
         self._run_in_worker = run_in_worker
 
     async def restore(self, graph: str, author: str, seq: int) -> GoneBack:
-        """Restore a graph to its state after the change `seq`, in the name of `author`. Raise
-        NotFound for an unknown graph, Conflict for an unknown change, Unavailable if the journal
-        cannot be read or written."""
+        """Restore a graph to its state after the change `seq`, in the name of `author`; return its
+        last change then. Raise NotFound for an unknown graph, Conflict for an unknown change,
+        Unavailable if the journal cannot be read or written."""
         then = await self._graph_reader.at(graph, seq)
         async with self._rooms.enter(h.graph_stream(graph)) as room:
             before = room.seq
@@ -233,8 +233,9 @@ class Restoring:
 
     async def restore_one(self, graph: str, author: str, seq: int, owner: str) -> GoneBack:
         """Restore one action, arrow or note (`owner`: its key) of a graph to its state after the
-        change `seq`, in the name of `author`. Raise NotFound if it did not exist then, Conflict for
-        an unknown change, Unavailable if the journal cannot be read or written."""
+        change `seq`, in the name of `author`; return the graph's last change then. Raise NotFound
+        if it did not exist then, Conflict for an unknown change, Unavailable if the journal cannot
+        be read or written."""
         upto = await self._index.upto(graph)
         if not 1 <= seq <= upto:
             raise Conflict(
@@ -248,9 +249,10 @@ class Restoring:
         return await self._said(graph, author, before, seq, now)
 
     async def revert(self, graph: str, author: str, edits: EditsOfOne) -> GoneBack:
-        """Revert the edits of one person in a graph, in the name of `author`. Raise BadInput for an
-        impossible range, NotFound for an unknown graph or if there was no change, TooLarge for too
-        many changes, Unavailable if the journal cannot be read or written."""
+        """Revert the edits of one person in a graph, in the name of `author`; return its last
+        change then, and the things that were not fully reverted. Raise BadInput for an impossible
+        range, NotFound for an unknown graph or if there was no change, TooLarge for too many
+        changes, Unavailable if the journal cannot be read or written."""
         first, last = edits.from_seq, edits.seq
         if not 2 <= first <= last:
             raise BadInput(

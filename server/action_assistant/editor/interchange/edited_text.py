@@ -147,8 +147,8 @@ def _aligned(old: Graph, wanted: Graph) -> dict[Key, Key]:
 
 
 def _gaps(order: Sequence[Key], kept: set[Key]) -> dict[Key, list[Key]]:
-    """Group the keys in `order` that are not in `kept` by the key of `kept` before them; "" stands
-    for the beginning."""
+    """Return the keys in `order` that are not in `kept`, grouped by the key of `kept` before them;
+    "" stands for the beginning."""
     found: dict[Key, list[Key]] = defaultdict(list)
     last = ""
     for key in order:
@@ -345,9 +345,10 @@ class MergingOutcome(msgspec.Struct, frozen=True):
 
 
 def merging(then: GraphAtSeq, state: bytes, text: bytes, inside: Inside) -> MergingOutcome:
-    """Merge an edited text into a graph that may have changed since. `then`: the state from whose
-    text it was edited; `state`: the document now; `inside`: the graphs inside. Raise BadInput,
-    NotUmrf or TooLarge, with the place, for a text that cannot be read."""
+    """Return the update that merges an edited text into a graph that may have changed since, or the
+    conflicts. `then`: the state from whose text it was edited; `state`: the document now; `inside`:
+    the graphs inside. Raise BadInput, NotUmrf or TooLarge, with the place, for a text that cannot
+    be read."""
     found = read(then)
     edit = text_edit(found.moment, text, found.problems(inside), inside)
     now = maps_of(state)

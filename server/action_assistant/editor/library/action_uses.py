@@ -181,8 +181,8 @@ def _of_uses(name: str, uses: list[tuple[ActionSource, Action]]) -> LibraryActio
 
 
 def together(name: str, uses: Sequence[Action]) -> Action:
-    """Combine several uses of an action into one action with this name and without values; where
-    they differ, the first use counts."""
+    """Return one action with this name and without values in place of several uses; where they
+    differ, the first use counts."""
     return Action(
         key="",
         name=name,

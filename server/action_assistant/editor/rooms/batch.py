@@ -364,8 +364,8 @@ def next_batch(
 
 
 def merged(updates: list[bytes]) -> list[bytes]:
-    """Merge updates into few updates, none so large that a client that sends it back would be
-    refused."""
+    """Return fewer updates with the same effect, none so large that a client that sends it back
+    would be refused."""
     groups: list[list[bytes]] = []
     size = 0
     for update in updates:

@@ -484,8 +484,8 @@ class Room:
             raise error
 
     def _apply_batch(self, batch: Sequence[QueueItem]) -> BatchOutcome:
-        """Apply the edits of a batch. After a panic of the library the remaining edits wait until
-        the document is loaded again."""
+        """Apply the edits of a batch to the document, and return what to store, send and answer.
+        After a panic of the library the remaining edits wait until the document is loaded again."""
         outcome = BatchOutcome()
         for n, item in enumerate(batch):
             match item:

@@ -111,9 +111,7 @@ def _superfluous(copies: list[UpgradeCopy]) -> list[UpgradeCopy]:
 def _written(target: Path, connection: Connection, branch: Branch, revision: str) -> int:
     """Write a copy of the database, verify it, and rename it to `target`; return the number of its
     events."""
-    for left in target.parent.glob(
-        f".{branch}_*.part*"
-    ):  # left by a killed process; no other one works here
+    for left in target.parent.glob(f".{branch}_*.part*"):  # of a killed process
         left.unlink()
     part = target.with_name(f".{target.name}.part")
     try:

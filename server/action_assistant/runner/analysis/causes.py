@@ -453,7 +453,8 @@ def _made_good(
 
 
 def _recovery(graph: Graph | None) -> Mapping[str, frozenset[str]]:
-    """Return, by the full name of each action, the full names of the actions that its error starts."""
+    """Return, by the full name of each action, the full names of the actions that its error starts;
+    empty if the graph is unknown (None)."""
     if graph is None:
         return {}
     names = {action.key: action.full_name for action in graph.actions}

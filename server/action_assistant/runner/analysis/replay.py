@@ -183,8 +183,8 @@ def _actions(before: Run | None, after: Run) -> dict[str, ActionFrame]:
 
 
 def _looks_new(before: ActionRun | None, after: ActionRun) -> bool:
-    """Return whether people would see a difference between two states of an action. That it was
-    seen again later, unchanged, is no difference."""
+    """Return whether people would see a difference between two states of an action; None as
+    `before` if it was not there. That it was seen again later, unchanged, is no difference."""
     if before is None:
         return True
     return before is not after and (

@@ -83,9 +83,9 @@ class Conductors:
         seq: int = 1,
         left: LeftOpen | None = None,
     ) -> OpenRun:
-        """Open a stored conducted run. `first`: its first event; `seq`: the number of its last
-        stored event; `texts`: its pieces by full name of their action; `engine` plays the whole
-        graph; `left`: how far an earlier process led it, None for a new run."""
+        """Open a stored conducted run, and return it. `first`: its first event; `seq`: the number
+        of its last stored event; `texts`: its pieces by full name of their action; `engine` plays
+        the whole graph; `left`: how far an earlier process led it, None for a new run."""
         conductor = Conductor(
             first,
             texts,

@@ -146,8 +146,9 @@ class RestRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def confirm_rest(opened: OpenRun, asked: RestRequest, author: Author) -> Run:
     """End a run because `author` has seen it at rest (nothing moves), where no answer of its engine
-    can prove that. `asked`: how it was seen. Raise BadInput if it does not say how; Conflict if the
-    run is simulated, if its engine still answers for it, or if actions were seen moving."""
+    can prove that; return the run. `asked`: how it was seen. Raise BadInput if it does not say how;
+    Conflict if the run is simulated, if its engine still answers for it, or if actions were seen
+    moving."""
     run, how = opened.run, asked.how.strip()
     if len(how) < 3:
         raise BadInput("Say how it was seen that nothing moves.", where={"path": "/how"})

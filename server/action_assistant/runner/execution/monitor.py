@@ -231,7 +231,7 @@ class Monitor:
         return _STOP_POLL_S if hurry else _POLL_S
 
     def take_jobs(self) -> list[Job]:
-        """Hand over the jobs that have come up since the last call."""
+        """Return the slow jobs that have come up since the last call, for the caller to run."""
         jobs, self._jobs = self._jobs, []
         return jobs
 

@@ -53,10 +53,11 @@ class OpenRuns:
         piece: PieceHooks | None = None,
         pressed: Callable[[Author], None] | None = None,
     ) -> OpenRun:
-        """Open a stored run on a link, and announce it. `seq`: the number of the run's last stored
-        event; `owns_link`: the link is closed with the run; `link`: None if the robot is not
-        registered any more: such a run gets a link that never answers. `piece`: ties a piece to its
-        conducted run; `pressed`: called first when a person stops a conducted run."""
+        """Open a stored run on a link, announce it to watchers and return it. `seq`: the number of
+        the run's last stored event; `owns_link`: the link is closed with the run; `link`: None if
+        the robot is not registered any more: such a run gets a link that never answers. `piece`:
+        ties a piece to its conducted run; `pressed`: called first when a person stops a conducted
+        run."""
         opened = OpenRun(
             run,
             link=link

@@ -254,7 +254,8 @@ class OpenRun:
 
     @contextmanager
     def _changing(self) -> Iterator[RunChanges]:
-        """Collect changes, and apply them at the end of the block, also after an exception in it."""
+        """Return a context whose value collects changes of the run; they are applied at its end,
+        also after an exception in it."""
         changes = RunChanges(self.run, self._clock_us)
         try:
             yield changes

@@ -125,9 +125,9 @@ class ExecutionService:
         past: Past | None = None,
         sources: StartSources = NO_SOURCES,
     ) -> "AsyncIterator[ExecutionService]":
-        """Open the service, after it has taken over the runs that an earlier process left open.
-        `past` reads runs that are over; `simulator` makes links to simulated engines; `sources`
-        are the behaviours, expected courses and index folders that starts need."""
+        """Return a context with the service, which has taken over the runs that an earlier process
+        left open. `past` reads runs that are over; `simulator` makes links to simulated engines;
+        `sources` are the behaviours, expected courses and index folders that starts need."""
         async with anyio.create_task_group() as tasks:
             runtime = Runtime(journal, clock_us, BackgroundTasks(tasks), run_in_worker)
             control = cls(robots, runtime, simulator=simulator, past=past, sources=sources)
@@ -157,9 +157,9 @@ class ExecutionService:
         return await self._starts.start(request, author)
 
     async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
-        """Start one version on several robots. All starts are checked and accepted before the first
-        message is sent. Raise a subclass of Refused if one start is refused; nothing was sent to
-        any robot then."""
+        """Start one version on several robots, and return the runs and the robots that nothing was
+        sent to. All starts are checked and accepted before the first message is sent. Raise a
+        subclass of Refused if one start is refused; nothing was sent to any robot then."""
         return await self._starts.start_group(group, author)
 
     async def look(self, group: GroupRequest, starter: str = "") -> list[Preflight]:
@@ -389,9 +389,9 @@ class ExecutionService:
         return self.robots.robot(name, self.foreign_stops.trouble)
 
     async def register(self, asked: Registration, author: Author) -> Robot:
-        """Register a robot, or change its registration. Raise BadInput if the registration is not
-        valid, Conflict if the robot is in use or has the simulator's name, Unavailable if the
-        journal cannot store it."""
+        """Register a robot, or change its registration, and return it. Raise BadInput if the
+        registration is not valid, Conflict if the robot is in use or has the simulator's name,
+        Unavailable if the journal cannot store it."""
         async with self._starts.turns([asked.name]):
             self._check_unused(asked.name)
             return await self.robots.register(asked, author)

@@ -140,10 +140,11 @@ class StartPipeline:
     async def _store_and_hand_over(
         self, accepted: AcceptedStart, author: Author, stops: int, group: str | None = None
     ) -> Run:
-        """Store a start, let its run send the message, and wait until it was sent. `stops`: how
-        many Stops had been pressed when the start was requested; a later one takes effect before
-        anything is sent. `group`: the id of its group, or None. Raise Conflict or Unavailable,
-        before anything is sent, if the robot is occupied or the start cannot be stored."""
+        """Store a start, let its run send the message, wait until it was sent, and return the run.
+        `stops`: how many Stops had been pressed when the start was requested; a later one takes
+        effect before anything is sent. `group`: the id of its group, or None. Raise Conflict or
+        Unavailable, before anything is sent, if the robot is occupied or the start cannot be
+        stored."""
         number, at = self._runs.next_number(), self._clock_us()
         requested, order = _to_store(accepted, author, at=at, number=number, group=group)
         await self._checks.give_words(accepted, author)

@@ -398,8 +398,7 @@ async def _obeyed(link: SimulatorLink, command: str, args: tuple[Any, ...]) -> o
 
 
 def _parts(report: Report) -> Iterator[Report]:
-    """Split a report into reports of at most 100 changes, so that none keeps the runner busy for
-    long."""
+    """Yield a report in parts of at most 100 changes, so that none keeps the runner busy for long."""
     if not isinstance(report, Transitions):
         yield report
         return

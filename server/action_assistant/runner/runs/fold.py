@@ -197,8 +197,8 @@ def follow(run: Run, event: RunEvent) -> Run:
 
 
 def _desired(run: Run, event: PauseRequested | ResumeRequested | StopRequested) -> Run:
-    """Fold the wish of a person to pause, resume or stop; once a Stop was pressed, no later wish
-    changes that."""
+    """Return the run after the wish of a person to pause, resume or stop it; once a Stop was
+    pressed, no later wish changes that."""
     is_stopped = run.desired == "stopped"
     match event:
         case PauseRequested():
@@ -233,8 +233,8 @@ def _with_intervention(
     event: PauseRequested | ResumeRequested | StopRequested | ModifyRequested,
     kind: Literal["stop", "pause", "resume", "modify"],
 ) -> Run:
-    """Add a command of a person to the run, with the state in which the run was then, as far as
-    known. `kind`: the command."""
+    """Return the run with a command of a person added, together with the state in which the run was
+    then, as far as known. `kind`: the command."""
     asked = Intervention(
         kind=kind, at=event.at, by=event.author, state=run.state, active=run.active
     )
@@ -252,8 +252,9 @@ def _alarmed(run: Run, event: AlarmRaised) -> Run:
 
 
 def _meddled(run: Run, alarm: str) -> Run:
-    """Fold the code of an alarm about a command of another program: such a command may cause what
-    the graph alone rules out, so later conclusions allow for it."""
+    """Return the run after an alarm about a command of another program: such a command may cause
+    what the graph alone rules out, so later conclusions allow for it. `alarm`: the code of the
+    alarm."""
     match alarm:
         case "foreign_pause":
             return _held(run)
@@ -339,8 +340,8 @@ def _modified(run: Run, event: ModifyRequested) -> Run:
 
 
 def _unmodified(run: Run, event: ModifyRefused) -> Run:
-    """Fold a refused change of the graph: the earlier version is in force again, and actions that
-    only the change would have brought are removed."""
+    """Return the run after a refused change of the graph: the earlier version is in force again,
+    and actions that only the change would have brought are removed."""
     actions = {
         name: replace(action, aid=event.actions.get(name, action.aid))
         for name, action in run.actions.items()
@@ -358,8 +359,8 @@ def _unmodified(run: Run, event: ModifyRefused) -> Run:
 
 
 def _reopen(run: Run, event: MovesAgain) -> Run:
-    """Fold that a run was seen moving after its end: it is open again without a proof, and the last
-    command of people still counts."""
+    """Return the run after it was seen moving after its end: it is open again without a proof, and
+    the last command of people still counts."""
     alarm = Alarm("moves_again", event.at, event.text)
     return replace(
         run,
@@ -375,8 +376,8 @@ def _reopen(run: Run, event: MovesAgain) -> Run:
 
 
 def _end(run: Run, event: Ended) -> Run:
-    """Fold the end of a run. Actions whose end is not proven keep the state in which they were seen
-    last."""
+    """Return the run after its end. Actions whose end is not proven keep the state in which they
+    were seen last."""
     return replace(
         run,
         end=event.state,
@@ -395,8 +396,8 @@ def _end(run: Run, event: Ended) -> Run:
 
 
 def _piece_seen(run: Run, event: PieceSeen) -> Run:
-    """Fold what a robot shows of an action that it carries out in a conducted run. Each call is one
-    visit, with the bounds that the piece's own run has found."""
+    """Return the conducted run after a robot has shown another state of an action that it carries
+    out. Each call is one visit, with the bounds that the piece's own run has found."""
     known = run.actions.get(event.node, _UNSEEN)
     action = after_piece(known, event.call, event.state, event.visit, event.at)
     action = with_messages(action, event.messages, event.at)
@@ -404,8 +405,8 @@ def _piece_seen(run: Run, event: PieceSeen) -> Run:
 
 
 def _piece_ended(run: Run, event: PieceEnded) -> Run:
-    """Fold the outcome of a call of a conducted run. In older streams, without `PieceRest` events,
-    an outcome that an answer has shown also proves that the piece is at rest."""
+    """Return the conducted run after the outcome of a call. In older streams, without `PieceRest`
+    events, an outcome that an answer has shown also proves that the piece is at rest."""
     action = after_outcome(
         run.actions.get(event.node, _UNSEEN),
         event.call,
@@ -450,8 +451,8 @@ def _going(event: PieceBegan) -> PieceRest:
 
 
 def _piece_rest(run: Run, event: PieceRest) -> Run:
-    """Fold how far a piece is proven to be at rest. Earlier pieces of the same robot stay listed
-    only while they may move or wait for an outcome."""
+    """Return the conducted run after news about how far a piece is proven to be at rest. Earlier
+    pieces of the same robot stay listed only while they may move or wait for an outcome."""
     kept = {
         piece: known
         for piece, known in run.rests.items()

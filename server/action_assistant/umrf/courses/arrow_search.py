@@ -93,8 +93,8 @@ class _RecordingInstant(Instant):
         return False  # every edge is to be recorded, also one that is known to lead to the exit
 
     def after(self, before: _GraphState) -> _GraphState:
-        """Return the state of the graph after this instant; `before`: the state before it. Times
-        are dropped, since any order of ends is searched."""
+        """Return the state of the graph after this instant; `before`: the state before it. The
+        times at which actions end are set to 0, since the search tries every order of ends."""
         states = list(before.states)
         for index, state in self.states.items():
             states[index] = state._replace(due=0.0)

@@ -48,8 +48,9 @@ class DeviatingCourses:
                 self._note_alone(number)
 
     def _note_alone(self, number: int) -> None:
-        """Store the outcome of the baseline course for its situations in which only one action
-        runs, to be reused by courses that come there. `number`: that of the instant."""
+        """Remember, from the baseline course, that if only this one action runs and nothing that it
+        can reach was touched, the graph ends as in the baseline. `number`: of the instant in the
+        baseline whose touched actions are examined."""
         course = self.course
         for index in course.touched[number]:
             if index == self.net.exit or course.state(index, number + 1).does != RUNS:

@@ -200,8 +200,9 @@ class Instant:
         return False
 
     def _bypass(self, index: int, child: int, result: Precondition) -> None:
-        """Bypass a child with a result, and pass the result on. The same bypass is done once in an
-        instant, since another path to it changes nothing."""
+        """Let the action `index`, which ended or was bypassed with `result`, bypass its child and
+        pass the result on. The same bypass is done once in an instant, since another path to it
+        changes nothing."""
         if child == self._net.exit:
             self._finish(index)
         elif (child, result) not in self._bypassed:

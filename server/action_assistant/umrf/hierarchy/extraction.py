@@ -171,9 +171,9 @@ Extraction: TypeAlias = Extracted | Unextractable
 def extracted(
     graph: Graph, chosen: Collection[Key], name: str, key: Key, *, budget: int | None = None
 ) -> Extraction:
-    """Move the `chosen` actions into a new graph of this name. `key`: the key of the action that
-    will stand for it. `budget`: the most states that are examined for each way to cut,
-    as many as `flattened` does without one."""
+    """Move the `chosen` actions into a new graph of this name. Return both graphs, or the reasons
+    for which that is impossible. `key`: the key of the action that will stand for it. `budget`: the
+    most states that are examined for each way to cut, as many as `flattened` does without one."""
     reasons = [*_unfit_names(graph, name), *_unfit(graph, chosen)]
     selection = selection_of(graph, chosen)
     if selection.chosen:

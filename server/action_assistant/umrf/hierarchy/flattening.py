@@ -270,8 +270,8 @@ class _Hierarchy:
         return count(graph, (graph.name,))
 
     def level(self, graph: Graph, above: tuple[str, ...]) -> _Found:
-        """Flatten one graph and all graphs inside it. `above`: the names of the graphs around
-        it."""
+        """Return the flat graph of one graph and all graphs inside it, or the reasons against it.
+        `above`: the names of the graphs around it."""
         reasons = list(faults(graph))
         inside: dict[Key, _Found] = {}
         for action in graph.actions:
@@ -296,8 +296,8 @@ class _Hierarchy:
         return self._together(graph, flats, seen, given, reasons)
 
     def _sub(self, action: Action, above: tuple[str, ...]) -> _Found:
-        """Flatten the sub-graph for which an action stands. `above`: the names of the graphs around
-        it."""
+        """Return the flat graph of the sub-graph for which an action stands, or the reasons against
+        it. `above`: the names of the graphs around it."""
         graph = self.graphs[action.name]
         if graph.name in above or action.name in above:
             return _refused("recursion", "The sub-graph contains itself, or the graph it is in.")

@@ -151,9 +151,9 @@ def level_courses(
     *,
     is_top: bool = False,
 ) -> LevelCourses:
-    """Follow all courses of a graph in which the actions with the keys of `inside` are sub-graphs
-    that can end with these results. `budget`: the most states of single actions that are examined;
-    `is_top`: it is no sub-graph, so that its own results do not matter."""
+    """Return a summary of all courses of a graph in which the actions with the keys of `inside` are
+    sub-graphs that can end with these results. `budget`: the most states of single actions that are
+    examined; `is_top`: it is no sub-graph, so that its own results do not matter."""
     search = _Courses(graph, inside, is_top=is_top)
     search.run(budget)
     return LevelCourses(

@@ -223,10 +223,7 @@ class Connections:
                 ssl=context,
                 ssl_handshake_timeout=_SILENT_S if context is not None else None,
             )
-        except (
-            OSError,
-            asyncio.CancelledError,
-        ):  # closed before it was open, or the handshake failed
+        except (OSError, asyncio.CancelledError):  # closed too early, or the handshake failed
             wire.close()
 
     def _keep(self, work: Coroutine[Any, Any, None]) -> None:

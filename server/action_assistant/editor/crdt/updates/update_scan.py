@@ -215,10 +215,10 @@ class Scan:
         return clock
 
     def _struct(self, info: int, needs: dict[int, int]) -> tuple[int, _Reference | None, _Fresh]:
-        """Read one struct after its first byte, `info`. Return how many clocks (item numbers) it
-        takes, the struct that gives its position (None for a root), and the kind of key that may be
-        new. `needs`: is increased to the clocks that it needs. Raise Malformed if it breaks a rule.
-        """
+        """Read one struct (item of the document) after its first byte, `info`. Return how many
+        clocks (item numbers) it takes; the struct beside or around it that gives its position, None
+        for a root; and whether its key may be that of a new action or field. `needs`: is increased,
+        by client, to the clocks that must exist before. Raise Malformed if it breaks a rule."""
         reader, kind = self._reader, info & 31
         if kind == _GC:
             return length(reader), None, _NONE

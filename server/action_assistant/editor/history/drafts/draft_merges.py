@@ -112,8 +112,9 @@ class DraftMerges:
 
     async def merge(self, draft: str, author: str, wanted: WantedMerge) -> MergedDraft:
         """Merge a draft with its origin, as it was previewed (`wanted`), by one edit in the name of
-        `author`. Raise Conflict if a side has changed since the preview or a conflict has no
-        choice; NotFound for an unknown draft; Unavailable if the journal cannot be written."""
+        `author`; return the graph that was changed. Raise Conflict if a side has changed since the
+        preview or a conflict has no choice; NotFound for an unknown draft; Unavailable if the
+        journal cannot be written."""
         row = (await self._drafts.pair(draft)).row
         target: str = row.draft_of if wanted.into == "origin" else draft
         async with self._rooms.enter(h.graph_stream(target)) as room:

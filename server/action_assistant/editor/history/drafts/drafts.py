@@ -112,9 +112,9 @@ class Drafts:
         self._distances: LruCache[_Moments, tuple[int, int]] = LruCache(_REMEMBERED)
 
     async def make(self, origin: str, author: str, new: NewDraft) -> DraftView:
-        """Make a draft of the graph `origin`. `new`: its name and the change to begin with. Raise
-        BadInput for a bad name, NotFound for an unknown graph, Conflict for a change that it does
-        not have, Unavailable if the journal cannot be written."""
+        """Make a draft of the graph `origin`, and return it. `new`: its name and the change to
+        begin with. Raise BadInput for a bad name, NotFound for an unknown graph, Conflict for a
+        change that it does not have, Unavailable if the journal cannot be written."""
         await self._catalogue.require(origin, "graph")
         name = " ".join(new.name.split())
         if len(name) > NAME_LIMIT:

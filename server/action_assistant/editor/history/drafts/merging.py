@@ -52,8 +52,8 @@ class KeyMerge(msgspec.Struct, frozen=True):
 
 
 def merged(base: Places, ours: Places, theirs: Places, choices: Choices) -> KeyMerge:
-    """Merge the changes of `theirs` into `ours`, key by key; `base` is their common origin.
-    `choices`: the side that counts for each conflict, by its place."""
+    """Return the merge of the changes of `theirs` into `ours`, key by key; `base` is their common
+    origin. `choices`: the side that counts for each conflict, by its place."""
     merge = _Merge(_plain(base), _plain(ours), _plain(theirs), choices)
     return merge.outcome()
 

@@ -235,8 +235,8 @@ class CallProcess:
             self._wake()
 
     def kill(self, why: str) -> str | None:
-        """Kill the call, and return its messages so far and the reason `why` as one text. The call
-        does not wait: `ended` is called when the process has ended."""
+        """Kill the process of the call, without waiting for its end, which is reported by `ended`.
+        Return its messages so far and the reason `why` as one text; None if there is neither."""
         with self._lock:
             self._wrong = self._wrong or why
             self._wake()

@@ -108,8 +108,9 @@ class _Saying:
 
 
 def supervise(lifeline: int) -> NoReturn:
-    """Fork the behaviour, wait for its end or the lifeline's, and kill all descendants. Exits with the code of
-    the behaviour, or 128 plus the signal that ended it."""
+    """Fork the behaviour, and wait until it ends or the pipe with the descriptor `lifeline` is
+    closed, as the runner does when it ends; then kill all descendants. Exit with the code of the
+    behaviour, or 128 plus the signal that ended it."""
     libc = ctypes.CDLL(None)
     libc.prctl(_SUBREAPER, 1)
     libc.prctl(_NO_NEW_PRIVILEGES, 1)

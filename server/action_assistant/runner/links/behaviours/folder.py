@@ -86,7 +86,7 @@ class BehaviourFolder(msgspec.Struct, frozen=True):
             raise Unusable(f"The behaviour {file} cannot be read: {why}.") from error
 
     def listed(self, names: Iterable[str] | None = None) -> BehaviourList:
-        """List the behaviours in the folder, or only those for the actions in `names`; the first
+        """Return the behaviours in the folder, or only those for the actions in `names`; the first
         ones if there are very many. A folder or file that cannot be used is reported in the result,
         not raised."""
         try:

@@ -40,7 +40,8 @@ class MessageQueue:
         self._is_empty = True
 
     def add(self, value: RosValue) -> bool:
-        """Add a value; return whether the queue was empty, so that the reader has to be woken."""
+        """Add a value; if the queue is full, the oldest value of its kind is dropped. Return
+        whether the queue was empty, so that the reader has to be woken."""
         with self._lock:
             self._number += 1
             if isinstance(value, OverheardCommand):
