@@ -3,7 +3,7 @@ import { NativeSelect, TextInput } from "@mantine/core";
 import { IconSearch } from "@tabler/icons-react";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
-import { type Folder, folderPath } from "../api/folders";
+import { type Folder, folderPath, graphsInFolder } from "../api/folders";
 import type { GraphSummary } from "../api/graphs";
 import { newestRun } from "../api/live-socket";
 import { useLive } from "../api/page-link";
@@ -21,14 +21,7 @@ import { isolated } from "../words/isolated";
 import style from "./graph-cards.module.css";
 import { GraphCounts } from "./graph-counts";
 import { GraphMenu } from "./graph-menu";
-import {
-  allLabels,
-  type GraphOrder,
-  graphsInFolder,
-  lastRuns,
-  ORDERS,
-  selectGraphs,
-} from "./graph-selection";
+import { allLabels, type GraphOrder, lastRuns, ORDERS, selectGraphs } from "./graph-selection";
 import home from "./home.module.css";
 
 /** Decoration, and the reading and laying out of graphs with it: the list is there without. */

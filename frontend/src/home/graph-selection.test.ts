@@ -1,13 +1,7 @@
 import { expect, test } from "vitest";
 import type { GraphSummary } from "../api/graphs";
 import type { Run } from "../api/runs";
-import {
-  allLabels,
-  type GraphOrder,
-  graphsInFolder,
-  lastRuns,
-  selectGraphs,
-} from "./graph-selection";
+import { allLabels, type GraphOrder, lastRuns, selectGraphs } from "./graph-selection";
 
 const graph = (id: string, more: Partial<GraphSummary> = {}): GraphSummary => ({
   id,
@@ -60,23 +54,4 @@ test("a search finds robots, labels and people, and a label is had by all that a
   expect(ids("name", "", "night")).toEqual(["a", "ccc"]);
   expect(ids("name", "nothing")).toEqual([]);
   expect(allLabels(graphs)).toEqual(["demo", "night"]);
-});
-
-test("a folder has its own graphs, a search those inside of it too, and none is out of reach", () => {
-  const folders = [
-    { id: "lab", name: "Lab" },
-    { id: "night", name: "Night", parent: "lab" },
-  ];
-  const filed = [
-    graph("top"),
-    graph("in_lab", { folder: "lab" }),
-    graph("in_night", { folder: "night" }),
-    graph("lost", { folder: "removed" }),
-  ];
-  const inside = (folder: string | null, deep: boolean) =>
-    graphsInFolder(filed, folders, folder, deep).map(({ id }) => id);
-  expect(inside(null, false)).toEqual(["top", "lost"]);
-  expect(inside(null, true)).toEqual(["top", "in_lab", "in_night", "lost"]);
-  expect(inside("lab", false)).toEqual(["in_lab"]);
-  expect(inside("lab", true)).toEqual(["in_lab", "in_night"]);
 });

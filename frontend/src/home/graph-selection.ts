@@ -1,5 +1,4 @@
 /** Filters and sorts lists of graphs. Pure. */
-import { type Folder, folderWay } from "../api/folders";
 import type { GraphSummary } from "../api/graphs";
 import { hasEnded } from "../api/run-stop";
 import type { Run } from "../api/runs";
@@ -46,24 +45,6 @@ export function allLabels(graphs: readonly GraphSummary[]): string[] {
   return [...new Set(graphs.flatMap(({ labels }) => labels ?? []))].sort((a, b) =>
     a.localeCompare(b),
   );
-}
-
-/**
- * Return the graphs in a folder (null: in none); `deep`: and those in all folders inside of it. The
- * place of a graph whose folder is not known counts as none, so that no graph is out of reach.
- */
-export function graphsInFolder(
-  graphs: readonly GraphSummary[],
-  folders: readonly Folder[],
-  folder: string | null,
-  deep: boolean,
-): readonly GraphSummary[] {
-  if (deep && folder === null) return graphs;
-  return graphs.filter((graph) => {
-    const way = folderWay(folders, graph.folder);
-    if (deep) return way.some(({ id }) => id === folder);
-    return (way.at(-1)?.id ?? null) === folder;
-  });
 }
 
 export function selectGraphs(
