@@ -45,6 +45,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_BACKUP_EVERY": "how often `serve` makes one (24h), as --backup-every",
     "ACTION_ASSISTANT_BACKUP_KEEP": "how many stay (7d,4w,6m), as --backup-keep",
     "ACTION_ASSISTANT_BACKUP_AFTER": "the command that takes a finished one elsewhere, as --backup-after",
+    "ACTION_ASSISTANT_SESSIONS": "when sessions expire, unused and in any case, by role, such as "
+    "`owner=12h/7d,operator=3d/30d` (owner=7d/30d, operator=14d/30d, others 30d/30d)",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
     "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
     "direct one fail",
@@ -80,7 +82,8 @@ class Reachability(msgspec.Struct, frozen=True):
 
 
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
-    """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`."""
+    """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`.
+    `sessions`: when sessions expire, as in ACTION_ASSISTANT_SESSIONS."""
 
     data: Path
     database: str
@@ -94,6 +97,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     switch_database: bool = False
     reached: Reachability = Reachability()
     metrics_token: str | None = None
+    sessions: str = ""
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -126,6 +130,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     behaviours: Path | None = None
     index_folders: Mapping[str, Path] = {}
     metrics_token: str | None = None
+    sessions: str = ""
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -253,6 +258,11 @@ def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | Non
     """Return a setting of regular backups from the variable ACTION_ASSISTANT_BACKUP_<name>; None if
     it is not set. `name`: TO, EVERY, KEEP or AFTER."""
     return environ.get(f"ACTION_ASSISTANT_BACKUP_{name}", "").strip() or None
+
+
+def sessions(environ: Mapping[str, str] = os.environ) -> str:
+    """Return when sessions expire, by role, as the environment says it; "" for the defaults."""
+    return environ.get("ACTION_ASSISTANT_SESSIONS", "").strip()
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:

@@ -13,7 +13,7 @@ import msgspec
 import segno
 
 from action_assistant.web.auth.keys import Keys, ServerProof
-from action_assistant.web.auth.roles import may
+from action_assistant.web.auth.roles import role_words
 
 _ROLES: Final = ("viewer", "editor", "operator")
 _PATIENCE_S: Final = 10.0
@@ -112,7 +112,7 @@ def may_of(role: str) -> str:
     """Return in words the things that a role may do."""
     match role:
         case "viewer" | "editor" | "operator" | "owner":
-            return may(role)
+            return role_words(role)
         case _:
             return "do what a newer version knows"
 

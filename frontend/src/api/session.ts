@@ -147,6 +147,7 @@ const FROM = {
   register: "operator",
   share: "owner",
   restore: "owner",
+  scrape: "viewer",
 } as const satisfies Record<string, Role>;
 
 export type Permission = keyof typeof FROM;

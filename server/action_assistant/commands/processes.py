@@ -237,6 +237,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         switch_database=options.switch_database,
         reached=reached(options),
         metrics_token=settings.metrics_token(),
+        sessions=settings.sessions(),
     )
 
 
@@ -320,6 +321,7 @@ def _runner(options: argparse.Namespace) -> int:
         behaviours=options.behaviours,
         index_folders=settings.index_folders(options.index_folder),
         metrics_token=settings.metrics_token(),
+        sessions=settings.sessions(),
     )
     listen(
         lambda: create_app(chosen),

@@ -13,6 +13,7 @@ from litestar.types import ASGIApp, ControllerRouterHandler
 
 from action_assistant import paths
 from action_assistant.editor.api import (
+    devices,
     doctor,
     drafts,
     drawing,
@@ -22,6 +23,7 @@ from action_assistant.editor.api import (
     history,
     invitations,
     library,
+    members,
     packages,
     room,
     subgraphs,
@@ -40,10 +42,14 @@ from action_assistant.settings import EditorSettings
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.audit.routes import audit_routes
 from action_assistant.web.audit.rows import AuditFilter
-from action_assistant.web.auth.keys import Keys, ScrapeToken
+from action_assistant.web.auth.device_codes import DeviceCodes
+from action_assistant.web.auth.keys import Keys, ScrapeToken, Session
+from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.session_files import SessionFiles
+from action_assistant.web.auth.session_limits import limits_of
 from action_assistant.web.auth.sessions import session_routes
+from action_assistant.web.auth.standing import Standings
 from action_assistant.web.monitoring.gauges import Family
 from action_assistant.web.monitoring.monitoring import Monitoring, Watched
 from action_assistant.web.monitoring.status import Activity
@@ -62,6 +68,7 @@ async def open_services(
     settings: EditorSettings,
     revoked: Revocations | None = None,
     audit: AuditLog | None = None,
+    people_files: PeopleFiles | None = None,
 ) -> AsyncIterator[EditorServices]:
     """Return a context with the services of the editor, without its HTTP side; they are closed at
     its end. `revoked`: the revoked sessions and links, None to read them. Raise CannotStart if the
@@ -82,10 +89,13 @@ async def open_services(
             epochs.living_in(journal, settings.data) as epoch,
         ):
             people = await People.known(journal)
-            services = EditorServices(settings, journal, people, epoch, revoked, workers, audit)
+            services = EditorServices(
+                settings, journal, people, epoch, revoked, workers, audit, people_files
+            )
             try:
                 async with (
                     services.invitations.opened(),
+                    services.members.opened(),
                     services.change_index.kept_up(),
                     services.graph_checks.names.read_ahead(),
                     services.audit.writing(journal),
@@ -109,8 +119,11 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     keys = Keys.of(settings.data)
     app_state = EditorState()
     revoked = Revocations(settings.data)
+    people_files = PeopleFiles(settings.data)
     browsers = SessionFiles(settings.data, revoked)
+    standings = Standings(people_files, browsers, limits_of(settings.sessions))
     browsers.every()  # forgets those that are over
+    codes = DeviceCodes(limits=settings.limits)
     addresses = _addresses(settings)
     monitoring = Monitoring("editor", settings.data)
     audit = AuditLog()
@@ -118,22 +131,33 @@ def create_app(settings: EditorSettings) -> ASGIApp:
 
     @asynccontextmanager
     async def lifespan(_: Litestar) -> AsyncIterator[None]:
-        async with open_services(settings, revoked, audit) as services:
+        async with open_services(settings, revoked, audit, people_files) as services:
             app_state.open(services)
             async with monitoring.watching(WatchedEditor(services)):
                 yield
+
+    async def device_added(session: Session, browser: str, address: str) -> None:
+        members = app_state.services.members
+        await members.device_added(session.person.id, session.id, browser, address)
 
     signing_in = session_routes(
         keys,
         settings.port,
         addresses=addresses,
         limits=settings.limits,
-        reception=lambda: app_state.services.invitations,
+        reception=lambda: app_state.services.reception,
         revoked=revoked,
-        browsers=browsers,
+        standings=standings,
+        codes=codes,
+        device_added=device_added,
     )
     return application(
-        [*signing_in, *_routes(app_state, addresses, browsers), *doctor.routes(settings)],
+        [
+            *signing_in,
+            *_routes(app_state, addresses, browsers),
+            *devices.routes(codes, browsers, addresses),
+            *doctor.routes(settings),
+        ],
         title="TeMoto Action Assistant: editor",
         keys=keys,
         revoked=revoked,
@@ -142,6 +166,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         lifespan=[lifespan],
         monitoring=monitoring,
         scraped=ScrapeToken(settings.metrics_token),
+        standings=standings,
         page=paths.page(),
         help_site=paths.help_site(),
         runner_port=settings.runner_port,
@@ -166,6 +191,7 @@ def _routes(
 ) -> list[ControllerRouterHandler]:
     return [
         *invitations.routes(app_state, addresses, browsers),
+        *members.routes(app_state, addresses, browsers),
         *editor.routes(app_state, addresses),
         *graphs.routes(app_state),
         *folders.routes(app_state),

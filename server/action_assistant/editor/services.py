@@ -18,7 +18,9 @@ from action_assistant.editor.history.graph_history import GraphHistory
 from action_assistant.editor.history.restoring import Restoring
 from action_assistant.editor.library.library import Library, LibraryEdits
 from action_assistant.editor.people.invitations import Invitations
+from action_assistant.editor.people.members import Members
 from action_assistant.editor.people.people import People
+from action_assistant.editor.people.reception import Reception
 from action_assistant.editor.rooms.member import ByteRateLimits
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.presence import PersonColours
@@ -28,6 +30,7 @@ from action_assistant.settings import EditorSettings
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import person_of
 from action_assistant.web.auth.keys import Keys, Person
+from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.network.connection_limits import ConnectionLimits
 
@@ -44,6 +47,7 @@ class EditorServices:
         revoked: Revocations,
         workers: EditorWorkers,
         audit: AuditLog | None = None,
+        people_files: PeopleFiles | None = None,
     ) -> None:
         self.settings = settings
         self.audit = audit or AuditLog()
@@ -66,7 +70,17 @@ class EditorServices:
         self.library_edits = LibraryEdits(
             journal, self.rooms, self.graph_reader, self.catalogue, self.library, workers.files
         )
-        self.invitations = Invitations(journal, people, Keys.of(settings.data), revoked)
+        keys = Keys.of(settings.data)
+        self.invitations = Invitations(journal, people, keys, revoked)
+        self.members = Members(
+            journal,
+            people,
+            keys,
+            revoked,
+            people_files or PeopleFiles(settings.data),
+            settings.data,
+        )
+        self.reception = Reception(self.invitations, self.members)
         self.change_index = ChangeIndex(journal, workers.graphs)
         self.history = GraphHistory(self.change_index)
         self.restoring = Restoring(

@@ -49,8 +49,12 @@ from action_assistant.web.audit.events import StopPressed
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.keys import Keys, ScrapeToken
+from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.session_files import SessionFiles
+from action_assistant.web.auth.session_limits import limits_of
 from action_assistant.web.auth.sessions import revocation
+from action_assistant.web.auth.standing import Standings
 from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.connection_limits import ConnectionLimits
@@ -231,8 +235,11 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         ):
             yield
 
+    people_files = PeopleFiles(settings.data)
+    browsers = SessionFiles(settings.data, revoked)
+    standings = Standings(people_files, browsers, limits_of(settings.sessions))
     return application(
-        [*routes(services), *revocation(revoked)],
+        [*routes(services), *revocation(revoked, people_files)],
         title="TeMoto Action Assistant: runner",
         keys=Keys.of(settings.data),
         revoked=revoked,
@@ -248,6 +255,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         lifespan=[lifespan],
         monitoring=monitoring,
         scraped=ScrapeToken(settings.metrics_token),
+        standings=standings,
         mount=public.path + RUNNER if public is not None else "",
         body_limit=SMALL,
     )

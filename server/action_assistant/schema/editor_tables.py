@@ -132,3 +132,41 @@ key_change_head: Final = Table(
     Column("document", LargeBinary, nullable=False),
     Column("form", BigInteger),
 )
+#: A person for whom an owner has made a personal link. `groups`: ids of groups, as JSON. `until`: when the
+#: right to do more than Stop ends.
+member: Final = Table(
+    "member",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("role", Text, nullable=False),
+    Column("groups", Text, nullable=False),
+    Column("until", BigInteger),
+    Column("made_at", BigInteger, nullable=False),
+    Column("made_by", Text, nullable=False),
+    Column("ended_at", BigInteger),
+    Column("ended_by", Text),
+)
+#: A personal link, which lets one browser in, once, before `expires`; and by which browser it was used.
+personal_link: Final = Table(
+    "personal_link",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("person", Text, nullable=False),
+    Column("made_at", BigInteger, nullable=False),
+    Column("made_by", Text, nullable=False),
+    Column("expires", BigInteger, nullable=False),
+    Column("used_at", BigInteger),
+    Column("browser", Text),
+    Column("address", Text),
+    Column("withdrawn_at", BigInteger),
+)
+#: A group of persons.
+people_group: Final = Table(
+    "people_group",
+    EDITOR,
+    Column("id", Text, primary_key=True),
+    Column("name", Text, nullable=False),
+    Column("made_at", BigInteger, nullable=False),
+    Column("made_by", Text, nullable=False),
+)

@@ -18,12 +18,15 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 from action_assistant.errors import Unauthenticated
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, SignedIn, person_of
+from action_assistant.web.auth.device_codes import DeviceCodes
 from action_assistant.web.auth.keys import Keys, Person, PersonRef, Session
+from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import Invited, session_routes
+from action_assistant.web.auth.standing import Standings
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.application import application
 from action_assistant.web.server.sockets import bound
@@ -32,7 +35,7 @@ KEYS = Keys("k" * 43)
 BEARER = {"authorization": f"Bearer {KEYS.token}"}
 
 
-@get("/api/me")
+@get("/api/me", guards=[SignedIn()])
 async def me(request: Request[Any, Any, Any]) -> str:
     """Say who asks."""
     return person_of(request).name
@@ -50,19 +53,13 @@ async def start(data: JSONBody[dict[str, int]]) -> str:
     return f"starting {data['n']}"
 
 
-@post("/api/novelty", status_code=200)
-async def novelty() -> str:
-    """Serve a route without a declared right."""
-    return "done"
-
-
-@get("/api/broken")
+@get("/api/broken", guards=[Needs("see")])
 async def broken() -> str:
     """Fail in a way that nobody foresaw."""
     raise ZeroDivisionError("secret detail")
 
 
-@websocket("/api/live")
+@websocket("/api/live", guards=[Needs("see")])
 async def live(socket: WebSocket[Any, Any, Any]) -> None:
     """Say who connected."""
     await socket.accept()
@@ -73,8 +70,11 @@ async def live(socket: WebSocket[Any, Any, Any]) -> None:
 class Nobody:
     """A reception that knows no invitations."""
 
-    def look(self, proof: str) -> Invited:
+    async def look(self, proof: str) -> Invited:
         raise Unauthenticated(f"{proof} is not known.")
+
+    async def come_in(self, link: str, browser: str, address: str) -> PersonFile:
+        raise AssertionError(f"{browser} at {address} came by {link}")
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
         raise AssertionError(f"{person} came by {invitation}")
@@ -89,9 +89,17 @@ def served(folder: Path) -> Iterator[int]:
     port: int = listener.getsockname()[1]
     revoked = Revocations(folder)
     browsers = SessionFiles(folder, revoked)
-    sessions = session_routes(KEYS, port, reception=Nobody, revoked=revoked, browsers=browsers)
+    standings = Standings(PeopleFiles(folder), browsers)
+    sessions = session_routes(
+        KEYS,
+        port,
+        reception=Nobody,
+        revoked=revoked,
+        standings=standings,
+        codes=DeviceCodes(),
+    )
     app = application(
-        [me, stop, start, novelty, broken, live, *sessions],
+        [me, stop, start, broken, live, *sessions],
         title="test",
         keys=KEYS,
         revoked=revoked,
@@ -214,13 +222,6 @@ def test_a_cookie_without_an_origin_changes_nothing(client: httpx.Client, port: 
     assert client.post("/api/runs", json={"n": 1}, headers=headers).status_code == 403
     own = {**headers, "origin": f"http://127.0.0.1:{port}"}
     assert client.post("/api/runs", json={"n": 1}, headers=own).text == "starting 1"
-
-
-def test_routes_without_a_declared_right_are_for_owners(client: httpx.Client, port: int) -> None:
-    origin = {"origin": f"http://127.0.0.1:{port}"}
-    for role, status in (("owner", 200), ("operator", 403), ("viewer", 403)):
-        headers = {**cookie(port, expires=1e12, role=role), **origin}
-        assert client.post("/api/novelty", headers=headers).status_code == status
 
 
 def test_an_expired_session_may_still_stop_and_nothing_else(

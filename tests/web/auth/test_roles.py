@@ -15,7 +15,7 @@ from websockets.sync.client import ClientConnection, connect
 
 from action_assistant.editor.crdt import messages
 from action_assistant.web.auth.keys import Keys
-from action_assistant.web.auth.roles import Permission, Role, allowed, may
+from action_assistant.web.auth.roles import Permission, Role, allowed, role_words
 from action_assistant.web.network.connection_limits import OF_A_PERSON, OF_AN_ADDRESS
 from support.product import TOKEN, Product, running
 
@@ -32,6 +32,7 @@ LEAST: dict[Permission, Role] = {
     "register": "operator",
     "share": "owner",
     "restore": "owner",
+    "scrape": "viewer",
 }
 
 
@@ -87,7 +88,9 @@ def test_the_page_has_the_same_table() -> None:
     table = text[text.index("FROM = {") : text.index("} as const satisfies")]
     assert dict(re.findall(r'(\w+): "(\w+)"', table)) == LEAST
     words = text[text.index("export const ROLE_WORDS") :]
-    assert dict(re.findall(r'(\w+): "([^"]+)"', words)) == {role: may(role) for role in ROLES}
+    assert dict(re.findall(r'(\w+): "([^"]+)"', words)) == {
+        role: role_words(role) for role in ROLES
+    }
 
 
 @pytest.mark.parametrize("process", PROCESSES)

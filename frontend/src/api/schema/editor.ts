@@ -276,6 +276,20 @@ export interface EditorApi {
         overwritten?: EditorApi["ChangedThings"];
     };
     /**
+     * ClaimOfDevice
+     * @description The claim of a browser that waits to be confirmed.
+     */
+    ClaimOfDevice: {
+        claim: string;
+    };
+    /**
+     * CodeOfDevice
+     * @description The code that a browser of the person shows, typed in on another one.
+     */
+    CodeOfDevice: {
+        code: string;
+    };
+    /**
      * Command
      * @description A command of a person to the running graph, and its time.
      */
@@ -330,6 +344,45 @@ export interface EditorApi {
         name?: string | null;
         /** @default null */
         description?: string | null;
+    };
+    /**
+     * DeviceAnswer
+     * @description The answer to a browser that waits: the session, or nothing while nobody has confirmed it.
+     */
+    DeviceAnswer: {
+        signed_in?: EditorApi["SignedIn"];
+    };
+    /**
+     * DeviceAsking
+     * @description The other browser, as the first one sees it. `browser` is missing while no browser has sent
+     *     the code; `number` is shown on both.
+     */
+    DeviceAsking: {
+        id: string;
+        /** @default  */
+        browser?: string;
+        /** @default  */
+        address?: string;
+        /** @default  */
+        number?: string;
+        /** @default false */
+        answered?: boolean;
+    };
+    /**
+     * DeviceCode
+     * @description A code that another browser may use. `seconds`: for how long it is valid.
+     */
+    DeviceCode: {
+        id: string;
+        code: string;
+        seconds: number;
+    };
+    /**
+     * DeviceIsMine
+     * @description The answer of the person to a device that has sent their code.
+     */
+    DeviceIsMine: {
+        yes: boolean;
     };
     /**
      * Diagnostic
@@ -490,6 +543,13 @@ export interface EditorApi {
         author: string;
         from_seq: number;
         seq: number;
+    };
+    /**
+     * EndedSessions
+     * @description The number of sessions that were ended.
+     */
+    EndedSessions: {
+        ended: number;
     };
     /**
      * Example
@@ -743,6 +803,21 @@ export interface EditorApi {
         folder?: string;
     };
     /**
+     * Group
+     * @description A named set of persons.
+     */
+    Group: {
+        id: string;
+        name: string;
+    };
+    /**
+     * GroupName
+     * @description The name of a group.
+     */
+    GroupName: {
+        name: string;
+    };
+    /**
      * Guest
      * @description A person who came in by an invitation. `at`: when that was for the first time.
      */
@@ -885,13 +960,15 @@ export interface EditorApi {
     };
     /**
      * Invited
-     * @description The role that a link invites to, and who made the link.
+     * @description The role that a link invites to, and who made the link. `name`: of the one person for whom
+     *     it is; null for a link for everybody who has it.
      */
     Invited: {
         id: string;
         /** @enum {string} */
         role: "editor" | "operator" | "owner" | "viewer";
         by: string;
+        name: string | null;
     };
     /**
      * Inviting
@@ -1062,6 +1139,50 @@ export interface EditorApi {
         changes: EditorApi["KeyChange"][];
     };
     /**
+     * Member
+     * @description A person as owners see them. `groups`: ids. `until`: when the right to do more than Stop ends.
+     *     `links`: the newest first, for owners only. `unrecorded`: that the person is ended is not in
+     *     the log yet.
+     */
+    Member: {
+        id: string;
+        name: string;
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+        groups: string[];
+        /** Format: date-time */
+        made_at: string;
+        made_by: EditorApi["PersonRef"];
+        until?: string;
+        ended_at?: string;
+        ended_by?: EditorApi["PersonRef"];
+        /** @default false */
+        unrecorded?: boolean;
+        /** @default [] */
+        links?: EditorApi["PersonalLink"][];
+    };
+    /**
+     * MemberChange
+     * @description A change of a person; what is missing stays. `until`: null takes the date away.
+     */
+    MemberChange: {
+        name?: string;
+        /** @enum {string} */
+        role?: "editor" | "operator" | "owner" | "viewer";
+        groups?: string[];
+        until?: string | null;
+    };
+    /**
+     * Members
+     * @description All persons with personal links, and all groups. `origins`: the addresses of the page for
+     *     other people, the likeliest first.
+     */
+    Members: {
+        people: EditorApi["Member"][];
+        groups: EditorApi["Group"][];
+        origins: string[];
+    };
+    /**
      * MergePreview
      * @description The effect of a merge on the side `into`, where a conflict without a choice keeps this side's
      *     value. `seq`, `draft_seq`: the compared changes of origin and draft. `changes`: what would
@@ -1155,6 +1276,30 @@ export interface EditorApi {
         parent?: string | null;
     };
     /**
+     * NewLink
+     * @description The request for a new link of a person. `hours`: for how long it is valid.
+     */
+    NewLink: {
+        /** @default 72 */
+        hours?: number;
+    };
+    /**
+     * NewMember
+     * @description The request for a new person. `until`: when their right to do more than Stop ends; `hours`:
+     *     for how long the link is valid.
+     */
+    NewMember: {
+        name: string;
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+        /** @default [] */
+        groups?: string[];
+        /** @default null */
+        until?: string | null;
+        /** @default 72 */
+        hours?: number;
+    };
+    /**
      * NodeResultEvent
      * @description A visit of an action ended with this result; the real engine reports it to no client.
      */
@@ -1228,7 +1373,9 @@ export interface EditorApi {
     /**
      * OpenSession
      * @description A browser that is signed in. `invitation`: the id of the invitation by which it came in; it
-     *     is missing if it came in by the token.
+     *     is missing if it came in by the token or a personal link. `browser`: its name and system, as it
+     *     says; `address`: where it signed in, missing for this computer itself. `used_at`: the last use,
+     *     to the minute.
      */
     OpenSession: {
         id: string;
@@ -1238,6 +1385,13 @@ export interface EditorApi {
         /** Format: date-time */
         expires: string;
         invitation?: string;
+        /** @default  */
+        browser?: string;
+        /** @default  */
+        address?: string;
+        used_at?: string;
+        /** @default false */
+        personal?: boolean;
     };
     /**
      * Origin
@@ -1256,6 +1410,16 @@ export interface EditorApi {
         token?: string;
         /** @default  */
         address?: string;
+    };
+    /**
+     * OwnDevices
+     * @description The open sessions of the person; `this`: the id of the one that asks. `origins`: the
+     *     addresses of the page for other devices, the likeliest first.
+     */
+    OwnDevices: {
+        sessions: EditorApi["OpenSession"][];
+        this: string;
+        origins: string[];
     };
     /**
      * PackageContents
@@ -1340,6 +1504,26 @@ export interface EditorApi {
     PersonRef: {
         id: string;
         name: string;
+    };
+    /**
+     * PersonalLink
+     * @description A link for one person. `path` follows the origin of the page; it holds the secret, and is
+     *     left out once the link opens nothing. `browser`, `address`: of the browser that used it.
+     */
+    PersonalLink: {
+        id: string;
+        /** Format: date-time */
+        made_at: string;
+        made_by: EditorApi["PersonRef"];
+        /** Format: date-time */
+        expires_at: string;
+        path?: string;
+        used_at?: string;
+        /** @default  */
+        browser?: string;
+        /** @default  */
+        address?: string;
+        withdrawn_at?: string;
     };
     /**
      * Pieces
@@ -1659,11 +1843,13 @@ export interface EditorApi {
     };
     /**
      * SignedIn
-     * @description The person who is signed in. `named` is false until the person has given a name.
+     * @description The person who is signed in. `named` is false until the person has given a name. `personal`:
+     *     an owner has given it, since the person came by a personal link.
      */
     SignedIn: {
         person: EditorApi["Person"];
         named: boolean;
+        personal: boolean;
     };
     /**
      * SinceWhen
@@ -1820,6 +2006,16 @@ export interface EditorApi {
         subgraphs?: EditorApi["PinnedGraph"][];
     };
     /**
+     * WaitingDevice
+     * @description The answer to the browser that has sent a code: `claim`, with which it asks for its session,
+     *     the name of the person, and the number that both browsers show.
+     */
+    WaitingDevice: {
+        claim: string;
+        person: string;
+        number: string;
+    };
+    /**
      * WantedMerge
      * @description The merge that was previewed: of the origin after its change `seq`, and of the draft after
      *     its change `draft_seq`.
@@ -1864,6 +2060,12 @@ export interface EditorPaths {
     "/api/session/invitation": {
         post: EditorOperations["lookAtInvitation"];
     };
+    "/api/session/device": {
+        post: EditorOperations["sendDeviceCode"];
+    };
+    "/api/session/device/answer": {
+        post: EditorOperations["collectDevice"];
+    };
     "/api/invitations": {
         get: EditorOperations["listInvitations"];
         post: EditorOperations["invite"];
@@ -1879,6 +2081,32 @@ export interface EditorPaths {
     };
     "/api/sessions/{session}/end": {
         post: EditorOperations["endSession"];
+    };
+    "/api/members": {
+        get: EditorOperations["listMembers"];
+        post: EditorOperations["addMember"];
+    };
+    "/api/members/{person}": {
+        patch: EditorOperations["changeMember"];
+    };
+    "/api/members/{person}/link": {
+        post: EditorOperations["linkMember"];
+    };
+    "/api/members/{person}/qr": {
+        get: EditorOperations["getMemberCode"];
+    };
+    "/api/members/{person}/end": {
+        post: EditorOperations["endMember"];
+    };
+    "/api/people/{person}/sessions/end": {
+        post: EditorOperations["endSessionsOf"];
+    };
+    "/api/groups": {
+        post: EditorOperations["makeGroup"];
+    };
+    "/api/groups/{group}": {
+        delete: EditorOperations["removeGroup"];
+        patch: EditorOperations["renameGroup"];
     };
     "/api/config": {
         get: EditorOperations["getConfig"];
@@ -2049,6 +2277,28 @@ export interface EditorPaths {
     "/api/audit": {
         get: EditorOperations["listAudit"];
     };
+    "/api/devices": {
+        get: EditorOperations["listDevices"];
+    };
+    "/api/devices/{session}/end": {
+        post: EditorOperations["endDevice"];
+    };
+    "/api/devices/end": {
+        post: EditorOperations["endOtherDevices"];
+    };
+    "/api/devices/codes": {
+        post: EditorOperations["makeDeviceCode"];
+    };
+    "/api/devices/codes/{code}": {
+        get: EditorOperations["lookAtDevice"];
+        delete: EditorOperations["cancelDeviceCode"];
+    };
+    "/api/devices/codes/{code}/answer": {
+        post: EditorOperations["answerDevice"];
+    };
+    "/api/devices/codes/{code}/qr": {
+        get: EditorOperations["getDeviceQrCode"];
+    };
     "/api/doctor": {
         get: EditorOperations["examine"];
     };
@@ -2112,6 +2362,34 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["Invited"];
+                };
+            };
+        };
+    };
+    sendDeviceCode: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["CodeOfDevice"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["WaitingDevice"];
+                };
+            };
+        };
+    };
+    collectDevice: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["ClaimOfDevice"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["DeviceAnswer"];
                 };
             };
         };
@@ -2187,6 +2465,156 @@ interface EditorOperations {
         };
         responses: {
             204: {
+            };
+        };
+    };
+    listMembers: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Members"];
+                };
+            };
+        };
+    };
+    addMember: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["NewMember"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["Member"];
+                };
+            };
+        };
+    };
+    changeMember: {
+        parameters: {
+            path: {
+                person: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["MemberChange"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Member"];
+                };
+            };
+        };
+    };
+    linkMember: {
+        parameters: {
+            path: {
+                person: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["NewLink"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Member"];
+                };
+            };
+        };
+    };
+    getMemberCode: {
+        parameters: {
+            query: {
+                origin: string;
+            };
+            path: {
+                person: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "image/svg+xml": string;
+                };
+            };
+        };
+    };
+    endMember: {
+        parameters: {
+            path: {
+                person: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Member"];
+                };
+            };
+        };
+    };
+    endSessionsOf: {
+        parameters: {
+            path: {
+                person: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["EndedSessions"];
+                };
+            };
+        };
+    };
+    makeGroup: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["GroupName"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["Group"];
+                };
+            };
+        };
+    };
+    removeGroup: {
+        parameters: {
+            path: {
+                group: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    renameGroup: {
+        parameters: {
+            path: {
+                group: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["GroupName"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Group"];
+                };
             };
         };
     };
@@ -3328,6 +3756,99 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["AuditPage"];
+                };
+            };
+        };
+    };
+    listDevices: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["OwnDevices"];
+                };
+            };
+        };
+    };
+    endDevice: {
+        parameters: {
+            path: {
+                session: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    endOtherDevices: {
+        responses: {
+            204: {
+            };
+        };
+    };
+    makeDeviceCode: {
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["DeviceCode"];
+                };
+            };
+        };
+    };
+    lookAtDevice: {
+        parameters: {
+            path: {
+                code: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["DeviceAsking"];
+                };
+            };
+        };
+    };
+    cancelDeviceCode: {
+        parameters: {
+            path: {
+                code: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    answerDevice: {
+        parameters: {
+            path: {
+                code: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["DeviceIsMine"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    getDeviceQrCode: {
+        parameters: {
+            query: {
+                origin: string;
+            };
+            path: {
+                code: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "image/svg+xml": string;
                 };
             };
         };

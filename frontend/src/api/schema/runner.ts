@@ -957,6 +957,21 @@ export interface RunnerApi {
         text: string;
     };
     /**
+     * PersonFile
+     * @description A person as the file says. `groups`: ids of groups. `until`: seconds since 1970 after which
+     *     the person may do nothing but Stop; null for no such end.
+     */
+    PersonFile: {
+        id: string;
+        name: string;
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+        /** @default [] */
+        groups?: string[];
+        /** @default null */
+        until?: number | null;
+    };
+    /**
      * PersonRef
      * @description A person who acted. `id` is opaque and stable for a browser; people choose `name` themselves.
      */
@@ -1251,13 +1266,18 @@ export interface RunnerApi {
     };
     /**
      * Revocation
-     * @description The invitation that is revoked or the session that is ended: one of the two.
+     * @description The invitation or token that is revoked, or the session or person that is ended: exactly one
+     *     of them.
      */
     Revocation: {
         /** @default null */
         invitation?: string | null;
         /** @default null */
         session?: string | null;
+        /** @default null */
+        person?: string | null;
+        /** @default null */
+        token?: string | null;
     };
     /**
      * Robot
@@ -2071,6 +2091,9 @@ export interface RunnerPaths {
     };
     "/api/audit": {
         get: RunnerOperations["listAudit"];
+    };
+    "/api/members/{person}": {
+        put: RunnerOperations["storeMember"];
     };
     "/api/revocations": {
         post: RunnerOperations["revokeSessions"];
@@ -2931,6 +2954,22 @@ interface RunnerOperations {
                 content: {
                     "application/json": RunnerApi["AuditPage"];
                 };
+            };
+        };
+    };
+    storeMember: {
+        parameters: {
+            path: {
+                person: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["PersonFile"];
+            };
+        };
+        responses: {
+            204: {
             };
         };
     };

@@ -46,6 +46,7 @@ def _drafts(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/drafts",
         summary="The drafts of a graph, the last changed first",
         operation_id="listDrafts",
+        guards=[Needs("see")],
     )
     async def list_drafts(graph_id: str) -> list[DraftView]:
         return await app_state.services.drafts.of(graph_id)
@@ -64,7 +65,12 @@ def _drafts(app_state: EditorState) -> list[ControllerRouterHandler]:
         headers = {"location": f"/api/drafts/{made.id}"}
         return Response(made, status_code=201, headers=headers)
 
-    @get("/api/drafts/{draft_id:str}", summary="One draft", operation_id="getDraft")
+    @get(
+        "/api/drafts/{draft_id:str}",
+        summary="One draft",
+        operation_id="getDraft",
+        guards=[Needs("see")],
+    )
     async def get_draft(draft_id: str) -> DraftView:
         return await app_state.services.drafts.get(draft_id)
 

@@ -18,7 +18,7 @@ from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.version import VERSION, commit
-from action_assistant.web.auth.access import person_of
+from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.openapi import answer
@@ -70,14 +70,24 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
 
     known = commit()
 
-    @get("/api/config", summary="What a page has to know", operation_id="getConfig")
+    @get(
+        "/api/config",
+        summary="What a page has to know",
+        operation_id="getConfig",
+        guards=[Needs("see")],
+    )
     async def get_config(request: Request[Any, Any, Any]) -> Config:
         runner = addresses.runner_at(
             request.headers.get("host", ""), app_state.services.settings.runner_port
         )
         return Config("local", VERSION, runner, known)
 
-    @get("/api/people", summary="Everyone who acted here, and who asks", operation_id="listPeople")
+    @get(
+        "/api/people",
+        summary="Everyone who acted here, and who asks",
+        operation_id="listPeople",
+        guards=[Needs("see")],
+    )
     async def list_people(request: Request[Any, Any, Any]) -> list[Participant]:
         services, person = app_state.services, person_of(request)
         services.colours.given(person.id)
@@ -90,6 +100,7 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         "/api/examples",
         summary="The graphs that come with the program, as UMRF",
         operation_id="listExamples",
+        guards=[Needs("see")],
     )
     async def list_examples() -> list[Example]:
         files = [path async for path in anyio.Path(paths.examples()).glob("*.umrf.graph.json")]
@@ -104,6 +115,7 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         "/api/events",
         summary="What is stored, as server-sent events; `after` and Last-Event-ID are positions",
         operation_id="followEvents",
+        guards=[Needs("see")],
         media_type="text/event-stream",
         responses={200: answer(StoredEvent, media="text/event-stream", text="An event each time")},
     )

@@ -89,7 +89,12 @@ async def _inside_with(services: EditorServices, then: GraphAtSeq, text: bytes) 
 
 
 def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
-    @get("/api/graphs", summary="All graphs, the last changed first", operation_id="listGraphs")
+    @get(
+        "/api/graphs",
+        summary="All graphs, the last changed first",
+        operation_id="listGraphs",
+        guards=[Needs("see")],
+    )
     async def list_graphs(deleted: bool = False) -> list[GraphView]:
         return await app_state.services.catalogue.all(deleted=deleted)
 
@@ -119,7 +124,12 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         made, told = await services.catalogue.create(body, person.id, folder=folder)
         return made_graph(made, told)
 
-    @get("/api/graphs/{graph_id:str}", summary="One graph", operation_id="getGraph")
+    @get(
+        "/api/graphs/{graph_id:str}",
+        summary="One graph",
+        operation_id="getGraph",
+        guards=[Needs("see")],
+    )
     async def get_graph(graph_id: str) -> GraphView:
         return await app_state.services.catalogue.get(graph_id)
 
@@ -164,6 +174,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/umrf",
         summary="A graph as UMRF, now or after its change `at`; `identities`: with those of its actions",
         operation_id="getUmrf",
+        guards=[Needs("see")],
         responses={200: answer(UmrfGraph)},
     )
     async def get_umrf(
@@ -180,6 +191,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/problems",
         summary="What is wrong with a graph, now or after its change `seq`",
         operation_id="getProblems",
+        guards=[Needs("see")],
     )
     async def get_problems(graph_id: str, seq: Seq | None = None) -> Problems:
         services = app_state.services

@@ -68,6 +68,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/history",
         summary="What was done to a graph, newest first",
         operation_id="getHistory",
+        guards=[Needs("see")],
     )
     async def get_history(
         graph_id: str,
@@ -83,6 +84,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/document",
         summary="The document of a graph as it was after its change `at`",
         operation_id="getDocument",
+        guards=[Needs("see")],
         responses={200: answer(PastDocument)},
     )
     async def get_document(graph_id: str, at: Seq) -> Response[bytes]:
@@ -97,6 +99,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="The newest changes of keys after the change `after` up to `upto`, in order of time: "
         "the steps between two documents",
         operation_id="getChanges",
+        guards=[Needs("see")],
     )
     async def get_changes(
         graph_id: str,
@@ -114,6 +117,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/diff",
         summary="What differs between two changes of a graph; `to` is now when left out",
         operation_id="getDifference",
+        guards=[Needs("see")],
     )
     async def get_difference(
         graph_id: str,
@@ -137,6 +141,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/blame",
         summary="Who gave each field of an action, arrow or note the value that it has, and when",
         operation_id="getBlame",
+        guards=[Needs("see")],
     )
     async def get_blame(graph_id: str, of: str, at: Seq | None = None) -> list[FieldBlame]:
         services = app_state.services
@@ -147,6 +152,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/blame/values",
         summary="All values that a field of an action, arrow or note has had, newest first",
         operation_id="getValues",
+        guards=[Needs("see")],
     )
     async def get_values(
         graph_id: str, of: str, field: str, at: Seq | None = None

@@ -1,14 +1,13 @@
 """Routes of invitations, for owners: links with a role, who came in by them, and their end."""
 
-import io
 from typing import Annotated, Any, Literal
 
 import msgspec
-import segno
 from anyio import to_thread
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
+from action_assistant.editor.api.qr_codes import qr_code
 from action_assistant.editor.people.invitations import Invitation
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput, Conflict
@@ -125,14 +124,6 @@ def _one(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterH
         found = app_state.services.invitations.get(invitation)
         if found.path is None:
             raise Conflict("This link was revoked.")
-        headers = {"cache-control": "no-store"}
-        return Response(_svg(origin + found.path), media_type="image/svg+xml", headers=headers)
+        return qr_code(origin + found.path)
 
     return [revoke, code]
-
-
-def _svg(link: str) -> bytes:
-    out = io.BytesIO()
-    drawn = segno.make(link, error="l", micro=False)
-    drawn.save(out, kind="svg", scale=8, border=2, light="white", xmldecl=False)
-    return out.getvalue()

@@ -80,6 +80,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/actions",
         summary="The actions of the library, and those that only graphs know, by name",
         operation_id="listActions",
+        guards=[Needs("see")],
     )
     async def list_actions() -> list[LibraryAction]:
         return encoded(list[LibraryAction], await app_state.services.library.all())
@@ -88,6 +89,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/actions/graphs",
         summary="The graphs, each as the action that stands for it in another one, by name",
         operation_id="listGraphsAsActions",
+        guards=[Needs("see")],
     )
     async def list_graphs_as_actions() -> list[GraphAsAction]:
         return encoded(list[GraphAsAction], await app_state.services.library.graphs())
@@ -96,6 +98,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/actions/deleted",
         summary="Actions that were taken out of the library; each can be recovered as a graph can",
         operation_id="listDeletedActions",
+        guards=[Needs("see")],
     )
     async def list_deleted_actions() -> list[GraphView]:
         return await app_state.services.catalogue.all(deleted=True, kind="action")
@@ -129,6 +132,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/actions/{action_id:str}/umrf",
         summary="The UMRF file of an action, now or after its change `at`",
         operation_id="getActionUmrf",
+        guards=[Needs("see")],
         responses={200: answer(JsonObject)},
     )
     async def get_action_umrf(action_id: str, at: Seq | None = None) -> Response[bytes]:
@@ -180,6 +184,7 @@ def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="The graphs that use an action, and what an update would change in each; `inputs` and "
         "`outputs` are renames, OLD:NEW, each of both percent-encoded",
         operation_id="listUses",
+        guards=[Needs("see")],
     )
     async def list_uses(action_id: str, inputs: Pairs = None, outputs: Pairs = None) -> ActionUses:
         services = app_state.services
@@ -225,6 +230,7 @@ def _builds(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/actions/{action_id:str}/build",
         summary="How the last build of an action's package went, as `action-assistant builds` told",
         operation_id="getBuild",
+        guards=[Needs("see")],
     )
     async def get_build(action_id: str) -> LastBuild:
         return LastBuild(await app_state.services.library_edits.last_build(action_id))

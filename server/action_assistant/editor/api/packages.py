@@ -12,6 +12,7 @@ from action_assistant.editor.interchange.action_packages import PackageContents,
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.umrf.kept_values import KEEPER_PACKAGE
+from action_assistant.web.auth.access import Needs
 from action_assistant.web.server.openapi import FileBytes, answer
 
 Packages = Annotated[list[str] | None, QueryParameter(name="package", max_items=1000)]
@@ -25,6 +26,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="The C++ packages of a graph's actions, now or after its change `at`, and why some "
         "have none",
         operation_id="listPackages",
+        guards=[Needs("see")],
     )
     async def list_packages(graph_id: str, at: Seq | None = None) -> PackageList:
         services = app_state.services
@@ -38,6 +40,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/packages/{package:str}",
         summary="The files of one of these packages",
         operation_id="getPackage",
+        guards=[Needs("see")],
     )
     async def get_package(graph_id: str, package: str, at: Seq | None = None) -> PackageContents:
         services = app_state.services
@@ -50,6 +53,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/packages.zip",
         summary="These packages, or all that there are, as a ZIP file",
         operation_id="downloadPackages",
+        guards=[Needs("see")],
         responses={200: answer(FileBytes, media="application/zip")},
     )
     async def download_packages(
@@ -74,6 +78,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         summary="The package that keeps values, with which conducted runs can hand them from robot to "
         "robot, as a ZIP file",
         operation_id="downloadValuesPackage",
+        guards=[Needs("see")],
         responses={200: answer(FileBytes, media="application/zip")},
     )
     async def download_values_package() -> Response[bytes]:

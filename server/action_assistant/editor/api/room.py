@@ -6,6 +6,7 @@ event for each message. Both ways keep the same rules.
 
 import asyncio
 import logging
+import time
 from typing import Any, Final
 
 import anyio
@@ -19,9 +20,9 @@ from action_assistant.editor.rooms.room import Room
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
 from action_assistant.logs import about
-from action_assistant.web.auth.access import person_of, plain, refuse
+from action_assistant.web.auth.access import Needs, identity_of, person_of, plain, refuse
 from action_assistant.web.auth.caller import origin_of
-from action_assistant.web.auth.roles import allowed
+from action_assistant.web.auth.rights import Allowed, may
 from action_assistant.web.server.direct import DirectSocket, direct_socket
 
 log: Final = logging.getLogger(__name__)
@@ -230,7 +231,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Return the route of rooms (WebSockets of graphs). Common clients (`y-websocket`) append the
     name of their room to the path, always `room`."""
 
-    @websocket("/api/graphs/{graph_id:str}/room")
+    @websocket("/api/graphs/{graph_id:str}/room", guards=[Needs("see")])
     async def room(socket: Socket, graph_id: str) -> None:
         services, person = app_state.services, person_of(socket)
         stream = h.graph_stream(graph_id)
@@ -247,7 +248,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                     if _has_other_history(socket, services.epoch, found):
                         await _refuse_history(socket, services.epoch)
                         return
-                    edits = allowed(person.role, "edit")
+                    edits = may(identity_of(socket), "edit", now=time.time()) == Allowed()
                     acks = _wants_acks(socket)
                     with services.colours.held(person.id) as colour:
                         origin = origin_of(person.id)

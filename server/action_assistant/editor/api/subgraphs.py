@@ -198,6 +198,7 @@ def _flat(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/flat",
         summary="A graph and those inside of it as one graph that does the same, or why there is none",
         operation_id="getFlatGraph",
+        guards=[Needs("see")],
     )
     async def get_flat(graph_id: str, at: Seq | None = None) -> FlatGraph:
         services = app_state.services

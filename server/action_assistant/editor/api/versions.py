@@ -30,6 +30,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/versions",
         summary="The versions of a graph, newest first, without their UMRF",
         operation_id="listVersions",
+        guards=[Needs("see")],
     )
     async def list_versions(graph_id: str) -> list[VersionView]:
         services = app_state.services
@@ -63,6 +64,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/subgraphs",
         summary="The graphs inside of a graph, as they are now, at all levels",
         operation_id="getSubgraphs",
+        guards=[Needs("see")],
     )
     async def get_subgraphs(graph_id: str, at: Seq | None = None) -> InsideView:
         services = app_state.services
@@ -73,6 +75,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/graphs/{graph_id:str}/subgraphs.zip",
         summary="These graphs as files for an engine to index, in a ZIP file",
         operation_id="downloadSubgraphs",
+        guards=[Needs("see")],
         responses={200: answer(FileBytes, media="application/zip")},
     )
     async def download_subgraphs(graph_id: str, at: Seq | None = None) -> Response[bytes]:
@@ -94,6 +97,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         "/api/versions/{version_id:str}",
         summary="One version with its UMRF",
         operation_id="getVersion",
+        guards=[Needs("see")],
     )
     async def get_version(version_id: str) -> VersionView:
         return await app_state.services.versions.get(version_id)

@@ -13,6 +13,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 import msgspec
 from sqlalchemy import Executable, ScalarSelect, delete, insert, select, update
 
+from action_assistant.editor.log import people_events
 from action_assistant.journal.events import Draft, Event
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.caller import stamped
@@ -303,6 +304,8 @@ def fold(event: Event) -> Sequence[Executable]:
         return _invitation(event)
     if event.stream == FOLDERS:
         return _folder(event)
+    if event.stream == PEOPLE:
+        return people_events.fold(event, _read)
     return ()
 
 

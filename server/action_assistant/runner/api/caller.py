@@ -12,8 +12,7 @@ from litestar.exceptions.http_exceptions import RequestEntityTooLarge
 from action_assistant.errors import Unavailable
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.sent_graphs import MOST, counted
-from action_assistant.web.auth.access import person_of, session_of
-from action_assistant.web.auth.caller import network_address
+from action_assistant.web.auth.access import identity_of, person_of, session_of
 from action_assistant.web.http.problems import BODY_LIMIT_TOLD
 from action_assistant.web.network.connection_limits import ConcurrencyLimit
 
@@ -34,7 +33,7 @@ def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
         person.id,
         person.name,
         by="program" if session_of(connection) is None else "browser",
-        address=network_address(connection.client.host if connection.client else ""),
+        address=identity_of(connection).address,
     )
 
 

@@ -7,6 +7,7 @@ before it.
 
 import logging
 import math
+import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 from datetime import datetime
@@ -19,7 +20,7 @@ import msgspec
 from litestar import WebSocket
 from litestar.exceptions import WebSocketDisconnect, WebSocketException
 
-from action_assistant.errors import Refused
+from action_assistant.errors import Forbidden, Refused
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -30,7 +31,8 @@ from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.foreign_stop import StoppedAll
 from action_assistant.safe_text import hold_names
-from action_assistant.web.auth.access import session_of
+from action_assistant.web.auth.access import identity_of, is_expired
+from action_assistant.web.auth.rights import Denied, may
 
 log: Final = logging.getLogger(__name__)
 
@@ -203,9 +205,10 @@ class Hub:
         recorded = opened.recorder.recorded
         return views.run_view(opened.run, recorded=recorded, cache=self.view_cache(opened))
 
-    async def follow(self, text: str, author: Author) -> str:
+    async def follow(self, text: str, author: Author, *, denied: str = "") -> str:
         """Carry out a message of a page in the name of `author`, and return the text of the answer.
         A message that cannot be understood or carried out is answered with the reason, not raised.
+        `denied`: why its sender may not stop anything; "" if they may.
         """
         stop_id = ""
         try:
@@ -213,6 +216,8 @@ class Hub:
                 raise msgspec.ValidationError("too long")
             message = msgspec.json.decode(text, type=StopMessage)
             stop_id = message.stop_id
+            if denied:
+                raise Forbidden(denied)
             if message.run == "all":
                 return _text(Stopping.everything(stop_id, self.control.stop_all(author, stop_id)))
             runs = await self.control.stop(message.run, author, stop_id)
@@ -310,9 +315,8 @@ class Outbox:
 async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
     """Serve the socket of one page until it disconnects. A page with an expired session may still
     stop runs, but gets no more states."""
-    session = session_of(socket)
     author = author_of(socket)
-    box = Outbox(hub, lambda: session is None or not session.expired)
+    box = Outbox(hub, lambda: not is_expired(socket))
     await socket.accept()
     box.post(await hub.hello())
     hub.boxes.add(box)
@@ -335,7 +339,9 @@ async def _read(
     try:
         while True:
             text = await socket.receive_text()
-            if not box.post(await hub.follow(text, author)):
+            stop = may(identity_of(socket), "stop", now=time.time())
+            denied = stop.reason if isinstance(stop, Denied) else ""
+            if not box.post(await hub.follow(text, author, denied=denied)):
                 await socket.close(code=_TOO_SLOW, reason="too slow")
                 break
     except (WebSocketDisconnect, WebSocketException, OSError):

@@ -94,6 +94,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/film",
         summary="The changes of a run by each event, page by page",
         operation_id="getReplay",
+        guards=[Needs("see")],
     )
     async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[RunReplay]:
         return json_of(await services.worker_queries.text(StoredRuns.replay, run, after), RunReplay)
@@ -102,6 +103,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/causes",
         summary="The proven causes of a run's end",
         operation_id="listCauses",
+        guards=[Needs("see")],
     )
     async def found_causes(run: str) -> Response[list[CauseShown]]:
         return json_of(await services.worker_queries.text(StoredRuns.causes, run), list[CauseShown])
@@ -110,6 +112,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/umrf",
         summary="The graph of a run as it was sent",
         operation_id="getRunUmrf",
+        guards=[Needs("see")],
         responses={200: answer(UmrfGraph)},
     )
     async def umrf(run: str) -> Response[bytes]:
@@ -119,6 +122,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/marks",
         summary="The marks that people gave a run",
         operation_id="getMarks",
+        guards=[Needs("see")],
     )
     async def marks(run: str) -> RunMarks:
         return await services.review_service.marks(run)
@@ -136,6 +140,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/script",
         summary="The course of a run, as a script for the simulator",
         operation_id="getScript",
+        guards=[Needs("see")],
     )
     async def script(
         run: str, action: str | None = None, fault: expected_runs.Fault | None = None
@@ -165,6 +170,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/export",
         summary="A run as a file: jsonl, csv or mcap",
         operation_id="exportRun",
+        guards=[Needs("see")],
         responses={200: answer(FileBytes, media="application/octet-stream")},
     )
     async def export(
@@ -182,6 +188,7 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/raw",
         summary="The places of the raw messages from the time of a run",
         operation_id="getRawMessages",
+        guards=[Needs("see")],
     )
     async def raw(run: str) -> Response[RawMessages]:
         found = await services.control.find(run)
@@ -238,6 +245,7 @@ def _many_runs(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/comparison",
         summary="Two runs side by side, and where they part",
         operation_id="compareRuns",
+        guards=[Needs("see")],
     )
     async def comparison(a: str, b: str) -> Response[RunComparison]:
         return json_of(await services.worker_queries.text(StoredRuns.compare, a, b), RunComparison)
@@ -246,6 +254,7 @@ def _many_runs(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/statistics",
         summary="The newest runs of a graph together",
         operation_id="getStatistics",
+        guards=[Needs("see")],
     )
     async def statistics(
         graph: str,

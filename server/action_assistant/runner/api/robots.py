@@ -142,7 +142,12 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
-    @get("/api/robots", summary="Engines that runs can go to", operation_id="listRobots")
+    @get(
+        "/api/robots",
+        summary="Engines that runs can go to",
+        operation_id="listRobots",
+        guards=[Needs("see")],
+    )
     async def robots() -> list[Robot]:
         return services.control.robot_views()
 
@@ -150,6 +155,7 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/reach",
         summary="All engines, and whether robots can be reached over ROS 2 from here",
         operation_id="getReach",
+        guards=[Needs("see")],
     )
     async def reach() -> ReachStatus:
         control = services.control
@@ -161,6 +167,7 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/candidates",
         summary="Engines in sight that nobody registered yet, once discovery has had its seconds",
         operation_id="findEngines",
+        guards=[Needs("see")],
     )
     async def candidates() -> list[Candidate]:
         return list(await services.control.robots.candidates())
@@ -169,6 +176,7 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/candidates/now",
         summary="Engines in sight now that nobody registered yet, and for how long others may still appear",
         operation_id="getFoundEngines",
+        guards=[Needs("see")],
     )
     async def sighting() -> Sighting:
         return await services.control.robots.sighting()
@@ -212,7 +220,12 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
-    @get("/api/robots/{name:str}", summary="One engine", operation_id="getRobot")
+    @get(
+        "/api/robots/{name:str}",
+        summary="One engine",
+        operation_id="getRobot",
+        guards=[Needs("see")],
+    )
     async def robot(name: str) -> Robot:
         return services.control.robot_view(name)
 
@@ -220,6 +233,7 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/known",
         summary="Actions and graphs that a robot has indexed",
         operation_id="getRobotIndex",
+        guards=[Needs("see")],
     )
     async def known(name: str) -> RobotKnowledge:
         index = await services.control.robots.index(name)
@@ -230,6 +244,7 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/known/{action:str}",
         summary="An action that a robot has indexed, as its UMRF file",
         operation_id="getIndexedAction",
+        guards=[Needs("see")],
         responses={200: answer(JsonObject)},
     )
     async def known_action(name: str, action: str) -> Response[bytes]:
@@ -244,6 +259,7 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/events",
         summary="The flight record of a robot, newest first",
         operation_id="getRobotLog",
+        guards=[Needs("see")],
     )
     async def events(name: str) -> list[RobotLogLine]:
         services.control.robots.registration(name)
@@ -254,6 +270,7 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/events/{seq:int}/umrf",
         summary="The graph of a command, as UMRF",
         operation_id="getCommandedGraph",
+        guards=[Needs("see")],
         responses={200: answer(UmrfGraph)},
     )
     async def commanded(name: str, seq: int) -> Response[bytes]:
@@ -264,6 +281,7 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/umrf",
         summary="A graph that a robot holds, as UMRF",
         operation_id="getHeldGraph",
+        guards=[Needs("see")],
         responses={200: answer(UmrfGraph)},
     )
     async def held(name: str, graph: str) -> Response[bytes]:
@@ -275,6 +293,7 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/recordings",
         summary="Recordings of an engine's messages, by the hour",
         operation_id="listRecordings",
+        guards=[Needs("see")],
     )
     async def recorded(name: str) -> list[Recording]:
         services.control.robots.registration(name)
@@ -285,6 +304,7 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/robots/{name:str}/recordings/{file:str}",
         summary="A recording of one hour, as JSON lines, gzipped",
         operation_id="downloadRecording",
+        guards=[Needs("see")],
         responses={200: answer(FileBytes, media="application/gzip")},
     )
     async def recording(name: str, file: str) -> Response[bytes]:

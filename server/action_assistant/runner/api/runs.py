@@ -119,6 +119,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/starts/{request_id:str}",
         summary="The runs that a start has become, by its request_id",
         operation_id="getStart",
+        guards=[Needs("see")],
     )
     async def started(request_id: str) -> views.StartShown:
         # Before the query: a start that is not under way any more is stored.
@@ -236,7 +237,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
-    @get("/api/runs", summary="Runs, newest first", operation_id="listRuns")
+    @get("/api/runs", summary="Runs, newest first", operation_id="listRuns", guards=[Needs("see")])
     async def listed(
         graph: str | None = None,
         robot: str | None = None,
@@ -274,13 +275,21 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         found = await services.worker_queries.text(StoredRuns.listed, wanted, limit, open_runs)
         return json_of(found, list[views.Listed])
 
-    @get("/api/labels", summary="Labels of runs, the most used first", operation_id="listLabels")
+    @get(
+        "/api/labels",
+        summary="Labels of runs, the most used first",
+        operation_id="listLabels",
+        guards=[Needs("see")],
+    )
     async def every_label() -> list[str]:
         rows = await services.control.history.rows(queries.all_labels())
         return [row.label for row in rows]
 
     @get(
-        "/api/runs/{run:str}", summary="A run, and the graph as it was sent", operation_id="getRun"
+        "/api/runs/{run:str}",
+        summary="A run, and the graph as it was sent",
+        operation_id="getRun",
+        guards=[Needs("see")],
     )
     async def one(run: str) -> Response[views.RunWhole]:
         opened = services.control.open.get(run)
@@ -304,6 +313,7 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/runs/{run:str}/events",
         summary="A run's events as they are stored (SSE)",
         operation_id="followRun",
+        guards=[Needs("see")],
         responses={
             200: answer(HistoryEvent, media="text/event-stream", text="An event each time"),
             204: ResponseSpec(None, description="All of them are known, and no more will come"),
@@ -329,7 +339,11 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
 
 
 def _live(services: RunnerServices) -> ControllerRouterHandler:
-    @websocket("/api/live", opt=exchanges(RunnerMessage=RunnerMessage, PageMessage=PageMessage))
+    @websocket(
+        "/api/live",
+        opt=exchanges(RunnerMessage=RunnerMessage, PageMessage=PageMessage),
+        guards=[Needs("see")],
+    )
     async def live(socket: WebSocket[Any, Any, Any]) -> None:
         address = socket.client.host if socket.client is not None else ""
         try:
@@ -428,6 +442,7 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         "/api/approvals",
         summary="The approvals of a graph, by its digest",
         operation_id="listApprovals",
+        guards=[Needs("see")],
     )
     async def approvals(
         digest: Annotated[str, Parameter(min_length=64, max_length=64)],
@@ -463,6 +478,7 @@ def _expected_courses(services: RunnerServices) -> list[ControllerRouterHandler]
         "/api/expectations",
         summary="Courses that graphs are expected to take",
         operation_id="listExpectations",
+        guards=[Needs("see")],
     )
     async def listed() -> Response[list[Expectation]]:
         return json_of(

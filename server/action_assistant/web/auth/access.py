@@ -6,6 +6,7 @@ import asyncio
 import getpass
 import logging
 import re
+import time
 from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import Any, Final, NamedTuple
@@ -15,6 +16,7 @@ from litestar.connection import ASGIConnection
 from litestar.enums import ScopeType
 from litestar.handlers.base import BaseRouteHandler
 from litestar.types import ASGIApp, HTTPScope, Message, Receive, Scope, Send, WebSocketScope
+from msgspec.structs import replace
 
 from action_assistant.errors import (
     Forbidden,
@@ -26,9 +28,24 @@ from action_assistant.errors import (
 )
 from action_assistant.logs import request_id
 from action_assistant.web.auth.caller import Caller, Origin, network_address, set_caller
+from action_assistant.web.auth.identity import (
+    Credential,
+    Identity,
+    NoTokens,
+    Standing,
+    Token,
+    Tokens,
+)
 from action_assistant.web.auth.keys import Keys, Person, ScrapeToken, Session
-from action_assistant.web.auth.revocations import SESSION_ENDED, Revocations, SessionGuards
-from action_assistant.web.auth.roles import OWNER, Permission, allowed, may
+from action_assistant.web.auth.revocations import (
+    SESSION_ENDED,
+    Revocations,
+    SessionGuards,
+    sealed_standing,
+)
+from action_assistant.web.auth.rights import Denied, Thing, may
+from action_assistant.web.auth.roles import OWNER, Permission
+from action_assistant.web.auth.standing import Standings
 from action_assistant.web.http.problems import problem_of
 from action_assistant.web.network.addresses import Addresses
 
@@ -45,6 +62,8 @@ _STOPS: Final = re.compile(r"/api/stop|/api/(runs|robots)/[^/]+/stop")
 _LIVE: Final = "/api/live"
 _GOODBYE: Final = 1.0  # seconds that a close frame gets
 _POLICY: Final = b"content-security-policy"
+#: Stands for the program with the token for scraping, which reads the metrics only.
+_SCRAPER: Final = Person("scrape", "Metrics", "viewer")
 _HEADERS: Final = (
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
@@ -66,10 +85,16 @@ def device_cookie_name(page_port: int) -> str:
     return f"aa_{page_port}_device"
 
 
+def identity_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Identity:
+    """Return the identity behind a request. Only routes behind the access control that are not
+    `Open` may call this."""
+    identity: Identity = connection.scope["state"]["identity"]
+    return identity
+
+
 def person_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Person:
-    """Return the person who sent a request. Only routes behind the access control may call this."""
-    person: Person = connection.scope["state"]["person"]
-    return person
+    """Return the person who sent a request, under the same condition as `identity_of`."""
+    return identity_of(connection).person
 
 
 def device_of(connection: ASGIConnection[Any, Any, Any, Any]) -> str:
@@ -84,15 +109,39 @@ def session_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None
     return session
 
 
-def require(connection: ASGIConnection[Any, Any, Any, Any], permission: Permission) -> None:
-    """Raise Forbidden if the person of this connection has a role that does not allow this."""
-    role = person_of(connection).role
-    if not allowed(role, permission):
-        raise Forbidden(f"You are here as {role}: you may {may(role)}.")
+def require(
+    connection: ASGIConnection[Any, Any, Any, Any],
+    permission: Permission,
+    thing: Thing | None = None,
+) -> None:
+    """Raise Forbidden, with the reason, if the identity of this connection may not do this."""
+    decision = may(identity_of(connection), permission, thing, now=time.time())
+    if isinstance(decision, Denied):
+        raise Forbidden(decision.reason)
 
 
-class Needs:
-    """A guard of a route: it refuses a person without the permission before the request is read."""
+class DeclaredRight:
+    """A guard that declares who may call a route. A route without one stops the program."""
+
+    async def __call__(
+        self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler
+    ) -> None:
+        """Raise a refusal unless the request may go on. This is a coroutine since a plain function
+        would run in a thread, for which Stop had to wait."""
+
+
+class Open(DeclaredRight):
+    """Declares a route that answers strangers, too. The access control lets all requests to its
+    path pass, so every route of that path has to be open."""
+
+
+class SignedIn(DeclaredRight):
+    """Declares a route for everybody who is signed in, and for all tokens."""
+
+
+class Needs(DeclaredRight):
+    """Declares a route for those who have a permission. Others are refused before their request
+    is read."""
 
     def __init__(self, permission: Permission) -> None:
         self.permission: Final = permission
@@ -100,16 +149,22 @@ class Needs:
     async def __call__(
         self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler
     ) -> None:
-        """Raise Forbidden if the person's role lacks the permission. This is a coroutine since a
-        plain function would run in a thread, for which Stop had to wait."""
+        """Raise Forbidden if the identity lacks the permission."""
         require(connection, self.permission)
 
 
-def known_person(connection: ASGIConnection[Any, Any, Any, Any]) -> Person | None:
-    """Return the person of this browser's session, also of an expired one; None without a session."""
-    state = connection.scope["state"]
-    session: Session | None = state.get("session") or state.get("expired")
-    return session.person if session is not None else None
+def expired_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None:
+    """Return the expired session of this browser; None without one. It proves only that the same
+    person is back."""
+    session: Session | None = connection.scope["state"].get("expired")
+    return session
+
+
+def is_expired(connection: ASGIConnection[Any, Any, Any, Any]) -> bool:
+    """Return whether the session of an open socket has expired by now. It then allows nothing but
+    Stop."""
+    check: Callable[[], bool] = connection.scope["state"].get("is_expired", lambda: False)
+    return check()
 
 
 def live_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session:
@@ -141,7 +196,9 @@ class Access:
     """An ASGI middleware that authenticates each request and refuses strangers.
 
     `is_open(path, accepts_html)` says which paths need no credentials; `policy(host)` returns the
-    Content-Security-Policy for a page asked for under that Host header.
+    Content-Security-Policy for a page asked for under that Host header. `tokens` knows the tokens
+    of programs. `standings`: knows what sessions and tokens are worth now; without it they are
+    worth what they say themselves.
     """
 
     def __init__(
@@ -155,9 +212,13 @@ class Access:
         policy: Callable[[str], str],
         revoked: Revocations,
         scraped: ScrapeToken | None = None,
+        tokens: Tokens | None = None,
+        standings: Standings | None = None,
     ) -> None:
         self._app = app
+        self._standings = standings
         self._scraped = scraped or ScrapeToken()
+        self._tokens = tokens or NoTokens()
         self._keys = keys
         self._addresses = addresses
         self._cookie = cookie_name(page_port)
@@ -165,11 +226,11 @@ class Access:
         self._is_open = is_open
         self._policy = policy
         self._revoked = revoked
-        self._leashes = SessionGuards(revoked)
+        self._leashes = SessionGuards(revoked, self._standing_while_open)
         self._local = Person("local", _user_name(), OWNER)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Refuse, or pass on with `state.person` set."""
+        """Refuse, or pass on with `state.identity` set."""
         if scope["type"] not in _CALLS:  # lifespan
             await self._app(scope, receive, send)
             return
@@ -181,27 +242,33 @@ class Access:
         except Refused as refused:
             await refuse(scope, receive, send, refused)
             return
-        known: Person | None = scope["state"].get("person")
+        identity: Identity | None = scope["state"].get("identity")
+        if identity is not None and identity.person is _SCRAPER:
+            identity = None  # as nobody: there is nothing else to be found out
         asked = receive if scope["type"] == ScopeType.HTTP else None
-        if known is not None:
-            scope["state"].get(KNOWN, _nobody)(known.id)
-        set_caller(None if known is None else _caller(known, scope, asked))
+        if identity is not None:
+            scope["state"].get(KNOWN, _nobody)(identity.person.id)
+        set_caller(None if identity is None else _caller(identity, asked))
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return
-        session: Session | None = scope["state"].get("session")
+        credential = None if identity is None else identity.session or identity.token
         lasts = _lasts(scope, headers)
         del headers  # of a socket they would be kept for as long as it is open
-        if session is None or not lasts:
+        if credential is None or not lasts:
             await self._app(scope, receive, send)
         else:
-            await self._leashed(session, scope, receive, send)
+            await self._leashed(credential, scope, receive, send)
 
     async def _leashed(
-        self, session: Session, scope: HTTPScope | WebSocketScope, receive: Receive, send: Send
+        self,
+        credential: Credential,
+        scope: HTTPScope | WebSocketScope,
+        receive: Receive,
+        send: Send,
     ) -> None:
-        """Pass the request on, and end it when the session ends. A socket for Stop goes on if the
-        session has only expired."""
+        """Pass the request on, and end it when the session or token ends. A socket for Stop goes on
+        if the session has only expired."""
         begun = over = False
 
         async def sent(message: Message) -> None:
@@ -210,7 +277,7 @@ class Access:
             over = message["type"] == "websocket.close" or message.get("more_body") is False
             await send(message)
 
-        with self._leashes.hold(session, outlives=scope["path"] == _LIVE) as leash:
+        with self._leashes.hold(credential, outlives=scope["path"] == _LIVE) as leash:
             try:
                 await self._app(scope, receive, sent)
                 if not leash.is_cut:
@@ -225,8 +292,7 @@ class Access:
         if scope["type"] == ScopeType.WEBSOCKET:
             last = {"type": "websocket.close", "code": SESSION_ENDED, "reason": "session ended"}
         elif not begun:
-            signed_out = self._revoked.ended(session)
-            await refuse(scope, receive, send, _ended(session, signed_out=signed_out))
+            await refuse(scope, receive, send, self._over(credential))
             return
         if not over:
             with anyio.move_on_after(_GOODBYE):
@@ -261,31 +327,77 @@ class Access:
     ) -> None:
         state = scope.setdefault("state", {})
         path = scope["path"]
-        state["device"] = self._device(headers)
-        scheme, _, token = headers.get("authorization", "").partition(" ")
-        if scheme.lower() == "bearer" and self._keys.opens(token.strip()):
-            state["person"] = self._local
-            return
-        if scheme.lower() == "bearer" and self._scraped.opens(method, path, token.strip()):
-            return  # as nobody: there is nothing else to be found out
+        device = state["device"] = self._device(headers)
+        address = client_address(scope)
+        scheme, _, text = headers.get("authorization", "").partition(" ")
+        if scheme.lower() == "bearer":
+            found = self._program(text.strip(), method, path)
+            if found is not None:
+                state["identity"] = replace(found, device=device, address=address)
+                return
         genuine = self._sessions(headers)
         state["sessions"] = genuine
         session = self._lasting(genuine)
         ended = session is not None and self._revoked.ends(session)
-        if session is not None and not ended and (not session.expired or _is_stop(method, path)):
+        if session is not None and not ended:
+            standing = self._standing(session)
+        if session is not None and not ended and (not standing.expired or _is_stop(method, path)):
             if origin is None and method not in _SAFE:
                 raise WrongOrigin("A browser says which page is asking; this request does not.")
             if headers.get("sec-fetch-site") == "cross-site" and path.startswith("/api/"):
                 raise WrongOrigin("Other sites may not use this session.")
-            state["person"] = session.person
+            if self._standings is not None and not standing.expired:
+                self._standings.browsers.use(session.id)
             state["session"] = session
+            state["identity"] = Identity(
+                standing.person, standing.groups, session, device=device, address=address
+            )
+            state["is_expired"] = lambda: self._standing(session).expired
             return
-        signed_out = session is not None and self._revoked.ended(session)
-        if session is not None and not signed_out:
+        if session is not None and not self._revoked.ended(session):
             state["expired"] = session  # good for nothing but being the same person again
-        state["ended"] = _ended(session, signed_out=signed_out)
+        state["ended"] = _ended(None) if session is None else self._over(session)
         if not self._is_open(path, "text/html" in headers.get("accept", "")):
             raise state["ended"]
+
+    def _program(self, text: str, method: str, path: str) -> Identity | None:
+        """Return the identity of a program with this token; None if the text is no token of this
+        server. Raise Unauthenticated or Withdrawn for a token that opens nothing any more."""
+        if self._keys.opens(text):
+            return Identity(self._local)
+        if self._scraped.opens(method, path, text):
+            return Identity(_SCRAPER)
+        token = self._tokens.opens(text)
+        if token is None:
+            return None
+        standing = self._standing(token)
+        if self._revoked.ends(token) or (standing.expired and not _is_stop(method, path)):
+            raise self._over(token)
+        return Identity(standing.person, standing.groups, token=token)
+
+    def _standing_while_open(self, credential: Credential) -> Standing:
+        """Return the standing of an open connection, which counts as use of its session."""
+        standing = self._standing(credential)
+        in_use = isinstance(credential, Session) and not standing.expired
+        if self._standings is not None and in_use:
+            self._standings.browsers.use(credential.id)
+        return standing
+
+    def _standing(self, credential: Credential) -> Standing:
+        if self._standings is not None:
+            return self._standings.of(credential)
+        return sealed_standing(credential)
+
+    def _over(self, credential: Credential) -> Refused:
+        """Return the refusal for a session or token that has expired or was ended."""
+        if self._revoked.person_ended(credential.person.id):
+            return Withdrawn("Your access was ended by an owner. Ask for a new link.")
+        if isinstance(credential, Token):
+            if self._revoked.token_ended(credential.id):
+                return Withdrawn(f"The token {credential.name!r} was revoked.")
+            return Unauthenticated(f"The token {credential.name!r} has expired.")
+        signed_out = self._revoked.ended(credential)
+        return _ended(credential, signed_out=signed_out, expired=self._standing(credential).expired)
 
     def _sessions(self, headers: dict[str, str]) -> list[Session]:
         """Return the sessions of all cookies that this server sealed. A browser may send several,
@@ -302,7 +414,11 @@ class Access:
     def _lasting(self, genuine: list[Session]) -> Session | None:
         """Return the first session that is neither expired nor revoked. If there is none, return
         the first session, or None if `genuine` is empty."""
-        lasting = (each for each in genuine if not (each.expired or self._revoked.ends(each)))
+        lasting = (
+            each
+            for each in genuine
+            if not (self._standing(each).expired or self._revoked.ends(each))
+        )
         return next(lasting, genuine[0] if genuine else None)
 
     def _dressed(self, headers: dict[str, str], send: Send) -> Send:
@@ -336,24 +452,31 @@ class Access:
         return dressed
 
 
-def _caller(person: Person, scope: HTTPScope | WebSocketScope, receive: Receive | None) -> Caller:
+def _caller(identity: Identity, receive: Receive | None) -> Caller:
     """Return the client of a request, with the connection by which its person acts."""
-    session: Session | None = scope["state"].get("session")
-    client = scope.get("client")
+    session, token = identity.session, identity.token
+    own = "server" if session is None else ""
     origin = Origin(
-        name=person.name,
+        name=identity.person.name,
         session="" if session is None else session.id,
-        token="server" if session is None else "",
-        address=network_address(client[0] if client else ""),
+        token=own if token is None else token.id,
+        address=identity.address,
     )
-    return Caller(person.id, receive, scope["state"]["device"], origin)
+    return Caller(identity.person.id, receive, identity.device, origin)
+
+
+def client_address(scope: HTTPScope | WebSocketScope) -> str:
+    """Return the address of the client on the network; "" for this computer itself, and for text
+    that is no address."""
+    client = scope.get("client")
+    return network_address(client[0] if client else "")
 
 
 def _nobody(_: str) -> None:
     """Ignore which person a connection belongs to."""
 
 
-def _ended(session: Session | None, *, signed_out: bool = False) -> Refused:
+def _ended(session: Session | None, *, signed_out: bool = False, expired: bool = False) -> Refused:
     """Return the refusal for a client whose session is missing, signed out, expired or revoked."""
     if session is None:
         return Unauthenticated(
@@ -361,7 +484,7 @@ def _ended(session: Session | None, *, signed_out: bool = False) -> Refused:
         )
     if signed_out:
         return Unauthenticated("This session was ended: come in by a link again.")
-    if session.expired:
+    if expired:
         return Unauthenticated("Your session has ended: open the link that the server printed.")
     return Withdrawn("The link that you came in by was revoked. Ask for another one.")
 

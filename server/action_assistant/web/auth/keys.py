@@ -1,9 +1,9 @@
 """The secret of local mode: a token for programs, and sessions sealed with it for browsers.
 
 A session cookie is `payload.signature`, both base64url; the payload is JSON `[id, person id, name,
-expires, role, invitation]`. Either process can verify it by itself, because both read the same token.
+expires, role, invitation, personal, begun]`. Either process can verify it by itself, because both read the same token.
 Cookies of before there were roles end after `expires`: they were traded for the token, so they are an
-owner's.
+owner's. Cookies without `begun` are of before sessions could be idle, and expire by `expires` alone.
 """
 
 import base64
@@ -42,13 +42,17 @@ class Person(PersonRef, frozen=True):
 
 
 class Session(msgspec.Struct, frozen=True):
-    """A browser that has presented the token or an invitation. `expires`: seconds since 1970.
-    `invitation`: the id of the invitation; None for the token."""
+    """A browser that has presented the token or an invitation. `expires` and `begun`: seconds since
+    1970; `begun` is 0 in cookies of earlier versions. `invitation`: the id of the group link; None
+    for the token and for personal links. `personal`: whether the person came by a personal link,
+    so that an owner gives name, role and groups."""
 
     id: str
     person: Person
     expires: float
     invitation: str | None = None
+    personal: bool = False
+    begun: float = 0.0
 
     @property
     def expired(self) -> bool:
@@ -65,6 +69,8 @@ class Sealed(msgspec.Struct, frozen=True, array_like=True):
     expires: float
     role: Role = OWNER
     invitation: str | None = None
+    personal: bool = False
+    begun: float = 0.0
 
 
 class ServerProof(msgspec.Struct, frozen=True):
@@ -129,13 +135,18 @@ class Keys:
         invitation: str | None = None,
         person_id: str | None = None,
         session_id: str | None = None,
+        personal: bool = False,
+        seconds: float = SESSION_SECONDS,
     ) -> Session:
-        """Make a session that begins now. `invitation`: the link by which the person came.
-        `person_id`: the id of a person who is known already. `session_id`: the id of a browser's
-        session that goes on, so that revoking it ends all cookies of this browser."""
+        """Make a session that begins now, and expires after `seconds`. `invitation`: the group link
+        by which the person came. `person_id`: the id of a person who is known already.
+        `session_id`: the id of a browser's session that goes on, so that revoking it ends all
+        cookies of this browser. `personal`: the person came by a personal link."""
         person = Person(person_id or random_id(), name, role)
-        expires = time.time() + SESSION_SECONDS
-        return Session(session_id or random_id(), person, expires, invitation)
+        begun = time.time()
+        return Session(
+            session_id or random_id(), person, begun + seconds, invitation, personal, begun
+        )
 
     def secret_of(self, invitation: str) -> str:
         """Return the secret of an invitation (256 bit), which cannot be derived from its id without
@@ -176,7 +187,14 @@ class Keys:
         """Return the value of the cookie for a session."""
         person = session.person
         fields = Sealed(
-            session.id, person.id, person.name, session.expires, person.role, session.invitation
+            session.id,
+            person.id,
+            person.name,
+            session.expires,
+            person.role,
+            session.invitation,
+            session.personal,
+            session.begun,
         )
         payload = _text(msgspec.json.encode(fields))
         return f"{payload}.{_text(self._sign(payload))}"
@@ -207,7 +225,9 @@ class Keys:
         except (ValueError, msgspec.DecodeError):
             return None
         person = Person(found.person, found.name, found.role)
-        return Session(found.id, person, found.expires, found.invitation)
+        return Session(
+            found.id, person, found.expires, found.invitation, found.personal, found.begun
+        )
 
     def _sign(self, payload: str) -> bytes:
         return hmac.digest(self._seal, payload.encode(errors="replace"), "sha256")

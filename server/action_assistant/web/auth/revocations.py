@@ -1,8 +1,8 @@
 """Revoked invitations and ended sessions, as either process sees them, and closing what they had
 open.
 
-`revoked/` in the data folder holds one empty file for each: `ID` for an invitation, `session-ID` for a
-session. It is made at once or not at all, never changed, and needs neither the other process nor a
+`revoked/` in the data folder holds one empty file for each: `ID` for an invitation, `session-ID`,
+`person-ID` and `token-ID` for sessions, persons and tokens that were ended. It is made at once or not at all, never changed, and needs neither the other process nor a
 database to be read. What this process was told itself it also keeps in mind, whatever becomes of the
 disk.
 """
@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from action_assistant.errors import Unavailable
+from action_assistant.web.auth.identity import Credential, Standing, Token
 from action_assistant.web.auth.keys import Session
 
 log: Final = logging.getLogger(__name__)
@@ -25,14 +26,19 @@ log: Final = logging.getLogger(__name__)
 FOLDER: Final = "revoked"
 SESSION_ENDED: Final = 4401  # close code of sockets
 _LOOK_S: Final = 0.2
+_STANDING_EACH: Final = 5  # at each fifth look also at what a credential is worth: it reads files
 _SETTLED_NS: Final = 3_000_000_000  # until a folder's time has changed with its next entry for sure
 _ID: Final = re.compile(r"[A-Za-z0-9]{1,40}")
 _SESSION: Final = "session-"
-_SESSION_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
+_PERSON: Final = "person-"
+_TOKEN: Final = "token-"
+#: The form of the ids of sessions, persons and tokens.
+_MARKED_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
 
 class Revocations:
-    """The invitations that open nothing any more, and the sessions that have ended."""
+    """The invitations that open nothing any more, and the sessions, persons and tokens that were
+    ended."""
 
     def __init__(self, data: Path) -> None:
         self._folder = data / FOLDER
@@ -54,16 +60,28 @@ class Revocations:
         return _ID.fullmatch(invitation) is None or self._is_marked(invitation)
 
     def ended(self, session: Session) -> bool:
-        """Return whether this session was ended by itself, not by its invitation."""
-        return _SESSION_ID.fullmatch(session.id) is None or self._is_marked(_SESSION + session.id)
+        """Return whether this session or its person was ended, other than by its invitation."""
+        if _MARKED_ID.fullmatch(session.id) is None or self._is_marked(_SESSION + session.id):
+            return True
+        return self.person_ended(session.person.id)
 
-    def ends(self, session: Session) -> bool:
-        """Return whether a session may do nothing any more, not even Stop."""
-        return self.holds(session.invitation) or self.ended(session)
+    def person_ended(self, person: str) -> bool:
+        """Return whether an owner has ended this person."""
+        return _MARKED_ID.fullmatch(person) is None or self._is_marked(_PERSON + person)
 
-    def ends_now(self) -> Callable[[Session], bool]:
+    def token_ended(self, token: str) -> bool:
+        """Return whether this token of a program was revoked."""
+        return _MARKED_ID.fullmatch(token) is None or self._is_marked(_TOKEN + token)
+
+    def ends(self, credential: Credential) -> bool:
+        """Return whether a session or token may do nothing any more, not even Stop."""
+        if isinstance(credential, Token):
+            return self.token_ended(credential.id) or self.person_ended(credential.person.id)
+        return self.holds(credential.invitation) or self.ended(credential)
+
+    def ends_now(self) -> Callable[[Credential], bool]:
         """Return the function `ends` as of now. It reads the folder once, and so suits a check of
-        many sessions."""
+        many sessions and tokens."""
         return self._ends_in_mind if self._take_up() else self.ends
 
     def every(self) -> frozenset[str]:
@@ -80,9 +98,17 @@ class Revocations:
 
     def end(self, session: str) -> None:
         """End a session, at once and durably. Raise ValueError or Unavailable as `add` does."""
-        if _SESSION_ID.fullmatch(session) is None:
-            raise ValueError(f"{session!r} is no id of a session")
-        self._mark(_SESSION + session)
+        self._mark(_SESSION + _checked(session, "a session"))
+
+    def end_person(self, person: str) -> None:
+        """End all sessions and tokens of a person, at once and durably. Raise ValueError or
+        Unavailable as `add` does."""
+        self._mark(_PERSON + _checked(person, "a person"))
+
+    def end_token(self, token: str) -> None:
+        """End a token of a program, at once and durably. Raise ValueError or Unavailable as `add`
+        does."""
+        self._mark(_TOKEN + _checked(token, "a token"))
 
     def write_again(self) -> None:
         """Write the marks that could not be written before. Raise Unavailable if they still cannot."""
@@ -117,13 +143,16 @@ class Revocations:
         self._marks.add(mark)
         return True
 
-    def _ends_in_mind(self, session: Session) -> bool:
-        mark, invitation = _SESSION + session.id, session.invitation
-        if mark in self._marks or invitation in self._marks:
+    def _ends_in_mind(self, credential: Credential) -> bool:
+        kind = _TOKEN if isinstance(credential, Token) else _SESSION
+        if kind + credential.id in self._marks or _PERSON + credential.person.id in self._marks:
             return True
-        if invitation is not None and _ID.fullmatch(invitation) is None:
+        if not (_MARKED_ID.fullmatch(credential.id) and _MARKED_ID.fullmatch(credential.person.id)):
             return True
-        return _SESSION_ID.fullmatch(session.id) is None
+        invitation = None if isinstance(credential, Token) else credential.invitation
+        return invitation is not None and (
+            invitation in self._marks or _ID.fullmatch(invitation) is None
+        )
 
     def _take_up(self) -> bool:
         """Read the marks that other processes have written; return False if the folder cannot be
@@ -147,19 +176,39 @@ class Revocations:
         return self._marks
 
 
-class SessionGuard:
-    """Guards one open socket or stream of a session; cancels it when the session ends."""
+def _checked(text: str, kind: str) -> str:
+    if _MARKED_ID.fullmatch(text) is None:
+        raise ValueError(f"{text!r} is no id of {kind}")
+    return text
 
-    def __init__(self, session: Session, task: "asyncio.Task[object]", *, outlives: bool) -> None:
+
+class SessionGuard:
+    """Guards one open socket or stream of a session or token; cancels it when that ends."""
+
+    def __init__(
+        self,
+        credential: Credential,
+        task: "asyncio.Task[object]",
+        standing: Callable[[Credential], Standing],
+        *,
+        outlives: bool,
+    ) -> None:
         self.is_cut = False
-        self._session = session
+        self._standing = standing
+        self._role = standing(credential).person.role
+        self._looks = 0
+        self._credential = credential
         self._task = task
         self._outlives = outlives
 
-    def look(self, ends: Callable[[Session], bool]) -> None:
-        """Cut it if the session has ended."""
-        over = ends(self._session)
-        over = over or (self._session.expired and not self._outlives)
+    def look(self, ends: Callable[[Credential], bool]) -> None:
+        """Cut it if the session or token has ended, or its person has another role by now: with
+        that one the client comes back at once."""
+        over = ends(self._credential)
+        self._looks += 1
+        if not over and self._looks % _STANDING_EACH == 0:
+            standing = self._standing(self._credential)
+            over = (standing.expired and not self._outlives) or standing.person.role != self._role
         if over and not self.is_cut:
             self.is_cut = True
             self._task.cancel()
@@ -170,21 +219,25 @@ class SessionGuard:
 
 
 class SessionGuards:
-    """The guards of all open sockets and streams of sessions. It checks the sessions periodically
+    """The guards of all open sockets and streams. It checks their sessions and tokens periodically
     while there are any."""
 
-    def __init__(self, revoked: Revocations) -> None:
+    def __init__(
+        self, revoked: Revocations, standing: Callable[[Credential], Standing] | None = None
+    ) -> None:
         self._revoked = revoked
+        self._standing = standing or sealed_standing
         self._held: set[SessionGuard] = set()
         self._watch: asyncio.Task[None] | None = None
 
     @contextmanager
-    def hold(self, session: Session, *, outlives: bool = False) -> Iterator[SessionGuard]:
-        """Cancel the current task when the session ends. `outlives`: not when it merely expires."""
+    def hold(self, credential: Credential, *, outlives: bool = False) -> Iterator[SessionGuard]:
+        """Cancel the current task when the session or token ends. `outlives`: not when it merely
+        expires."""
         task = asyncio.current_task()
         if task is None:
             raise RuntimeError("only a task can be cancelled")
-        leash = SessionGuard(session, task, outlives=outlives)
+        leash = SessionGuard(credential, task, self._standing, outlives=outlives)
         self._held.add(leash)
         if self._watch is None or self._watch.done():
             self._watch = asyncio.create_task(self._looking(), name="leashes")
@@ -199,3 +252,8 @@ class SessionGuards:
             for leash in tuple(self._held):
                 leash.look(ends)
             await asyncio.sleep(_LOOK_S)
+
+
+def sealed_standing(credential: Credential) -> Standing:
+    """Return the standing that a session or token gives itself."""
+    return Standing(credential.person, frozenset(), credential.expired)

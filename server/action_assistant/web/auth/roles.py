@@ -16,6 +16,7 @@ Permission: TypeAlias = Literal[
     "register",  # robots
     "share",  # invite and revoke
     "restore",  # a backup
+    "scrape",  # the metrics of a process
 ]
 
 #: Whoever holds the token of the server is an owner.
@@ -30,6 +31,7 @@ _FROM: Final[Mapping[Permission, Role]] = {
     "register": "operator",
     "share": "owner",
     "restore": "owner",
+    "scrape": "viewer",
 }
 _RANK: Final[Mapping[Role, int]] = {role: rank for rank, role in enumerate(get_args(Role))}
 _MAY: Final[Mapping[Role, str]] = {
@@ -50,6 +52,6 @@ def rank(role: Role) -> int:
     return _RANK[role]
 
 
-def may(role: Role) -> str:
+def role_words(role: Role) -> str:
     """Return what a role may do, in words that follow "you may"."""
     return _MAY[role]

@@ -1,16 +1,19 @@
 """Signed-in sessions: one small file for each, beside the cookies, which are valid without it.
 
 A cookie is enough to be let in, so that a full disk, a lost database or a dead editor signs nobody out;
-`revoked/` is enough to end it. What stands here is for people: whose sessions there are, to be listed and
-ended. Sessions of older versions are noted when their page is opened next.
+`revoked/` is enough to end it. What stands here is for people: whose sessions there are, on which
+browsers, to be listed and ended. The time of the last change of a file is that of the last use of its
+session. Sessions of older versions are noted when their page is opened next.
 """
 
 import contextlib
 import logging
+import os
 import time
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import msgspec
 
@@ -23,52 +26,100 @@ log: Final = logging.getLogger(__name__)
 
 FOLDER: Final = "sessions"
 _MOST: Final = 5000  # that one process notes: somebody may sign in again and again
+_USE_S: Final = 60.0  # between two notes of the use of one session
 
 
 class OpenSession(msgspec.Struct, frozen=True, omit_defaults=True):
     """A browser that is signed in. `invitation`: the id of the invitation by which it came in; it
-    is missing if it came in by the token."""
+    is missing if it came in by the token or a personal link. `browser`: its name and system, as it
+    says; `address`: where it signed in, missing for this computer itself. `used_at`: the last use,
+    to the minute."""
 
     id: str
     person: Person
     since: datetime
     expires: datetime
     invitation: str | None = None
+    browser: str = ""
+    address: str = ""
+    used_at: datetime | None = None
+    personal: bool = False
+
+
+class NotedSession(Session, frozen=True):
+    """A session as its file says, with the browser and the address at which it was noted."""
+
+    browser: str = ""
+    address: str = ""
 
 
 class SessionFiles:
     """Stores the open sessions as files, as far as the disk has room."""
 
-    def __init__(self, data: Path, revoked: Revocations) -> None:
+    def __init__(
+        self, data: Path, revoked: Revocations, is_over: Callable[[Session], bool] | None = None
+    ) -> None:
         self._folder = data / FOLDER
         self._revoked = revoked
+        self._is_over = is_over or (lambda session: session.expired)
         self._noted: dict[str, Session] = {}
+        self._used: dict[str, float] = {}
 
-    def note(self, session: Session) -> None:
+    def judge_by(self, is_over: Callable[[Session], bool]) -> None:
+        """List only those sessions from now on for which `is_over` returns False."""
+        self._is_over = is_over
+
+    def note(self, session: Session, browser: str = "", address: str = "") -> None:
         """Store a session for the list of open sessions. A full disk or list is no error."""
-        if self._noted.get(session.id) == session or len(self._noted) >= _MOST:
+        sealed: dict[str, Any] = msgspec.structs.asdict(session)
+        noted = NotedSession(**sealed, browser=browser, address=address)
+        if self._noted.get(session.id) == noted or len(self._noted) >= _MOST:
             return
         path = self._path(session.id)
         try:
             self._folder.mkdir(mode=0o700, exist_ok=True)
-            content = msgspec.json.encode(session)
+            content = msgspec.json.encode(noted)
             replace_file(path, content, part=path.with_suffix(".part"), is_durable=False)
         except OSError as error:
             log.warning("a session could not be noted in %s: %s", self._folder, error.strerror)
             return
-        self._noted[session.id] = session
+        self._noted[session.id] = noted
+
+    def use(self, session: str) -> None:
+        """Note that the session with this id is used now, at most once a minute. A full disk is no
+        error."""
+        now = time.time()
+        if now - self._used.get(session, 0.0) < _USE_S:
+            return
+        if len(self._used) >= _MOST:
+            self._used.clear()
+        self._used[session] = now
+        with contextlib.suppress(OSError, ValueError):
+            os.utime(self._path(session))
+
+    def used_at(self, session: Session) -> float | None:
+        """Return when a session was last used, in seconds since 1970, by either process; None if
+        that is unknown."""
+        mine = self._used.get(session.id)
+        if mine is not None and time.time() - mine < _USE_S:
+            return mine
+        try:
+            noted = self._path(session.id).stat().st_mtime
+        except (OSError, ValueError):
+            return mine
+        return noted if mine is None else max(noted, mine)
 
     def every(self) -> list[OpenSession]:
-        """Return the sessions that are still valid, newest first, and delete the files of all
-        others."""
+        """Return the sessions that are still valid, newest first, and delete the files of those
+        that never will be again. The file of an idle session stays, since it proves that."""
         found = []
         with contextlib.suppress(FileNotFoundError):
             for path in list(self._folder.glob("*.json")):
                 session = _read(path)
                 if session is None or session.expired or self._revoked.ends(session):
                     self._forget(path)
-                else:
-                    found.append(_shown(session))
+                elif not self._is_over(session):
+                    found.append(self._shown(session))
         return sorted(found, key=lambda each: each.expires, reverse=True)
 
     def end(self, session: str) -> None:
@@ -79,23 +130,46 @@ class SessionFiles:
         self._revoked.end(session)
         self._forget(self._path(session))
 
+    def end_all_of(self, person: str, *, but: str | None = None) -> int:
+        """End the open sessions of a person, except the one with the id `but`; return how many.
+        Raise Unavailable if the folder cannot store that."""
+        theirs = [each.id for each in self.every() if each.person.id == person and each.id != but]
+        for each in theirs:
+            self._revoked.end(each)
+            self._forget(self._path(each))
+        return len(theirs)
+
     def _path(self, session: str) -> Path:
         return self._folder / f"{session}.json"
 
     def _forget(self, path: Path) -> None:
         self._noted.pop(path.stem, None)
+        self._used.pop(path.stem, None)
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
 
+    def _shown(self, session: NotedSession) -> OpenSession:
+        used = self.used_at(session)
+        begun = session.begun or min(session.expires - SESSION_SECONDS, time.time())
+        return OpenSession(
+            session.id,
+            session.person,
+            _time(begun),
+            _time(session.expires),
+            session.invitation,
+            session.browser,
+            session.address,
+            None if used is None else _time(used),
+            session.personal,
+        )
 
-def _read(path: Path) -> Session | None:
+
+def _read(path: Path) -> NotedSession | None:
     try:
-        return msgspec.json.decode(path.read_bytes(), type=Session)
+        return msgspec.json.decode(path.read_bytes(), type=NotedSession)
     except (OSError, msgspec.DecodeError):
         return None
 
 
-def _shown(session: Session) -> OpenSession:
-    expires = datetime.fromtimestamp(session.expires, UTC)
-    since = datetime.fromtimestamp(min(session.expires - SESSION_SECONDS, time.time()), UTC)
-    return OpenSession(session.id, session.person, since, expires, session.invitation)
+def _time(seconds: float) -> datetime:
+    return datetime.fromtimestamp(seconds, UTC)

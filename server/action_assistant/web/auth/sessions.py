@@ -1,30 +1,39 @@
 """Sign-in: a token or an invitation is traded for a cookie that either process can verify."""
 
-from collections.abc import Callable
+import contextlib
+import time
+from collections.abc import Awaitable, Callable
 from typing import Annotated, Any, Final, Protocol
 
 import msgspec
 from anyio import to_thread
-from litestar import Request, Response, delete, get, post
+from litestar import Request, Response, delete, get, post, put
 from litestar.datastructures import Cookie
-from litestar.params import JSONBody
+from litestar.params import FromPath, JSONBody
 from litestar.types import ControllerRouterHandler
+from msgspec.structs import replace
 
-from action_assistant.errors import BadInput, TooMany, Unauthenticated, Unavailable
+from action_assistant.errors import BadInput, Forbidden, TooMany, Unauthenticated, Unavailable
 from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.web.auth.access import (
     Needs,
+    Open,
+    client_address,
     cookie_name,
     device_cookie_name,
     device_of,
-    known_person,
+    expired_session,
+    identity_of,
     live_session,
     session_of,
 )
+from action_assistant.web.auth.browser_names import browser_name
+from action_assistant.web.auth.device_codes import DeviceCodes, WaitingDevice
 from action_assistant.web.auth.keys import SESSION_SECONDS, Keys, Person, PersonRef, Session
+from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
-from action_assistant.web.auth.roles import Role, rank
-from action_assistant.web.auth.session_files import SessionFiles
+from action_assistant.web.auth.roles import OWNER, Role, rank
+from action_assistant.web.auth.standing import Standings
 from action_assistant.web.http.problems import PROBLEM_JSON, problem_of
 from action_assistant.web.network.addresses import Addresses
 
@@ -49,10 +58,12 @@ class SignIn(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class SignedIn(msgspec.Struct, frozen=True):
-    """The person who is signed in. `named` is false until the person has given a name."""
+    """The person who is signed in. `named` is false until the person has given a name. `personal`:
+    an owner has given it, since the person came by a personal link."""
 
     person: Person
     named: bool
+    personal: bool = False
 
 
 class InvitationQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -62,25 +73,52 @@ class InvitationQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True
 
 
 class Invited(msgspec.Struct, frozen=True):
-    """The role that a link invites to, and who made the link."""
+    """The role that a link invites to, and who made the link. `name`: of the one person for whom
+    it is; null for a link for everybody who has it."""
 
     id: str
     role: Role
     by: str
+    name: str | None = None
+
+
+class CodeOfDevice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The code that a browser of the person shows, typed in on another one."""
+
+    code: Annotated[str, msgspec.Meta(max_length=40)]
+
+
+class ClaimOfDevice(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The claim of a browser that waits to be confirmed."""
+
+    claim: Annotated[str, msgspec.Meta(max_length=100)]
+
+
+class DeviceAnswer(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The answer to a browser that waits: the session, or nothing while nobody has confirmed it."""
+
+    signed_in: SignedIn | None = None
 
 
 class Revocation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The invitation that is revoked or the session that is ended: one of the two."""
+    """The invitation or token that is revoked, or the session or person that is ended: exactly one
+    of them."""
 
     invitation: str | None = None
     session: str | None = None
+    person: str | None = None
+    token: str | None = None
 
 
 class InvitationRegistry(Protocol):
-    """Knows the invitations and the people who came in by them."""
+    """Knows the links, and the people who came in by them."""
 
-    def look(self, proof: str) -> Invited:
+    async def look(self, proof: str) -> Invited:
         """Return the invitation that a link proves. Raise Unauthenticated if the link is not valid."""
+
+    async def come_in(self, link: str, browser: str, address: str) -> PersonFile:
+        """Use a personal link, and return its person. Of several who use it at once, one comes in;
+        raise Unauthenticated for the others."""
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
         """Record that a person came in by an invitation."""
@@ -94,22 +132,26 @@ class Sessions:
         keys: Keys,
         page_port: int,
         reception: Callable[[], InvitationRegistry],
+        revoked: Revocations,
+        standings: Standings,
         *,
         addresses: Addresses | None,
         limits: bool,
     ) -> None:
         self._keys = keys
+        self._revoked = revoked
+        self._standings = standings
         self._cookie = cookie_name(page_port)
         self._device = device_cookie_name(page_port)
         self._reception = reception
         self._addresses = addresses
         self._pace = TokenBuckets(_TRIES_AT_ONCE, _TRIES_PER_MINUTE / 60) if limits else None
 
-    def look(self, invitation: str, request: _Asking) -> Invited:
+    async def look(self, invitation: str, request: _Asking) -> Invited:
         """Return the invitation of a link. Raise Unauthenticated if the link is not valid, TooMany
         if this address tries too often."""
-        self._admit(request)
-        return self._reception().look(invitation)
+        self.admit(request)
+        return await self._reception().look(invitation)
 
     async def session(self, data: SignIn, request: _Asking) -> Session:
         """Return the session for a sign-in. Raise Unauthenticated, TooMany or BadInput."""
@@ -119,36 +161,104 @@ class Sessions:
                 return _renamed(self._keys, live_session(request), name)
             case SignIn(token=str(token), invitation=None):
                 if not self._keys.opens(token):
-                    self._admit(request)
+                    self.admit(request)
                     raise Unauthenticated("This is not the token of this server.")
                 # The link again, in a browser that is or was signed in: the same person, since what
                 # older tabs have written belongs to them.
-                known, now = known_person(request), session_of(request)
-                return self._keys.new_session(
-                    name or _name(known),
-                    person_id=known.id if known else None,
-                    session_id=now.id if now else None,
-                )
+                return self._begun(name, request)
             case SignIn(token=None, invitation=str(proof)):
-                self._admit(request)
-                return await _invited(self._keys, self._reception(), proof, name, request)
+                self.admit(request)
+                return await self._invited(proof, name, request)
             case _:
                 raise BadInput("Send the token or an invitation, not both.")
 
-    def answer(self, session: Session, request: _Asking) -> Response[SignedIn]:
-        """Return the answer that sets the cookie of a session."""
+    def follow(self, first: Session) -> Session:
+        """Return the session of another browser of the person of a session. Raise Unauthenticated
+        if that session has ended meanwhile."""
+        standing = self._standings.of(first)
+        if self._revoked.ends(first) or standing.expired:
+            raise Unauthenticated("The session that showed the code has ended.")
+        return self._keys.new_session(
+            standing.person.name,
+            role=standing.person.role,
+            invitation=first.invitation,
+            person_id=first.person.id,
+            personal=first.personal,
+            seconds=self._standings.limits[standing.person.role].longest,
+        )
+
+    async def _invited(self, proof: str, name: str, request: _Asking) -> Session:
+        """Return a session for a person who comes in by a link. A person whose present role is
+        higher keeps their session, unless the link is for one person."""
+        invited = await self._reception().look(proof)
+        if invited.name is not None:
+            return await self._came(invited.id, request)
+        now = session_of(request)
+        if now is not None and rank(identity_of(request).person.role) >= rank(invited.role):
+            return _renamed(self._keys, now, name)
+        session = self._begun(name, request, role=invited.role, invitation=invited.id)
+        await self._reception().welcome(invited.id, session.person)
+        return session
+
+    async def _came(self, link: str, request: _Asking) -> Session:
+        """Return the session of the person of a personal link. The session that this browser had
+        ends, since its person changes."""
+        browser = browser_of(request)
+        person = await self._reception().come_in(link, browser, client_address(request.scope))
+        now = session_of(request)
+        if now is not None:
+            with contextlib.suppress(Unavailable):  # it holds here
+                await to_thread.run_sync(self._revoked.end, now.id)
+        return self._keys.new_session(
+            person.name,
+            role=person.role,
+            person_id=person.id,
+            personal=True,
+            seconds=self._standings.limits[person.role].longest,
+        )
+
+    def _begun(
+        self,
+        name: str,
+        request: _Asking,
+        *,
+        role: Role = OWNER,
+        invitation: str | None = None,
+    ) -> Session:
+        """Return a session by the token or a group link: of the person of this browser, under a
+        new id where that is a new person. A person with a personal link stays who they are only by
+        that."""
+        now = session_of(request)
+        session = now or expired_session(request)
+        if session is not None and session.personal:
+            now = session = None
+        known = None if session is None else session.person
+        return self._keys.new_session(
+            name or _name(known),
+            role=role,
+            invitation=invitation,
+            person_id=known.id if known is not None else None,
+            session_id=now.id if now is not None else None,
+            seconds=self._standings.limits[role].longest,
+        )
+
+    def answer(self, session: Session, request: _Asking, content: Any = None) -> Response[Any]:
+        """Return the answer that sets the cookie of a session; by default it says whose that is."""
         secure, path = self._jar(request)
         cookie = Cookie(
             key=self._cookie,
             value=self._keys.sealed(session),
-            max_age=SESSION_SECONDS,
+            # An expired session still stops runs, so the browser keeps it for longer.
+            max_age=int(session.expires - time.time()) + SESSION_SECONDS,
             httponly=True,
             samesite="strict",
             secure=secure,
             path=path,
         )
         return Response(
-            _signed_in(session), status_code=200, cookies=[cookie, *self._device_cookie(request)]
+            content if content is not None else _signed_in(session),
+            status_code=200,
+            cookies=[cookie, *self._device_cookie(request)],
         )
 
     def _device_cookie(self, request: _Asking) -> list[Cookie]:
@@ -185,7 +295,8 @@ class Sessions:
             return False, "/"
         return self._addresses.jar(request.headers.get("host", ""))
 
-    def _admit(self, request: _Asking) -> None:
+    def admit(self, request: _Asking) -> None:
+        """Raise TooMany if this address tries too often."""
         address = request.client.host if request.client is not None else ""
         if self._pace is not None and not self._pace.of(address).take():
             raise TooMany("Too many tries from your address; wait a minute.")
@@ -197,18 +308,86 @@ def session_routes(
     *,
     reception: Callable[[], InvitationRegistry],
     revoked: Revocations,
-    browsers: SessionFiles,
+    standings: Standings,
+    codes: DeviceCodes,
+    device_added: Callable[[Session, str, str], Awaitable[None]] | None = None,
     addresses: Addresses | None = None,
     limits: bool = True,
 ) -> list[ControllerRouterHandler]:
-    """Return the routes under `/api/session`."""
-    sessions = Sessions(keys, page_port, reception, addresses=addresses, limits=limits)
+    """Return the routes under `/api/session`. `device_added` stores that a device was added, with
+    its session, browser and address."""
+    sessions = Sessions(
+        keys, page_port, reception, revoked, standings, addresses=addresses, limits=limits
+    )
+    return [
+        *_own_session(sessions, revoked, standings),
+        *_new_device(sessions, standings, codes, device_added or _added),
+    ]
 
-    @get("/api/session", summary="Who is signed in", operation_id="getSession")
+
+async def _added(session: Session, browser: str, address: str) -> None:
+    """Store nothing about a new device."""
+
+
+def _new_device(
+    sessions: Sessions,
+    standings: Standings,
+    codes: DeviceCodes,
+    added: Callable[[Session, str, str], Awaitable[None]],
+) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/session/device",
+        status_code=200,
+        summary="Send the code that a signed-in browser shows, to be added as a device",
+        operation_id="sendDeviceCode",
+        request_max_body_size=_BODY,
+        guards=[Open()],
+    )
+    async def send(data: JSONBody[CodeOfDevice], request: _Asking) -> WaitingDevice:
+        sessions.admit(request)
+        return codes.claim(data.code, browser_of(request), client_address(request.scope))
+
+    @post(
+        "/api/session/device/answer",
+        status_code=200,
+        summary="Ask whether the person has confirmed this device; it is then signed in",
+        operation_id="collectDevice",
+        request_max_body_size=_BODY,
+        guards=[Open()],
+    )
+    async def collect(data: JSONBody[ClaimOfDevice], request: _Asking) -> Response[DeviceAnswer]:
+        confirmed = codes.confirmed(data.claim)
+        if confirmed is None:
+            return Response(DeviceAnswer(), status_code=200)
+        session = sessions.follow(confirmed.session)
+        codes.collected(data.claim)
+        await added(session, confirmed.browser, confirmed.address)
+        await to_thread.run_sync(
+            standings.browsers.note, session, confirmed.browser, confirmed.address
+        )
+        return sessions.answer(session, request, DeviceAnswer(_signed_in(session)))
+
+    return [send, collect]
+
+
+def _own_session(
+    sessions: Sessions, revoked: Revocations, standings: Standings
+) -> list[ControllerRouterHandler]:
+    async def note(session: Session, request: _Asking) -> None:
+        await to_thread.run_sync(
+            standings.browsers.note, session, browser_of(request), client_address(request.scope)
+        )
+
+    @get(
+        "/api/session",
+        summary="Who is signed in",
+        operation_id="getSession",
+        guards=[Open()],
+    )
     async def who(request: _Asking) -> SignedIn:
         session = live_session(request)
-        await to_thread.run_sync(browsers.note, session)
-        return _signed_in(session)
+        await note(session, request)
+        return _signed_in(replace(session, person=identity_of(request).person))
 
     @post(
         "/api/session",
@@ -216,10 +395,11 @@ def session_routes(
         summary="Sign in, or change one's name",
         operation_id="signIn",
         request_max_body_size=_BODY,
+        guards=[Open()],
     )
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
         session = await sessions.session(data, request)
-        await to_thread.run_sync(browsers.note, session)
+        await note(session, request)
         return sessions.answer(session, request)
 
     @post(
@@ -227,16 +407,18 @@ def session_routes(
         status_code=200,
         summary="What an invitation leads to",
         operation_id="lookAtInvitation",
+        guards=[Open()],
         request_max_body_size=_BODY,
     )
     async def look(data: JSONBody[InvitationQuestion], request: _Asking) -> Invited:
-        return sessions.look(data.invitation, request)
+        return await sessions.look(data.invitation, request)
 
     @delete(
         "/api/session",
         status_code=204,
         summary="Sign out: this session ends, everywhere",
         operation_id="signOut",
+        guards=[Open()],
     )
     async def sign_out(request: _Asking) -> Response[None]:
         try:
@@ -248,39 +430,59 @@ def session_routes(
     return [who, sign_in, look, sign_out]
 
 
-def revocation(revoked: Revocations) -> list[ControllerRouterHandler]:
-    """Return the route by which the editor ends sessions in a process without invitations: the
-    runner, which may be on another computer."""
+def revocation(revoked: Revocations, people: PeopleFiles) -> list[ControllerRouterHandler]:
+    """Return the routes by which owners end sessions and change persons in a process without
+    people of its own: the runner, which may be on another computer."""
+
+    @put(
+        "/api/members/{person:str}",
+        status_code=204,
+        summary="Store the present name, role and groups of a person with a personal link",
+        operation_id="storeMember",
+        guards=[Needs("share")],
+    )
+    async def store(person: FromPath[str], data: JSONBody[PersonFile]) -> None:
+        if person != data.id:
+            raise BadInput("The path names another person than the body.", where={"path": "/id"})
+        try:
+            await to_thread.run_sync(people.write, data)
+        except ValueError as error:
+            raise BadInput(f"{error}.", where={"path": "/id"}) from error
 
     @post(
         "/api/revocations",
         status_code=204,
-        summary="End every session that came in by an invitation, or one session",
+        summary="End every session of an invitation or a person, or one session or token",
         operation_id="revokeSessions",
         guards=[Needs("share")],
     )
     async def revoke(data: JSONBody[Revocation]) -> None:
+        enders = {
+            "invitation": revoked.add,
+            "session": revoked.end,
+            "person": revoked.end_person,
+            "token": revoked.end_token,
+        }
+        named = {kind: id_ for kind in enders if (id_ := getattr(data, kind)) is not None}
+        if len(named) != 1:
+            raise BadInput("Name one invitation, session, person or token.")
+        ((kind, id_),) = named.items()
         try:
-            match data:
-                case Revocation(invitation=str(invitation), session=None):
-                    await to_thread.run_sync(revoked.add, invitation)
-                case Revocation(invitation=None, session=str(session)):
-                    await to_thread.run_sync(revoked.end, session)
-                case _:
-                    raise BadInput("Name an invitation or a session, one of the two.")
+            await to_thread.run_sync(enders[kind], id_)
         except ValueError as error:
-            raise BadInput(f"{error}.", where={"path": "/invitation"}) from error
+            raise BadInput(f"{error}.", where={"path": f"/{kind}"}) from error
 
     @delete(
         "/api/session",
         status_code=204,
         summary="Sign out: this session ends, everywhere",
         operation_id="signOut",
+        guards=[Open()],
     )
     async def sign_out(request: _Asking) -> None:
         await _end(revoked, request)
 
-    return [revoke, sign_out]
+    return [store, revoke, sign_out]
 
 
 async def _end(revoked: Revocations, request: _Asking) -> None:
@@ -297,35 +499,26 @@ async def _end(revoked: Revocations, request: _Asking) -> None:
         raise unwritten
 
 
-async def _invited(
-    keys: Keys, reception: InvitationRegistry, proof: str, name: str, request: _Asking
-) -> Session:
-    """Return a session for a person who comes in by an invitation. A person whose present role is
-    higher keeps their session."""
-    invited = reception.look(proof)
-    now = session_of(request)
-    if now is not None and rank(now.person.role) >= rank(invited.role):
-        return _renamed(keys, now, name)
-    known = known_person(request)
-    session = keys.new_session(
-        name or _name(known),
-        role=invited.role,
-        invitation=invited.id,
-        person_id=known.id if known is not None else None,
-        session_id=now.id if now is not None else None,
-    )
-    await reception.welcome(invited.id, session.person)
-    return session
-
-
 def _signed_in(session: Session) -> SignedIn:
-    return SignedIn(session.person, bool(session.person.name))
+    return SignedIn(session.person, bool(session.person.name), session.personal)
+
+
+def browser_of(request: _Asking) -> str:
+    """Return the readable name of the browser that sent a request."""
+    return browser_name(request.headers.get("user-agent", ""))
 
 
 def _renamed(keys: Keys, session: Session, name: str) -> Session:
-    person = session.person
+    """Return a session under another name. It expires when it would have expired."""
+    if session.personal:
+        if name and name != session.person.name:
+            raise Forbidden("An owner has given you your name; only they change it.")
+        return session
+    person = Person(session.person.id, name or session.person.name, session.person.role)
+    if session.begun:
+        return replace(session, person=person)
     return keys.new_session(
-        name or person.name,
+        person.name,
         role=person.role,
         invitation=session.invitation,
         person_id=person.id,

@@ -1,25 +1,26 @@
 """The ASGI application of either process: Litestar inside, access control around it."""
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractAsyncContextManager
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, NamedTuple
 
 import msgspec
 from litestar import Litestar, MediaType, Request, Response, get
-from litestar.connection import ASGIConnection
 from litestar.handlers.base import BaseRouteHandler
 from litestar.params import Parameter
-from litestar.routes import HTTPRoute
+from litestar.routes import ASGIRoute, BaseRoute, HTTPRoute, WebSocketRoute
 from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive, Scope, Send
 
-from action_assistant.errors import NotFound
+from action_assistant.errors import CannotStart, NotFound
 from action_assistant.version import VERSION, commit
-from action_assistant.web.auth.access import Access, Needs, require
+from action_assistant.web.auth.access import Access, DeclaredRight, Needs, Open
+from action_assistant.web.auth.identity import Tokens
 from action_assistant.web.auth.keys import METRICS, Keys, ScrapeToken, ServerProof
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Permission
+from action_assistant.web.auth.standing import Standings
 from action_assistant.web.http.problems import problem_handlers
 from action_assistant.web.http.requests import RequestCounts, Requests
 from action_assistant.web.http.static_files import HelpSite, Page
@@ -33,10 +34,6 @@ from action_assistant.web.server.proxy import MOUNT, Mounted, misrouted
 log: Final = logging.getLogger(__name__)
 
 BODY_LIMIT: Final = 10_000_000  # bytes; a graph file of 10 MB is refused with 413
-_OPEN: Final = frozenset(
-    {"/healthz", "/readyz", "/api/session", "/api/session/invitation", "/api/server"}
-)
-_SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 
 
 class Health(msgspec.Struct, frozen=True):
@@ -61,6 +58,8 @@ def application(
     lifespan: Sequence[Lifespan] = (),
     monitoring: Monitoring | None = None,
     scraped: ScrapeToken | None = None,
+    tokens: Tokens | None = None,
+    standings: Standings | None = None,
     page: Path | None = None,
     help_site: Path | None = None,
     runner_port: int | None = None,
@@ -73,7 +72,9 @@ def application(
     unless a route has its own limit. `page`, `help_site`, `runner_port`: only for the editor, which
     serves the built page and the documentation, and names the runner in the
     Content-Security-Policy. `mount`: the path at which a proxy serves this process. `scraped`: the
-    token that allows /metrics only."""
+    token that allows /metrics only. `tokens`: the tokens of programs. `standings`: knows what
+    sessions and tokens are worth now. Raise CannotStart if a route declares no right.
+    """
     handlers = [
         *route_handlers,
         *_health(monitoring),
@@ -82,6 +83,8 @@ def application(
     ]
     openapi = OpenApiText()
     inner = _routed(handlers, title, lifespan, body_limit, openapi)
+    rights = _declared_rights(inner)
+    openapi.make = lambda: document(inner, rights.needed, rights.open_paths.__contains__)
 
     def root_of(scope: HTTPScope) -> str:
         state: dict[str, Any] = scope.get("state", {})
@@ -94,10 +97,12 @@ def application(
         keys=keys,
         addresses=addresses,
         page_port=page_port,
-        is_open=lambda path, html: _answers_strangers(path) or is_public(path, html),
+        is_open=lambda path, html: path in rights.open_paths or is_public(path, html),
         policy=lambda host: _policy(addresses, host, page_port, runner_port),
         revoked=revoked,
         scraped=scraped,
+        tokens=tokens,
+        standings=standings,
     )
     return _Described(Mounted(Requests(outer, _counts(monitoring)), mount), openapi)
 
@@ -135,62 +140,55 @@ def _routed(
 ) -> Litestar:
     """Return the Litestar application with its routes, error handlers and OpenAPI document, but
     without authentication."""
-    inner = Litestar(
+    return Litestar(
         handlers,
-        guards=[_undecided],
         exception_handlers=problem_handlers(),
         lifespan=list(lifespan),
         openapi_config=openapi_config(title, openapi),
         request_max_body_size=body_limit,
         logging_config=None,
     )
-    decisions = _decisions(inner)
-    openapi.make = lambda: document(inner, decisions, _answers_strangers)
-    return inner
 
 
 def _host(scope: HTTPScope) -> str:
     return dict(scope["headers"]).get(b"host", b"").decode("latin-1")
 
 
-def _answers_strangers(path: str) -> bool:
-    return path in _OPEN
+class _Rights(NamedTuple):
+    """The declared rights of all routes: the permission by path and method, and the paths that
+    answer strangers."""
+
+    needed: dict[tuple[str, str], Permission]
+    open_paths: frozenset[str]
 
 
-def _decisions(inner: Litestar) -> dict[tuple[str, str], Permission]:
-    """Return the permission that each route needs, by path and method. Reading needs no more than
-    being signed in. Other routes have to name their permission; routes that do not are missing in
-    the result, and only owners may call them."""
-    found: dict[tuple[str, str], Permission] = {}
+def _declared_rights(inner: Litestar) -> _Rights:
+    """Return the rights that all routes declare. Raise CannotStart if an HTTP route or a socket
+    declares none, or if a path is open by one method only."""
+    needed: dict[tuple[str, str], Permission] = {}
+    paths: dict[bool, set[str]] = {True: set(), False: set()}
     for route in inner.routes:
-        if not isinstance(route, HTTPRoute) or _answers_strangers(route.path_format):
-            continue
+        for method, handler in _methods(route):
+            declared = [
+                each for each in handler.resolve_guards() if isinstance(each, DeclaredRight)
+            ]
+            if not declared:
+                raise CannotStart(f"{method} {route.path_format} does not declare who may call it.")
+            paths[isinstance(declared[-1], Open)].add(route.path_format)
+            if isinstance(declared[-1], Needs):
+                needed[route.path_format, method.lower()] = declared[-1].permission
+    for path in sorted(paths[True] & paths[False]):
+        raise CannotStart(f"{path} is open to strangers by some of its methods only.")
+    return _Rights(needed, frozenset(paths[True]))
+
+
+def _methods(route: BaseRoute) -> Iterator[tuple[str, BaseRouteHandler]]:
+    """Yield the methods of a route, and their handlers. The answers to OPTIONS are Litestar's."""
+    if isinstance(route, HTTPRoute):
         for handler in route.route_handlers:
-            said = _said(handler)
-            for method in handler.http_methods:
-                if said is not None:
-                    found[route.path_format, method.lower()] = said
-                elif method in _SAFE:
-                    found[route.path_format, method.lower()] = "see"
-    return found
-
-
-def _said(handler: BaseRouteHandler) -> Permission | None:
-    for guard in handler.guards or ():
-        if isinstance(guard, Needs):
-            return guard.permission
-    return None
-
-
-async def _undecided(
-    connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler
-) -> None:
-    """Guard of all routes: let only owners call a writing route for which no permission was chosen.
-    Raise Forbidden for others."""
-    if connection.scope.get("method", "GET") in _SAFE or _said(handler) is not None:
-        return
-    if not _answers_strangers(connection.scope["path"]):
-        require(connection, "restore")
+            yield from ((method, handler) for method in handler.http_methods - {"OPTIONS"})
+    elif isinstance(route, ASGIRoute | WebSocketRoute):
+        yield "WEBSOCKET" if isinstance(route, WebSocketRoute) else "ASGI", route.route_handler
 
 
 class _Described:
@@ -237,6 +235,7 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
         "/api/server",
         summary="That this server knows the token, before anybody shows it",
         operation_id="proveServer",
+        guards=[Open()],
     )
     async def prove(
         request: Request[Any, Any, Any],
@@ -254,7 +253,9 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
 def _health(monitoring: Monitoring | None) -> list[ControllerRouterHandler]:
     health = Health("ok", VERSION, commit())
 
-    @get("/healthz", summary="Whether the process answers", operation_id="getHealth")
+    @get(
+        "/healthz", summary="Whether the process answers", operation_id="getHealth", guards=[Open()]
+    )
     async def healthz() -> Health:
         return health
 
@@ -262,6 +263,7 @@ def _health(monitoring: Monitoring | None) -> list[ControllerRouterHandler]:
         "/readyz",
         summary="Whether the process can do its work, and which part of it cannot",
         operation_id="getReadiness",
+        guards=[Open()],
     )
     async def readyz() -> Response[Readiness]:
         found = await monitoring.readiness() if monitoring is not None else Readiness(ready=True)
@@ -272,6 +274,7 @@ def _health(monitoring: Monitoring | None) -> list[ControllerRouterHandler]:
         media_type=MediaType.TEXT,
         summary="Measures, as Prometheus reads them",
         operation_id="getMetrics",
+        guards=[Needs("scrape")],
     )
     async def metrics() -> Response[str]:
         text = await monitoring.exposition() if monitoring is not None else ""

@@ -23,6 +23,7 @@ from litestar.routes import HTTPRoute, WebSocketRoute
 from msgspec import inspect as kinds
 
 from action_assistant.version import VERSION
+from action_assistant.web.auth.access import SignedIn
 from action_assistant.web.auth.roles import Permission
 from action_assistant.web.http.problems import PROBLEM_JSON, ProblemDetails
 
@@ -90,6 +91,7 @@ class OpenApiText(JsonRenderPlugin):
         return Router(
             "/schema",
             route_handlers=[],
+            guards=[SignedIn()],
             before_request=answer,
             include_in_schema=False,
             dto=None,

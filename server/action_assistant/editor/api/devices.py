@@ -1,0 +1,136 @@
+"""Routes of one's own devices: the list, the end of one, and *add a device*."""
+
+from typing import Any
+
+import msgspec
+from anyio import to_thread
+from litestar import Request, Response, delete, get, post
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.editor.api.qr_codes import qr_code
+from action_assistant.errors import BadInput, NotFound
+from action_assistant.web.auth.access import Needs, live_session
+from action_assistant.web.auth.device_codes import DeviceAsking, DeviceCode, DeviceCodes
+from action_assistant.web.auth.session_files import OpenSession, SessionFiles
+from action_assistant.web.network.addresses import Addresses
+from action_assistant.web.server.openapi import answer
+
+_Asking = Request[Any, Any, Any]
+
+
+class OwnDevices(msgspec.Struct, frozen=True):
+    """The open sessions of the person; `this`: the id of the one that asks. `origins`: the
+    addresses of the page for other devices, the likeliest first."""
+
+    sessions: list[OpenSession]
+    this: str
+    origins: tuple[str, ...]
+
+
+class DeviceIsMine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The answer of the person to a device that has sent their code."""
+
+    yes: bool
+
+
+def routes(
+    codes: DeviceCodes, browsers: SessionFiles, addresses: Addresses
+) -> list[ControllerRouterHandler]:
+    """Return the routes under `/api/devices`. They are for browsers: a token has no devices."""
+    return [*_own(browsers, addresses), *_adding(codes, addresses)]
+
+
+def _own(browsers: SessionFiles, addresses: Addresses) -> list[ControllerRouterHandler]:
+    def own(person: str) -> list[OpenSession]:
+        return [each for each in browsers.every() if each.person.id == person]
+
+    @get(
+        "/api/devices",
+        summary="The devices on which one is signed in oneself",
+        operation_id="listDevices",
+        guards=[Needs("see")],
+    )
+    async def list_devices(request: _Asking) -> OwnDevices:
+        session = live_session(request)
+        found = await to_thread.run_sync(own, session.person.id)
+        return OwnDevices(found, session.id, addresses.origins())
+
+    @post(
+        "/api/devices/{session:str}/end",
+        status_code=204,
+        summary="Sign out on one of one's own devices",
+        operation_id="endDevice",
+        guards=[Needs("see")],
+    )
+    async def end(session: str, request: _Asking) -> None:
+        mine = await to_thread.run_sync(own, live_session(request).person.id)
+        if session not in {each.id for each in mine}:
+            raise NotFound(f"You have no open session {session!r}.")
+        await to_thread.run_sync(browsers.end, session)
+
+    @post(
+        "/api/devices/end",
+        status_code=204,
+        summary="Sign out on all of one's other devices",
+        operation_id="endOtherDevices",
+        guards=[Needs("see")],
+    )
+    async def end_others(request: _Asking) -> None:
+        session = live_session(request)
+        await to_thread.run_sync(lambda: browsers.end_all_of(session.person.id, but=session.id))
+
+    return [list_devices, end, end_others]
+
+
+def _adding(codes: DeviceCodes, addresses: Addresses) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/devices/codes",
+        summary="Make a code with which another device of one's own signs in, valid for 2 minutes",
+        operation_id="makeDeviceCode",
+        guards=[Needs("see")],
+    )
+    async def make(request: _Asking) -> DeviceCode:
+        return codes.open(live_session(request))
+
+    @get(
+        "/api/devices/codes/{code:str}",
+        summary="Which device has sent a code",
+        operation_id="lookAtDevice",
+        guards=[Needs("see")],
+    )
+    async def look(code: str, request: _Asking) -> DeviceAsking:
+        return codes.look(code, live_session(request))
+
+    @post(
+        "/api/devices/codes/{code:str}/answer",
+        status_code=204,
+        summary="Confirm that the device which has sent a code is one's own, or refuse it",
+        operation_id="answerDevice",
+        guards=[Needs("see")],
+    )
+    async def say(code: str, data: DeviceIsMine, request: _Asking) -> None:
+        codes.answer(code, live_session(request), is_mine=data.yes)
+
+    @delete(
+        "/api/devices/codes/{code:str}",
+        status_code=204,
+        summary="Make a code invalid",
+        operation_id="cancelDeviceCode",
+        guards=[Needs("see")],
+    )
+    async def cancel(code: str, request: _Asking) -> None:
+        codes.cancel(code, live_session(request))
+
+    @get(
+        "/api/devices/codes/{code:str}/qr",
+        summary="A code as a QR code (SVG) that opens the page at `origin`",
+        operation_id="getDeviceQrCode",
+        guards=[Needs("see")],
+        responses={200: answer(str, media="image/svg+xml", text="The picture")},
+    )
+    async def picture(code: str, origin: str, request: _Asking) -> Response[bytes]:
+        if not addresses.is_page(origin):
+            raise BadInput("The page is not to be found there.", where={"path": "/origin"})
+        return qr_code(f"{origin}/#d={codes.text(code, live_session(request))}")
+
+    return [make, look, say, cancel, picture]

@@ -1,0 +1,50 @@
+"""Events that must take effect before the log can store them: stored as soon as it can."""
+
+import asyncio
+import logging
+from collections.abc import Awaitable, Callable
+from typing import Final
+
+from action_assistant.errors import Unavailable
+
+log: Final = logging.getLogger(__name__)
+
+_PATIENCE_S: Final = 2.0  # that a request waits for the log
+_AGAIN_S: Final = 5.0
+
+
+class LateRecords:
+    """Runs functions that store something in the log, in order, and retries each until it succeeds."""
+
+    def __init__(self, what: str) -> None:
+        self._what = what
+        self._waiting: list[Callable[[], Awaitable[None]]] = []
+        self._task: asyncio.Task[None] | None = None
+
+    async def add(self, store: Callable[[], Awaitable[None]]) -> None:
+        """Store something now or later. Wait a short time for it."""
+        self._waiting.append(store)
+        if self._task is None or self._task.done():
+            self._task = asyncio.create_task(self._store(), name=self._what)
+        await asyncio.wait([self._task], timeout=_PATIENCE_S)
+
+    async def aclose(self) -> None:
+        """Give up what is not stored yet."""
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.wait([self._task])
+
+    async def _store(self) -> None:
+        told = False
+        while self._waiting:
+            try:
+                await self._waiting[0]()
+            except Unavailable as error:
+                if not told:
+                    log.warning("the log does not have %s yet: %s", self._what, error.detail)
+                told = True
+                await asyncio.sleep(_AGAIN_S)
+                continue
+            self._waiting.pop(0)
+        if told:
+            log.info("the log has %s now", self._what)

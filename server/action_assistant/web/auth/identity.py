@@ -1,0 +1,82 @@
+"""The identity behind a request: the person, and the session or token by which they act.
+
+Decision 115 says which credentials there are. This module knows nothing of HTTP.
+"""
+
+import time
+from typing import Literal, NamedTuple, Protocol, TypeAlias
+
+import msgspec
+
+from action_assistant.web.auth.keys import Person, Session
+
+#: The areas for which a token of a program is valid; `hooks` is reserved.
+Scope: TypeAlias = Literal["read", "edit", "simulate", "operate", "scrape", "hooks"]
+
+
+class Token(msgspec.Struct, frozen=True):
+    """A token of a program, without its secret.
+
+    `person`: the person for whom the program acts, with the role that counts for it. `expires`:
+    seconds since 1970; None for a token that does not expire.
+    """
+
+    id: str
+    name: str
+    person: Person
+    scopes: frozenset[Scope]
+    expires: float | None = None
+
+    @property
+    def expired(self) -> bool:
+        """Return whether the token has expired: it then allows nothing but Stop."""
+        return self.expires is not None and time.time() >= self.expires
+
+
+#: The credentials that somebody can end. The owner's token is none of them.
+Credential: TypeAlias = Session | Token
+
+
+class Standing(NamedTuple):
+    """The present worth of a credential. `expired`: good for nothing but Stop."""
+
+    person: Person
+    groups: frozenset[str]
+    expired: bool
+
+
+class Identity(msgspec.Struct, frozen=True):
+    """The person who sends a request, and by which means.
+
+    `groups`: ids of the groups to which an owner has added the person. `session` and `token` are
+    both None for the owner's token. `device`: the id of the browser; "" if unknown. `address`: the
+    address of the client on the network; "" for this computer itself.
+    """
+
+    person: Person
+    groups: frozenset[str] = frozenset()
+    session: Session | None = None
+    token: Token | None = None
+    device: str = ""
+    address: str = ""
+
+    @property
+    def scopes(self) -> frozenset[Scope] | None:
+        """Return the scopes of the program's token; None for people and for the owner's token."""
+        return None if self.token is None else self.token.scopes
+
+
+class Tokens(Protocol):
+    """Knows the tokens of programs."""
+
+    def opens(self, text: str) -> Token | None:
+        """Return the token with this text; None if the text is no token of a program. Raise
+        Unauthenticated or Withdrawn if it is one that opens nothing. Called at each request."""
+
+
+class NoTokens:
+    """Accepts no token: used where a process knows of no programs."""
+
+    def opens(self, text: str) -> Token | None:
+        """Return None for every text."""
+        return None

@@ -1,0 +1,105 @@
+"""Persons who came by personal links, as files by which either process verifies them.
+
+`people/ID.json` in the data folder holds the present name, role and groups of one person, and
+`people/groups.json` the names of groups. The editor writes both after its log. They are read
+without a database or the other process. A person without a file has what their cookie says, so that
+a full disk signs nobody out. What could not be written holds in this process until it ends.
+"""
+
+import logging
+import re
+from pathlib import Path
+from typing import Final
+
+import msgspec
+
+from action_assistant.errors import Unavailable
+from action_assistant.private_files import make_folder, replace_file
+from action_assistant.web.auth.roles import Role
+
+log: Final = logging.getLogger(__name__)
+
+FOLDER: Final = "people"
+_GROUPS: Final = "groups"
+_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
+_State = tuple[int, int, int]
+
+
+class PersonFile(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A person as the file says. `groups`: ids of groups. `until`: seconds since 1970 after which
+    the person may do nothing but Stop; None for no such end."""
+
+    id: str
+    name: str
+    role: Role
+    groups: tuple[str, ...] = ()
+    until: float | None = None
+
+
+class PeopleFiles:
+    """Reads and writes the files of persons and groups."""
+
+    def __init__(self, data: Path) -> None:
+        self._folder = data / FOLDER
+        self._read: dict[str, tuple[_State, PersonFile | None]] = {}
+        self._unwritten: dict[str, PersonFile] = {}
+
+    def get(self, person: str) -> PersonFile | None:
+        """Return what is known of a person; None if there is no file, or none that can be read."""
+        if person in self._unwritten:
+            return self._unwritten[person]
+        if _ID.fullmatch(person) is None:
+            return None
+        path = self._path(person)
+        try:
+            found = path.stat()
+        except OSError:  # not there, or the disk is gone, for which nobody is put out
+            return None
+        state = (found.st_mtime_ns, found.st_ino, found.st_size)
+        known = self._read.get(person)
+        if known is None or known[0] != state:
+            known = (state, _decoded(path, person))
+            self._read[person] = known
+        return known[1]
+
+    def write(self, person: PersonFile) -> None:
+        """Store a person durably. Raise Unavailable if that fails; it then holds in this process
+        until the process ends. Raise ValueError for a malformed id."""
+        if _ID.fullmatch(person.id) is None or person.id == _GROUPS:
+            raise ValueError(f"{person.id!r} is no id of a person")
+        self._unwritten[person.id] = person
+        self._replace(person.id, msgspec.json.encode(person))
+        del self._unwritten[person.id]
+
+    def write_groups(self, names: dict[str, str]) -> None:
+        """Store the names of all groups by id. Raise Unavailable if that fails."""
+        self._replace(_GROUPS, msgspec.json.encode(names))
+
+    def groups(self) -> dict[str, str]:
+        """Return the names of all groups by id, as far as they can be read."""
+        try:
+            return msgspec.json.decode(self._path(_GROUPS).read_bytes(), type=dict[str, str])
+        except (OSError, msgspec.DecodeError):
+            return {}
+
+    def _path(self, name: str) -> Path:
+        return self._folder / f"{name}.json"
+
+    def _replace(self, name: str, content: bytes) -> None:
+        try:
+            make_folder(self._folder)
+            replace_file(self._path(name), content)
+        except OSError as error:
+            raise Unavailable(
+                f"It holds here and now, but could not be written to {self._folder}: "
+                f"{error.strerror}."
+            ) from error
+
+
+def _decoded(path: Path, person: str) -> PersonFile | None:
+    try:
+        found = msgspec.json.decode(path.read_bytes(), type=PersonFile)
+    except (OSError, msgspec.DecodeError) as error:
+        log.error("%s cannot be read: %s", path, error)
+        return None
+    return found if found.id == person else None

@@ -1,0 +1,72 @@
+"""The one function that decides what an identity may do, and that says why not."""
+
+from collections.abc import Mapping
+from typing import Final, Protocol, TypeAlias
+
+import msgspec
+
+from action_assistant.web.auth.identity import Identity, Scope
+from action_assistant.web.auth.roles import Permission, allowed, role_words
+
+#: The scopes of a token that include a permission. Tokens never register, share or restore.
+SCOPES_FOR: Final[Mapping[Permission, frozenset[Scope]]] = {
+    "see": frozenset({"read", "edit", "simulate", "operate"}),
+    "stop": frozenset({"simulate", "operate"}),
+    "edit": frozenset({"edit"}),
+    "simulate": frozenset({"simulate", "operate"}),
+    "operate": frozenset({"operate"}),
+    "register": frozenset(),
+    "share": frozenset(),
+    "restore": frozenset(),
+    "scrape": frozenset({"scrape", "read"}),
+}
+
+
+class Allowed(msgspec.Struct, frozen=True):
+    """The identity may do it."""
+
+
+class Denied(msgspec.Struct, frozen=True):
+    """The identity may not do it. `reason`: a sentence for the person."""
+
+    reason: str
+
+
+Decision: TypeAlias = Allowed | Denied
+
+
+class Thing(Protocol):
+    """A thing with rights of its own, such as a robot: a frozen value of one process."""
+
+    def refusal(self, identity: Identity, permission: Permission, now: float) -> str | None:
+        """Return the sentence that says why the identity may not do this here; None if it may.
+        `now`: seconds since 1970. Never asked about Stop."""
+
+
+def may(
+    identity: Identity, permission: Permission, thing: Thing | None = None, *, now: float
+) -> Decision:
+    """Return whether an identity has a permission, for a thing if one is given. `now`: seconds
+    since 1970.
+
+    Stop depends on no thing: everybody who is signed in may stop everything, and so may a token
+    with which a run can be started.
+    """
+    role = identity.person.role
+    if not allowed(role, permission):
+        return Denied(f"You are here as {role}: you may {role_words(role)}.")
+    token = identity.token
+    if token is not None and not token.scopes & SCOPES_FOR[permission]:
+        return Denied(_out_of_scope(token.name, permission, sorted(token.scopes)))
+    if thing is None or permission == "stop":
+        return Allowed()
+    reason = thing.refusal(identity, permission, now)
+    return Allowed() if reason is None else Denied(reason)
+
+
+def _out_of_scope(name: str, permission: Permission, scopes: list[Scope]) -> str:
+    has = ", ".join(scopes) or "none"
+    needed = " or ".join(sorted(SCOPES_FOR[permission]))
+    if not needed:
+        return f"The token {name!r} may not do this: it takes a person who is signed in."
+    return f"The token {name!r} has the scopes {has}; this needs {needed}."

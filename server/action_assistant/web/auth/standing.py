@@ -1,0 +1,58 @@
+"""The present standing of a session or token: what its person is now, and whether it has expired.
+
+A cookie says what was true at sign-in. Files of persons and the last use of sessions say what is true
+now, to either process by itself.
+"""
+
+import time
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from action_assistant.web.auth.identity import Credential, Standing, Token
+from action_assistant.web.auth.keys import Person, Session
+from action_assistant.web.auth.people_files import PeopleFiles
+from action_assistant.web.auth.roles import Role, rank
+from action_assistant.web.auth.session_files import SessionFiles
+from action_assistant.web.auth.session_limits import DEFAULTS, Limit
+
+
+class Standings:
+    """Knows the present standing of all credentials."""
+
+    def __init__(
+        self,
+        people: PeopleFiles,
+        browsers: SessionFiles,
+        limits: Mapping[Role, Limit] = DEFAULTS,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        self.people: Final = people
+        self.browsers: Final = browsers
+        self.limits: Final = limits
+        self._clock = clock
+        browsers.judge_by(lambda session: self.of(session).expired)
+
+    def of(self, credential: Credential) -> Standing:
+        """Return the present standing of a session or token."""
+        person = credential.person
+        now = self._clock()
+        over = credential.expired
+        file = None
+        if isinstance(credential, Token) or credential.personal:
+            file = self.people.get(person.id)
+        if file is not None:
+            # A token has at most the role that it was made with.
+            capped = isinstance(credential, Token) and rank(file.role) > rank(person.role)
+            person = Person(person.id, file.name, person.role if capped else file.role)
+            over = over or (file.until is not None and now >= file.until)
+        if not over and not isinstance(credential, Token):
+            over = self._is_idle(credential, person.role, now)
+        return Standing(person, frozenset(file.groups if file is not None else ()), over)
+
+    def _is_idle(self, session: Session, role: Role, now: float) -> bool:
+        """Return whether a session was not used for too long. One whose last use is unknown, as on
+        a full disk, is not idle."""
+        if session.begun == 0.0:
+            return False
+        used = self.browsers.used_at(session)
+        return used is not None and now - used >= self.limits[role].idle
