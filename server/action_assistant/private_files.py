@@ -90,7 +90,7 @@ def open_to_others(data: Path) -> list[Path]:
     rights."""
     if not hasattr(os, "geteuid"):
         return []  # Windows keeps rights in lists of its own, of which modes tell nothing
-    return [path for path in (data, *_ours_in(data)) if _is_open(path)]
+    return [path for path in (data, *_own_files(data)) if _is_open(path)]
 
 
 def holds_nothing_else(data: Path) -> bool:
@@ -99,7 +99,7 @@ def holds_nothing_else(data: Path) -> bool:
     return all(_OURS.fullmatch(entry.name) for entry in data.iterdir())
 
 
-def _ours_in(data: Path) -> Iterator[Path]:
+def _own_files(data: Path) -> Iterator[Path]:
     """Yield the files and folders of this program in a data folder, each folder before its content;
     symbolic links are skipped."""
     for entry in sorted(data.iterdir()):
@@ -131,7 +131,7 @@ def of_others(data: Path) -> list[Path]:
     does."""
     owner = data.stat().st_uid
     found: list[Path] = []
-    for path in _ours_in(data):
+    for path in _own_files(data):
         try:
             if path.lstat().st_uid != owner:
                 found.append(path)

@@ -102,7 +102,7 @@ def _warning(origin: str) -> list[str]:
 
 def _text(origins: list[str], link: ShareLink) -> str:
     first, *others = (f"{origin}{link.path}" for origin in origins)
-    lines = [f"\n  {link.role}: may {may_of(link.role)}", f"\n    {first}\n", _drawn(first)]
+    lines = [f"\n  {link.role}: may {may_of(link.role)}", f"\n    {first}\n", _qr_code(first)]
     if others:
         lines.append("    also: " + ", ".join(origin for origin in origins[1:]))
     return "\n".join(lines)
@@ -117,7 +117,7 @@ def may_of(role: str) -> str:
             return "do what a newer version knows"
 
 
-def _drawn(link: str) -> str:
+def _qr_code(link: str) -> str:
     """Return a QR code of a link as text of half blocks, readable on dark and light terminals."""
     out = io.StringIO()
     segno.make(link, error="l", micro=False).terminal(out, compact=True, border=2)

@@ -176,7 +176,7 @@ def serve(plan: ServePlan) -> int:
     for child in children:
         child.start(reading)
     threading.Thread(
-        target=_greet, args=(plan, keys, trust, children, enough), name="greet", daemon=True
+        target=_announce_page, args=(plan, keys, trust, children, enough), name="greet", daemon=True
     ).start()
     try:
         while not enough.within(_TICK):
@@ -271,7 +271,7 @@ def _certified(plan: ServePlan) -> ssl.SSLContext | None:
     return certificate.trusting()
 
 
-def _greet(
+def _announce_page(
     plan: ServePlan,
     keys: Keys,
     trust: ssl.SSLContext | None,
@@ -282,7 +282,7 @@ def _greet(
     nothing if the program is told to end (`enough`) before."""
     here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"
     origin = f"{'https' if plan.tls else 'http'}://{f'[{here}]' if ':' in here else here}"
-    if not _answer(origin, keys, trust, children, enough):
+    if not _wait_for_answers(origin, keys, trust, children, enough):
         return
     base = f"{origin}:{plan.port}"
     url = f"{base}/#t={keys.token}"
@@ -309,7 +309,7 @@ def _greet(
         webbrowser.open(redirect.as_uri())
 
 
-def _answer(
+def _wait_for_answers(
     origin: str,
     keys: Keys,
     trust: ssl.SSLContext | None,

@@ -36,7 +36,7 @@ class SharedCheck(Generic[T]):
         task = self._task
         if task is None or (task.done() and loop.time() - self._answered_at > self._fresh):
             task = self._task = loop.create_task(self._asked())
-            task.add_done_callback(_heard)
+            task.add_done_callback(_fetch_exception)
             self._asked_at = loop.time()
         return task
 
@@ -81,7 +81,7 @@ class SharedCheck(Generic[T]):
             self._task.cancel()
 
 
-def _heard(task: "asyncio.Task[T]") -> None:
+def _fetch_exception(task: "asyncio.Task[T]") -> None:
     """Fetch the exception of an ended task, so that asyncio does not warn where no caller waits for
     it any more; `failure` reports it."""
     if not task.cancelled():

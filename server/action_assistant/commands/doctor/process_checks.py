@@ -119,7 +119,7 @@ def certificate_fits(where: str, url: str, trust: ssl.SSLContext) -> Iterator[Di
     `where`: the address for the message; `trust`: the certificates to accept."""
     host, port = urlsplit(url).hostname or "", urlsplit(url).port or 443
     try:
-        _shake(host, port, trust)
+        _certificate_of(host, port, trust)
     except ssl.SSLCertVerificationError as error:
         yield _wrong(where, host, error, _shown_certificate(host, port))
     except OSError:  # reported by the check that connects there
@@ -166,7 +166,7 @@ def _names(shown: x509.Certificate | None) -> str:
     return ", ".join(str(each.value) for each in held) or "no name at all"
 
 
-def _shake(host: str, port: int, trust: ssl.SSLContext) -> bytes | None:
+def _certificate_of(host: str, port: int, trust: ssl.SSLContext) -> bytes | None:
     """Make a TLS handshake with a server and return its certificate (DER), None if it has none.
     Raise OSError if it does not answer, ssl.SSLCertVerificationError if the certificate is not
     trusted."""
@@ -182,7 +182,7 @@ def _shown_certificate(host: str, port: int) -> x509.Certificate | None:
     context.check_hostname = False
     context.verify_mode = ssl.CERT_NONE
     try:
-        raw = _shake(host, port, context)
+        raw = _certificate_of(host, port, context)
         return x509.load_der_x509_certificate(raw) if raw else None
     except (OSError, ValueError):
         return None

@@ -169,9 +169,9 @@ class GraphNames:
             chosen = select(*fields).where(graph.id.in_(ids[start : start + _ROWS]))
             for row in await self._journal.query(chosen):
                 if row.deleted_at is not None or row.draft_of is not None:
-                    self._call(row.id, None)
+                    self._set_document(row.id, None)
                 elif row.id not in self._documents:
-                    self._call(row.id, _as_document(row))
+                    self._set_document(row.id, _as_document(row))
                     fresh.add(row.id)
         return fresh
 
@@ -186,9 +186,9 @@ class GraphNames:
             except Refused:  # not now
                 self._again.add(graph)
                 return
-            self._call(graph, msgspec.structs.replace(document, name=name))
+            self._set_document(graph, msgspec.structs.replace(document, name=name))
 
-    def _call(self, graph: str, document: _Document | None) -> None:
+    def _set_document(self, graph: str, document: _Document | None) -> None:
         """Replace what is stored of the document with this id by `document`; None removes it, since
         it was deleted or is a draft."""
         before = self._documents.pop(graph, None)

@@ -412,7 +412,7 @@ async def _folded(
     if run_in_worker is run_here or _is_small(document, events):
         return _fold(document, events.part(0, await tail.sound()), learn)
     folding = asyncio.ensure_future(_folded_aside(document, events, learn, run_in_worker))
-    folding.add_done_callback(_heard)
+    folding.add_done_callback(_fetch_exception)
     try:
         await asyncio.sleep(0)  # it is sent before checking takes turns with that
         good = await tail.sound()  # while it works
@@ -432,7 +432,7 @@ def _is_small(document: bytes, events: EventColumns) -> bool:
     return not is_packed(document) and len(document) + events.size <= _SMALL
 
 
-def _heard(folding: "asyncio.Future[Folded | None]") -> None:
+def _fetch_exception(folding: "asyncio.Future[Folded | None]") -> None:
     """Read the error of a fold that was cancelled or no longer needed, so that asyncio does not log
     it."""
     if not folding.cancelled():

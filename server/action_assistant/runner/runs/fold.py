@@ -248,10 +248,10 @@ def _held(run: Run) -> Run:
 
 def _alarmed(run: Run, event: AlarmRaised) -> Run:
     alarm = Alarm(event.code, event.at, event.text)
-    return replace(_meddled(run, event.code), alarms=(*run.alarms, alarm)[-KEPT:])
+    return replace(_disturbed(run, event.code), alarms=(*run.alarms, alarm)[-KEPT:])
 
 
-def _meddled(run: Run, alarm: str) -> Run:
+def _disturbed(run: Run, alarm: str) -> Run:
     """Return the run after an alarm about a command of another program: such a command may cause
     what the graph alone rules out, so later conclusions allow for it. `alarm`: the code of the
     alarm."""

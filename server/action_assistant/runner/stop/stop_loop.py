@@ -65,7 +65,7 @@ class StopLoop:
         """Process the present state of the run: if the last stop message was useless and the next
         one may not be, that is sent soon."""
         self._run = run
-        if self._vain and not _is_vain(run):
+        if self._vain and not _are_stops_useless(run):
             self._news.set()
 
     async def attempts(self) -> AsyncIterator[StopAttempt]:
@@ -73,9 +73,9 @@ class StopLoop:
         await self._wanted.wait()
         since, gap = anyio.current_time(), _FIRST_GAP_S
         for number in itertools.count(self._run.stops_sent + 1):
-            await self._turn()
+            await self._until_due()
             yield StopAttempt(number, since)
-            self._vain = _is_vain(self._run)
+            self._vain = _are_stops_useless(self._run)
             self._news = anyio.Event()
             with anyio.move_on_after(gap) as quiet:
                 await self._news.wait()
@@ -83,7 +83,7 @@ class StopLoop:
             if not quiet.cancelled_caught:
                 gap = _FIRST_GAP_S
 
-    async def _turn(self) -> None:
+    async def _until_due(self) -> None:
         """Wait until the next stop message may be sent. That is at once while the engine holds the
         run; later a person has to press Stop for each message, since a graph of that name would be
         another one."""
@@ -93,7 +93,7 @@ class StopLoop:
         self._pressed = anyio.Event()
 
 
-def _is_vain(run: Run) -> bool:
+def _are_stops_useless(run: Run) -> bool:
     """Return whether further stop messages are useless: nothing of the run moves any more, and the
     engine can never prove it."""
     return bool(run.unconfirmed) and not run.active and run.unknown_since is None

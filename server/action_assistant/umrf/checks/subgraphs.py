@@ -257,12 +257,12 @@ def _inner(name: str, facts: EngineFacts, graphs: SubGraphs) -> _Inner:
     _check_each(inside, name, graphs)
     check_scenarios(inside)
     findings = _findings(inside)
-    when = None if any(_stays(each) for each in findings) else halted(inside)
+    when = None if any(_needs_no_trial(each) for each in findings) else halted(inside)
     ends = None if when is None else (when, not inside.incoming.get(EXIT))
     return _Inner(signature_of_graph(graph), findings, ends)
 
 
-def _stays(finding: _Finding) -> bool:
+def _needs_no_trial(finding: _Finding) -> bool:
     """Return whether a finding makes it needless to try how the sub-graph ends: it is an error, or
     says that the sub-graph may never end (H8)."""
     return finding.severity == "error" or finding.place.code == "H8"

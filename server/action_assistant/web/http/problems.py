@@ -86,7 +86,7 @@ def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Respons
     """Answer a refusal of Litestar itself, such as an unknown route or method, or a malformed or
     too large body."""
     phrase = HTTPStatus(error.status_code).phrase
-    detail, where = _told(request, error)
+    detail, where = _detail_and_place(request, error)
     if error.status_code >= 500:
         log.error("request failed", exc_info=error)
     slug = phrase.lower().replace(" ", "-")
@@ -94,7 +94,7 @@ def _framework(request: Request[Any, Any, Any], error: HTTPException) -> Respons
     return _response(details, dict(error.headers or {}))
 
 
-def _told(
+def _detail_and_place(
     request: Request[Any, Any, Any], error: HTTPException
 ) -> tuple[str, dict[str, Any] | None]:
     """Return a sentence about an error of Litestar, and the path of the wrong field in the body as
@@ -113,13 +113,13 @@ def _told(
         case HTTPStatus.METHOD_NOT_ALLOWED:
             return f"{request.method} is not possible at {request.url.path}.", None
         case HTTPStatus.REQUEST_ENTITY_TOO_LARGE:
-            return f"At most {_limit(request)} are read.", None
+            return f"At most {_body_limit(request)} are read.", None
         case status if status >= 500:
             return "The server failed; its log says why.", None
     return error.detail, None
 
 
-def _limit(request: Request[Any, Any, Any]) -> str:
+def _body_limit(request: Request[Any, Any, Any]) -> str:
     """Return, as text such as `2 MB`, the longest body that the route of a request accepts."""
     handler = request.scope.get("route_handler")
     if not isinstance(handler, HTTPRouteHandler):

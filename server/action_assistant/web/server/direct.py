@@ -240,7 +240,7 @@ class DirectSocket(WebSocketProtocol):
         self._rest += data
         if self._waits:
             self._pause_reading()
-        self._cut()
+        self._handle_frames()
 
     def resume_writing(self) -> None:
         """Continue after the transport has room again: send a delayed ping and notify the receiver."""
@@ -274,9 +274,9 @@ class DirectSocket(WebSocketProtocol):
 
     def _go_on(self) -> None:
         self._drain()
-        self._cut()
+        self._handle_frames()
 
-    def _cut(self) -> None:
+    def _handle_frames(self) -> None:
         """Handle complete frames while the receiver accepts them, up to a limit; then let other
         tasks run."""
         for _ in range(_IN_A_TURN):
@@ -287,7 +287,7 @@ class DirectSocket(WebSocketProtocol):
                 return
             frame = bytes(self._rest[:end])
             del self._rest[:end]  # the receiver may resume reading in this call
-            self._deal_with(frame, start)
+            self._handle_frame(frame, start)
         else:
             self._waits = True
             self._pause_reading()
@@ -297,7 +297,7 @@ class DirectSocket(WebSocketProtocol):
 
     def _next_turn(self) -> None:
         self._waits = False
-        self._cut()
+        self._handle_frames()
         if not self._is_held and self.queue.empty():
             self._read_on()
 
@@ -322,7 +322,7 @@ class DirectSocket(WebSocketProtocol):
         most = self._limit - (self._in_pieces or 0)
         return (start, start + size) if size <= most else (0, there)
 
-    def _deal_with(self, frame: bytes, start: int) -> None:
+    def _handle_frame(self, frame: bytes, start: int) -> None:
         """Handle one frame, whose payload begins at the offset `start`."""
         first = frame[0]
         usual = self._receiver is None or self._in_pieces is not None

@@ -76,7 +76,7 @@ def serve(
     connections = Connections(posix.raise_descriptors(), forwarded.is_proxy)
     app = ActivityTracker(forwarded, connections)
     config = _configured(app, identity, direct=direct)
-    logging.getLogger("uvicorn.error").addFilter(_in_one_line)
+    logging.getLogger("uvicorn.error").addFilter(_shorten_error)
     server = _Server(config, endings, connections)
     _end_with_parent(server)
     server.run(sockets=sockets)
@@ -226,7 +226,7 @@ class ActivityTracker:
 
         async def sent(message: Message) -> None:
             if message["type"] == "http.response.start" and scope["path"].endswith("/stop"):
-                message["headers"] = [*message.get("headers", []), _own_share()]
+                message["headers"] = [*message.get("headers", []), _time_header()]
             await send(message)
 
         with self._connections.answering(peer and tuple(peer)) as holder:
@@ -243,7 +243,7 @@ def _waits_for_body(scope: Scope) -> bool:
     return any(name == b"content-length" and value != b"0" for name, value in scope["headers"])
 
 
-def _own_share() -> tuple[bytes, bytes]:
+def _time_header() -> tuple[bytes, bytes]:
     """Return the header with the time since a Stop came in: processor time and wall time, in
     milliseconds."""
     cpu, wall = _RECEIVED.get()
@@ -340,7 +340,7 @@ class _Server(uvicorn.Server):
         await super().shutdown(sockets)
 
 
-def _in_one_line(record: logging.LogRecord) -> bool:
+def _shorten_error(record: logging.LogRecord) -> bool:
     """Filter a log record: turn an error that a malformed message of a client causes into a warning
     without a traceback. Always return True, so that no line is lost."""
     if "Invalid UTF-8" in record.msg:

@@ -51,14 +51,14 @@ class Forwarded:
             peer: Any = scope.get("client")
             if peer and self.is_proxy(peer[0]):
                 scope.setdefault("state", {})[PROXIED] = True
-            found = self._asker(peer[0], _forwarded(scope)) if peer else None
+            found = self._client_behind(peer[0], _forwarded(scope)) if peer else None
             if found is not None:
-                scope.get("state", {}).get(ASKED, _nobody)(found)
+                scope.get("state", {}).get(ASKED, _ignore_client)(found)
                 changed: Any = {**scope, "client": (found, 0)}
                 scope = changed
         await self._app(scope, receive, send)
 
-    def _asker(self, peer: str, chain: list[str]) -> str | None:
+    def _client_behind(self, peer: str, chain: list[str]) -> str | None:
         """Return the address of the client behind trusted proxies; None if the peer itself is the
         client. `chain`: the addresses of X-Forwarded-For, the last proxy's client at the end; it is
         used up."""
@@ -146,7 +146,7 @@ def misrouted(runner_port: int) -> ControllerRouterHandler:
     return astray
 
 
-def _nobody(_: str) -> None:
+def _ignore_client(_: str) -> None:
     """Ignore the address of the client, since no part asked for it."""
 
 

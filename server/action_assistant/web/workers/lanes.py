@@ -83,12 +83,12 @@ def child(
     imports before the first fork. Raise OSError or EOFError if it cannot be started."""
     _context().set_forkserver_preload(list(preloaded))
     told = (name, work, args, nice)
-    process = _context().Process(target=_humbly, args=told, name=name, daemon=True)
+    process = _context().Process(target=_run_in_child, args=told, name=name, daemon=True)
     process.start()
     return process
 
 
-def _humbly(name: str, work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
+def _run_in_child(name: str, work: Callable[..., None], args: tuple[Any, ...], nice: int) -> None:
     """Set up the new process `name` and call `work` in it. When processor time runs short, other
     processes go first (`nice`); when memory runs short, the system ends this process first."""
     make_streams_printable()

@@ -93,7 +93,7 @@ class _Merge:
         actions = [owner for owner in sorted(self._owners) if is_aid(owner)]
         arrows = [owner for owner in sorted(self._owners) if ends_of(owner) is not None]
         self._take_whole(actions, self._is_used)
-        self._take_along(actions)
+        self._choose_sides_of_arrows(actions)
         self._take_whole(arrows, self._is_changed)
         lists: list[Place] = []
         for owner, places in sorted(self._owners.items()):
@@ -151,7 +151,7 @@ class _Merge:
             if not is_place_of_card(place) and not _is_order(place)
         )
 
-    def _take_along(self, actions: Iterable[str]) -> None:
+    def _choose_sides_of_arrows(self, actions: Iterable[str]) -> None:
         """Choose the side of each arrow of the given actions, which one side removed: the side that
         was chosen for the action at its end. Where both ends were, an action that stays decides."""
         whole = {action: self._whole[action] for action in actions if action in self._whole}
