@@ -125,7 +125,8 @@ class Child:
 
     def tend(self, parent: int) -> int | None:
         """Start the process if it has died and a pause has passed; call this again and again.
-        Return None, or its exit code if a new start is hopeless. `parent`: as for `start`."""
+        Return None, or its exit code if a new start is hopeless. `parent`: the reading end of a
+        pipe that closes when this process dies."""
         now = time.monotonic()
         if self._process is None:
             if now >= self._again:

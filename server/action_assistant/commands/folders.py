@@ -117,7 +117,8 @@ def _list(options: argparse.Namespace) -> int:
 
 
 def _new(options: argparse.Namespace) -> int:
-    """Make the folders of a path that are missing, and print the id of the last one."""
+    """Make the folders of a path that are missing, print the id of the last one, and return the
+    exit code."""
     names = _names(options.path)
     if not names:
         raise RequestRefused("A path names at least one folder.")

@@ -98,8 +98,9 @@ def _go_on(options: argparse.Namespace) -> int:
 
 
 def press(server: Server, path: str, body: dict[str, str]) -> None:
-    """Send an order that may move robots. If no answer comes, send it once more with the same request
-    id, so that the two count once. Raise CannotStart if there is no answer then either."""
+    """Send an order that may move robots (POST of `body` to `path`), and wait for the answer. If no
+    answer comes, send it once more with the same request id, so that the two count once. Raise
+    CannotStart if there is no answer then either."""
     press = body | {"request_id": str(uuid.uuid4())}
     try:
         server.runner("POST", path, json=press)

@@ -103,7 +103,7 @@ class JournalReader:
         self, statement: Select[Any], values: Mapping[str, Any] | None = None
     ) -> list[Sequence[Any]]:
         """Return the rows of a query as the driver returns them, which is quicker for many rows.
-        `values`: as for `query`."""
+        `values`: for the parameters of a prepared statement."""
         return await self._ask(lambda connection: _plain(connection.execute(statement, values)))
 
     async def snapshot(self, stream: str) -> StreamSnapshot | None:

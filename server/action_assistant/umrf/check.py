@@ -66,7 +66,8 @@ def check_reading(
     graphs: Mapping[str, Graph] | None = None,
 ) -> list[Problem]:
     """Return all problems of a file that was read, with their places in the file: problems of the
-    text, and problems of the graph in it. `library`, `facts` and `graphs` are as in `check`."""
+    text, and problems of the graph in it. `library`, `graphs`: the actions and graphs that the
+    engine has, by name, None if unknown; `facts`: its build."""
     found = check(reading.graph, library, facts, graphs)
     problems = [*reading.problems, *reading.placed(found)]
     return sorted(problems, key=rank)

@@ -54,7 +54,7 @@ def piece_name(graph: str, action: str, visit: str = "") -> str:
 
 def piece_of(graph: Graph, action: Action, visit: str = "") -> Graph:
     """Return the graph that has only this action of `graph`, with the values that stand in it.
-    `visit`: as in `piece_name`."""
+    `visit`: an id that is put into its name if each visit needs a name of its own, else ""."""
     alone = msgspec.structs.replace(action, actor="", position=None)
     return Graph(
         name=piece_name(graph.name, action.full_name, visit),

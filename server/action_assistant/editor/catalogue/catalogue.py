@@ -168,7 +168,8 @@ class Catalogue:
         return await self._add(found.update, about, drafts, author, file), found.reading
 
     async def folder_of(self, graph: str) -> str | None:
-        """Return the id of the folder in which a graph lies. A draft lies where its graph does."""
+        """Return the id of the folder in which a graph lies, None for no folder. A draft lies where
+        its graph does."""
         row = await self._row(graph)
         if row.draft_of is not None:
             row = await self._row(row.draft_of, deleted=True)
@@ -329,7 +330,8 @@ class Catalogue:
 
 
 def _filed(folder: str | None, author: str) -> list[Draft]:
-    """Return the event that puts a new graph into a folder; nothing without a folder."""
+    """Return, as a list, the event that puts a new graph into a folder; an empty list without a
+    folder."""
     return [] if folder is None else [h.draft(h.FILED, author, h.GraphFiled(folder))]
 
 

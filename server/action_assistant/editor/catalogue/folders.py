@@ -58,8 +58,9 @@ class Folders:
         _one(await self._known(), folder)
 
     async def make(self, name: str, parent: str | None, author: str) -> Folder:
-        """Make a folder in `parent`, or in no folder. Raise BadInput for a bad name, Conflict if
-        the name is taken there, the folders would be too many or lie too deep."""
+        """Make a folder in the folder `parent` (None: in no folder), and return it. Raise BadInput
+        for a bad name, Conflict if the name is taken there, the folders would be too many or lie
+        too deep."""
         name = fit_name(name)
         async with self._changing:
             known = await self._known()
@@ -71,15 +72,17 @@ class Folders:
         return made
 
     async def rename(self, folder: str, name: str, author: str) -> Folder:
-        """Give a folder another name. Raise BadInput for a bad name, Conflict if it is taken."""
+        """Give a folder another name, and return it. Raise BadInput for a bad name, Conflict if it
+        is taken."""
         name = fit_name(name)
         async with self._changing:
             known = await self._known()
             return await self._change(known, replace(_one(known, folder), name=name), author)
 
     async def move(self, folder: str, parent: str | None, author: str) -> Folder:
-        """Move a folder with its contents into another, or into none. Raise Conflict if it would
-        lie in itself or too deep, or if its name is taken there."""
+        """Move a folder with its contents into the folder `parent` (None: out of all folders), and
+        return it. Raise Conflict if it would lie in itself or too deep, or if its name is taken
+        there."""
         async with self._changing:
             known = await self._known()
             return await self._change(known, replace(_one(known, folder), parent=parent), author)
@@ -92,7 +95,7 @@ class Folders:
             await self._append(h.FOLDER_REMOVED, author, body)
 
     async def file(self, graph: str, folder: str | None, author: str) -> None:
-        """Move a graph into a folder, or out of all folders. Raise NotFound if there is no such
+        """Move a graph into a folder (None: out of all folders). Raise NotFound if there is no such
         graph or folder, Conflict if it is a draft or an action of the library."""
         table = editor_tables.graph.c
         columns = table.deleted_at, table.kind, table.draft_of, table.folder
@@ -111,7 +114,8 @@ class Folders:
                 await self._journal.append(h.about_stream(graph), [filed])
 
     async def _change(self, known: Mapping[str, Folder], now: Folder, author: str) -> Folder:
-        """Store another name or place of a folder, if it differs from the present one."""
+        """Store the new name or place of a folder (`now`), if it differs from the present one;
+        return the folder. `known`: all folders by id."""
         _check_place(known, now)
         if known[now.id] != now:
             body = h.FolderState(now.id, now.name, now.parent)
@@ -143,9 +147,9 @@ def _one(known: Mapping[str, Folder], folder: str) -> Folder:
 
 
 def _check_place(known: Mapping[str, Folder], now: Folder) -> None:
-    """Check that a folder may have this name and place. Raise NotFound if its parent does not
-    exist, Conflict if it would lie in itself or too deep, or if a folder beside it is called
-    alike."""
+    """Raise NotFound if the parent of the folder `now` does not exist, Conflict if the folder would
+    lie in itself or too deep, or if a folder beside it has the same name. `known`: all folders by
+    id."""
     above = _way(known, now.parent)
     if now.id in above:
         raise Conflict("A folder cannot lie in itself.")
@@ -157,7 +161,8 @@ def _check_place(known: Mapping[str, Folder], now: Folder) -> None:
 
 
 def _way(known: Mapping[str, Folder], folder: str | None) -> list[str]:
-    """Return a folder and those around it, the outermost last."""
+    """Return the ids of a folder and of those around it, the outermost last; none for None.
+    `known`: all folders by id."""
     way: list[str] = []
     while folder is not None and folder not in way:
         way.append(folder)
@@ -166,7 +171,8 @@ def _way(known: Mapping[str, Folder], folder: str | None) -> list[str]:
 
 
 def _height(known: Mapping[str, Folder], folder: str) -> int:
-    """Return how many folders lie in one another from this one downwards, at least 1."""
+    """Return how many levels of folders there are from this one downwards, at least 1. `known`: all
+    folders by id."""
     depths = Counter({folder: 0})
     for each in known:
         way = _way(known, each)

@@ -28,7 +28,8 @@ async def call_actions(
     room: Room, author: str, before: str, name: str, *, run_in_worker: RunInWorker = run_here
 ) -> bool:
     """Rename all actions called `before` to `name`, as one edit in the name of `author`. Return
-    whether there was one. The errors are those of `rename`."""
+    whether there was one. Raise BadInput or TooLarge if the edit is refused, Conflict if the log is
+    damaged, Unavailable if the room is closed or the edit cannot be stored."""
     state, seq = await room.read(lambda replica, seq: (replica.state(), seq))
     update = await run_in_worker(calling_actions, state, before, name)
     return await room.submit(update, author) > seq

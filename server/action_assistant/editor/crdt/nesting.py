@@ -56,8 +56,8 @@ class Nesting:
 
     def _resolved(self, placed: list[Placed], known: Mapping[int, int]) -> dict[Span, int]:
         """Return the depth of each struct in `placed`, without recursion: a struct waits for the
-        one that gives its position. `known`: as in `depths`. Raise Malformed if structs wait for
-        each other in a circle."""
+        one that gives its position. `known`: per Yjs client, the first clock that the document does
+        not have yet. Raise Malformed if structs wait for each other in a circle."""
         by_client: dict[int, list[Placed]] = {}
         for each in placed:  # within a client they come in order
             by_client.setdefault(each.span[0], []).append(each)

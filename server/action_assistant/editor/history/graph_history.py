@@ -197,7 +197,8 @@ def history_of(
 
 def last_edit_of(connection: Connection, graph: str, limit: int, before: int | None) -> int:
     """Return the number of the last change that a page of the history shows, up to which it needs
-    the index; 0 if it shows none. `limit`, `before`: as in `history_of`."""
+    the index; 0 if it shows none. The page has at most `limit` entries, from before the change
+    `before` (None: the newest)."""
     special = _special(connection, graph, stored_people(connection))
     edits = _edits(_shown(connection, graph, special, limit, before))
     return max((each.last for each in edits), default=0)

@@ -340,7 +340,7 @@ def _folder(event: Event) -> Sequence[Executable]:
 
 def _existing(folder: str | None) -> ScalarSelect[str]:
     """Return the id of a folder as a query that gives NULL if there is no such folder. So no row
-    refers to a folder that was removed by somebody else a moment before."""
+    refers to a folder that another person has just removed."""
     named = editor_tables.folder.alias("named")
     return select(named.c.id).where(named.c.id == folder).scalar_subquery()
 

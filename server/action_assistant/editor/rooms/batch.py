@@ -284,8 +284,9 @@ async def tried_for(
 
 
 async def adds_nothing_aside(edit: SubmittedEdit, state: bytes, run_in_worker: RunInWorker) -> bool:
-    """Return whether a large edit would change nothing in a document with the state vector `state`,
-    by `adds_nothing` in a worker process. Raise the errors of `tried_for`."""
+    """Return whether a large edit would change nothing in a document with the state vector `state`;
+    it is examined in a worker process. Raise Malformed, Panicked or TooSlow for a bad edit, NotNow
+    if the examination itself fails."""
     return await _done_for(edit.author, run_in_worker, adds_nothing, state, edit.update)
 
 

@@ -33,7 +33,8 @@ class ByteRateLimits:
         self._buckets: Final = TokenBuckets(AT_ONCE, PER_MINUTE / 60, clock)
 
     def spend_on_presence(self, person: str, size: int) -> float:
-        """Count a presence message of `size` bytes that a person sent; return as `spend` does."""
+        """Count a presence message of `size` bytes that a person sent, as some bytes at least;
+        return the seconds to wait before more of theirs is read."""
         return self.spend(person, max(size, _PRESENCE_BYTES))
 
     def spend(self, person: str, size: int) -> float:

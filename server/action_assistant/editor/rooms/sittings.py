@@ -25,8 +25,9 @@ class EditSittings:
         self._last: dict[str, tuple[Origin | None, float]] = {}
 
     def begun(self, graph: str, edits: Sequence[SubmittedEdit], seq: int) -> Sequence[Addition]:
-        """Return the events of the sittings that begin with these edits, the first of which gets the
-        number `seq`. There is none while it is not known by which connection a person edits."""
+        """Return the events that record who begins to edit a graph: for the first time, after a
+        pause, or by another connection. `edits`: those of one batch; `seq`: the number that the
+        first of them gets. No event is returned while the connection of a person is unknown."""
         drafts: list[Draft] = []
         now = time.monotonic()
         for number, edit in enumerate(edits, seq):

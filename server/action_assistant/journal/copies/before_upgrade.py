@@ -128,8 +128,8 @@ def _written(target: Path, connection: Connection, branch: Branch, revision: str
 
 
 def _free(folder: Path, revision: str) -> Path:
-    """Return a file name for a copy at this revision that no copy in the folder has yet; wait for
-    one if needed."""
+    """Return a file name, by the time, for a copy at this revision that no copy in the folder has
+    yet; wait until the time gives one, if needed."""
     while True:
         target = folder / f"{revision}-{datetime.now(UTC).strftime(_STAMP)}.db"
         if not target.exists():

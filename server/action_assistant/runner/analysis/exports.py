@@ -171,7 +171,8 @@ class _Track:
 
     def see_piece(self, event: Event, decoded: Any, before: Run | None, after: Run) -> None:
         """Write what one event of a piece showed of its robot; all else is in the conducted run's
-        own events. The parameters are those of `see`."""
+        own events. `decoded`: the decoded body of the event; `before`, `after`: the piece before
+        and after it."""
         if isinstance(decoded, Observed):
             for item in decoded.seen:
                 self._seen(item)

@@ -47,7 +47,8 @@ def noted(
     connection: ASGIConnection[Any, Any, Any, Any] | Request[Any, Any, Any],
     refusal: StartRefused,
 ) -> Iterator[None]:
-    """Keep a refusal that is raised inside of the block, with its reason, and raise it again."""
+    """Return a context: a refusal that is raised inside it is recorded, as `refusal` with the
+    reason, and raised again."""
     try:
         yield
     except Refused as refused:

@@ -244,13 +244,14 @@ def _due(before: int, most: int) -> Select[Any]:
 
 
 def _kept(run_id: str) -> Select[Any]:
-    """Return the query for a run that is never archived: pinned, or kept as an incident."""
+    """Return the query that finds a run (by id) if it is never archived: it is pinned, or kept as
+    an incident."""
     pinned = exists().where(review.c.run == run.c.id, review.c.pinned)
     return select(run.c.id).where(run.c.id == run_id, or_(pinned, _is_incident(run.c.id)))
 
 
 def _is_incident(run_id: ColumnElement[str]) -> ColumnElement[bool]:
-    """Return whether an owner keeps a run as an incident, by the events about it."""
+    """Return the SQL condition that an owner keeps the run as an incident, by the events about it."""
     stream = literal(annotations.stream_about("")) + run_id
     event = runner_event.c
     return exists().where(event.stream == stream, event.kind == annotations.IncidentKept.kind)

@@ -162,8 +162,8 @@ class Step:
         self._waiting.cancel()
 
     def tell_end(self, tell: Tell, ended: PieceEnded) -> None:
-        """Show and record the outcome of the step; if it is the word of a person, as theirs, who gave it
-        in another task."""
+        """Show and record the outcome of the step by `tell`. An outcome that a person gave is
+        recorded as theirs, although another task carries it out."""
         if self.word is None:
             tell(ended)
         else:

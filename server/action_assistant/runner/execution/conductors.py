@@ -153,8 +153,8 @@ class Conductors:
         return self._simulator(CONDUCTED_FACTS, first.script, self._runtime.clock_us, led=led)
 
     def once(self, run: str, request_id: str) -> AbstractAsyncContextManager[None]:
-        """Hold the lock of a request of a person on this run until the end of the block, so that a
-        repeat of it waits for the first one; a request without an id has no lock."""
+        """Return a context that holds the lock of a person's request (by its id) on this run, so
+        that a repeat of it waits for the first one. A request without an id ("") has no lock."""
         return self._claims.once(f"{run} {request_id}") if request_id else nullcontext()
 
     async def go_on(self, run: str, author: Author, request_id: str) -> None:

@@ -268,7 +268,8 @@ class Monitor:
         self, changes: RunChanges, standing: Standing, answer: Answer, look: EngineQuery
     ) -> None:
         """Add all conclusions that one answer allows to `changes`: observations of the run, its
-        loss after a restart of the engine, or its end. The parameters are those of `answered`."""
+        loss after a restart of the engine, or its end. `standing`: the engine's condition after the
+        answer; `look`: the mark of the get that it answers."""
         run = changes.run
         name = run.graph_name
         if len({run.incarnation, answer.incarnation} - {None, ""}) > 1:

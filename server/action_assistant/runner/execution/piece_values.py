@@ -63,8 +63,9 @@ class PieceValues:
     def ended(
         self, step: Step, outcome: Precondition, how: Literal["shape", "word", "unsent"], at: int
     ) -> PieceEnded:
-        """Return the event that ends the call of a step, with the output values. `outcome` and
-        `how`: as in `Conductor._finish`; `at`: µs UTC."""
+        """Return the event that ends the call of a step with this outcome, with the output values.
+        `how`: it was told by states of the robot ("shape"), by a person ("word"), or no piece was
+        sent ("unsent"); `at`: µs UTC."""
         given = self._given(step, outcome, how)
         return PieceEnded(
             at=at,

@@ -114,8 +114,8 @@ class RunChanges:
         self._rests_by_itself(how + self.last_words())
 
     def last_words(self) -> str:
-        """Return the exception that the engine's log showed right before now, as a further sentence;
-        "" if it showed none: then nobody knows why the engine has ended."""
+        """Return, as a further sentence, the exception that the engine's log showed right before;
+        "" if it showed none: it is then unknown why the engine has ended."""
         since = self._clock_us() - _LAST_WORDS_US
         lines = (line for line in reversed(self.run.log) if line.at >= since)
         said = next((line.text for line in lines if _EXCEPTION.search(line.text)), "")

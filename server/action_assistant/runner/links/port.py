@@ -239,8 +239,9 @@ class Link(Protocol):
 
     async def modify(self, order: Order, continue_from: str = "") -> None:
         """Publish one modify message: the order's graph takes the place of the running graph of the
-        same name. `continue_from`: as for `resume`. Raise NotSent if the message could not be sent,
-        EngineRefused if the engine refuses the change."""
+        same name. `continue_from`: the full name of an action that is started when the graph goes
+        on, "" for none. Raise NotSent if the message could not be sent, EngineRefused if the engine
+        refuses the change."""
         ...
 
     async def get(self) -> Answer:

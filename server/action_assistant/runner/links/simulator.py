@@ -99,8 +99,8 @@ def in_this_process(
     led: frozenset[str] = frozenset(),
 ) -> "SimulatorLink":
     """Return a link to a simulated engine that shares the event loop, for tests in virtual time.
-    The parameters are those of `Simulator`; raise Unavailable for behaviours, which need a process.
-    """
+    `facts`: the engine build; `script`: how its actions act (JSON); `led`: full names of actions
+    that robots carry out. Raise Unavailable if `behaviours` are given, which need a process."""
     if behaviours is not None:
         raise Unavailable("Behaviours need a simulated engine in a process of its own.")
     performer = LedCalls(led) if led else None
@@ -413,7 +413,8 @@ def _inside(order: Order) -> dict[str, Graph]:
 
 def _seen(trace: semantics.Trace, at: int, begun: Mapping[int, Values]) -> Exact | None:
     """Return the change that a trace adds to the history, at the time `at` (µs UTC); None for
-    relations, which follow from results. `begun`: as `_begun` returns."""
+    relations, which follow from results. `begun`: the inputs with which actions began, by the id of
+    the trace."""
     match trace:
         case semantics.NodeStateEvent():
             inputs = begun.get(id(trace))

@@ -111,7 +111,9 @@ class Incident(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def window(requested_at: int, ended_at: int | None, now: int) -> tuple[int, int]:
-    """Return the time of which robots and audit are kept, in microseconds UTC."""
+    """Return the begin and end (µs UTC) of the time from which an incident contains robots' logs
+    and audit: that of the run, with a margin. `ended_at`: None for a run that goes on until `now`.
+    """
     return requested_at - _AROUND_US, (now if ended_at is None else ended_at) + _AROUND_US
 
 
@@ -137,7 +139,7 @@ def event_lines(events: Sequence[Event]) -> tuple[bytes, Head]:
 
 
 def body_of(body: bytes) -> Any:
-    """Return a body as JSON; as hex where it is none."""
+    """Return the stored body of an event as JSON data; as text in hex if it is no JSON."""
     try:
         msgspec.json.decode(body, type=msgspec.Raw)
     except msgspec.DecodeError:
@@ -146,7 +148,8 @@ def body_of(body: bytes) -> Any:
 
 
 def proof_of(stream: str, found: Head, stored: Head) -> StreamProof:
-    """Return the check of a stream: `found` follows from its events, `stored` is its end by the log."""
+    """Return the check of a stream (by name): `found` is the end that follows from its events,
+    `stored` its end as the log has it."""
     return StreamProof(stream, found.seq, found.chain.hex(), stored.chain.hex(), found == stored)
 
 
@@ -222,5 +225,5 @@ def _readme(incident: Incident) -> str:
 
 
 def made_at(now: int) -> str:
-    """Return a time (microseconds UTC) as the title has it."""
+    """Return a time (µs UTC) as text, as the title of an incident writes it."""
     return time(now).strftime("%Y-%m-%dT%H:%M:%SZ")

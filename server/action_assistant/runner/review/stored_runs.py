@@ -308,7 +308,8 @@ class StoredRuns:
         return Head(rows[0].seq, bytes(rows[0].chain)) if rows else NOTHING
 
     async def _robot_facts(self, name: str, since: int, until: int) -> incident.RobotFacts:
-        """Return the registration of a robot, and what was recorded of it in a time (µs UTC)."""
+        """Return the registration of a robot, and all that was recorded of it from `since` to
+        `until` (µs UTC)."""
         registered = await self.rows(select(robot).where(robot.c.name == name))
         event = runner_event.c
         near = select(

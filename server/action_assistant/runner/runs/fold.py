@@ -432,7 +432,8 @@ def _piece_ended(run: Run, event: PieceEnded) -> Run:
 
 
 def _pressed(run: Run, request: str, press: Press) -> Run:
-    """Keep a press of a person with its request id, if it has one; of many only the newest."""
+    """Return the run with a person's press remembered under its request id ("" : not remembered);
+    of many only the newest stay."""
     if not request:
         return run
     kept = tuple(run.pressed.items())[1 - KEPT :]

@@ -193,8 +193,8 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
 
     @property
     def proven(self) -> int:
-        """The smallest number of visits by which everything can have happened that answers and
-        feedback showed."""
+        """The least number of visits that explains all states which answers and feedback have
+        shown."""
         fed = self.feedback[-1].least if self.feedback else 0
         return (max(self.answers.least, fed) + 1) // 2
 

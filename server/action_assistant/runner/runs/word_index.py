@@ -106,9 +106,9 @@ def unindexed() -> Select[Any]:
 
 
 def _place(begins: bool, ends: bool) -> Literal["all", "end", "begin", "within"]:
-    """Return where a searched word has to stand in a word of a run. `begins` and `ends`: another
-    character stands before, or after, it in the searched text, so that its begin or end is that of
-    the word."""
+    """Return where in a word of a run a part of the searched text has to be. `begins`, `ends`: the
+    searched text has other characters before, or after, this part, so that the word begins, or
+    ends, with it."""
     if begins and ends:
         return "all"
     if begins:

@@ -129,10 +129,11 @@ def check_loading(
     nested: Container[str] = frozenset(),
 ) -> None:
     """Report as one problem (hazard H14) all ends of actions that halt the graph while another
-    action may still load. The parameters are as in `check_responses`. An end with on_error is
-    reported only if it starts an action and halts the graph by itself: otherwise every graph that
-    ignores the errors of one branch would get this problem, though an action would have to fail
-    while another one loads."""
+    action may still load. `reports`: the outcomes that each action can report, by key;
+    `concurrency`: which actions can run at the same time; `nested`: names of sub-graphs, which need
+    no loading. An end with on_error is reported only if it starts an action and halts the graph by
+    itself: otherwise every graph that ignores the errors of one branch would get this problem,
+    though an action would have to fail while another one loads."""
     if "H14" not in subject.facts.hazards:
         return
     runs_at_once = {action.key for action in subject.real if action.name in nested}
@@ -199,8 +200,8 @@ def _failing_starts(
 def check_endless(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
     """Report as one problem (hazard H12) all spontaneous actions that continue when the graph is
     FINISHED. They begin again and again, and no stop reaches them. The problem is an error if this
-    happens even when all actions end with on_true, else a warning. The parameters are as in
-    `check_responses`."""
+    happens even when all actions end with on_true, else a warning. `reports`: the outcomes that
+    each action can report, by key; `concurrency`: which actions can run at the same time."""
     lively = {action.key for action in subject.real if action.type == "spontaneous"}
     if "H12" not in subject.facts.hazards or not lively:
         return
@@ -290,7 +291,8 @@ class _EarlyExit(msgspec.Struct, frozen=True):
 
 def check_stragglers(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
     """Report as one problem (hazard H12) all arrows to the exit by which the graph is FINISHED
-    while other actions may still run. The parameters are as in `check_responses`."""
+    while other actions may still run. `reports`: the outcomes that each action can report, by key;
+    `concurrency`: which actions can run at the same time."""
     if "H12" not in subject.facts.hazards:
         return
     incoming = [r for r in subject.incoming.get(EXIT, []) if not r.listing]

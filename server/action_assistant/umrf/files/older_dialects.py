@@ -231,9 +231,9 @@ def _relation(old: OldFile, relation: Json, path: str, side: str) -> Json:
 
 
 def _stop(old: OldFile, relation: dict[str, Json], path: str) -> None:
-    """Translate an item of `parents` (at the JSON pointer `path`) whose end stopped the child. The
-    older engine never counted it among the parents for which the child waits, so that a required
-    one prevented the child from ever running."""
+    """Translate an item of `parents` (`relation`, at the JSON pointer `path`) whose end stopped the
+    child: it gets conditions that stop it. A problem is added to `old` if the child also waits for
+    this parent: the older engine then never ran the child."""
     relation["conditions"] = list[Json](_STOPS)
     old.renamed(path, "stop_when_received", "conditions")
     place = old.at(path, "stop_when_received")

@@ -36,7 +36,8 @@ def write(graph: Graph, stamp: Stamp | None = None) -> str:
 
 
 def tree_of(graph: Graph, stamp: Stamp | None = None) -> dict[str, Json]:
-    """Return the canonical file of a graph as nested JSON values. `stamp`: as in `write`."""
+    """Return the canonical file of a graph as nested JSON values. `stamp`: the ids of graph,
+    version and run that the file carries, None for none."""
     return _Writer(graph, stamp).graph()
 
 

@@ -38,10 +38,10 @@ class GenerationBase(msgspec.Struct, frozen=True):
     unfinished: dict[str, UnfinishedFile] = {}
 
     def settled(self, there: Mapping[str, bytes]) -> dict[str, bytes]:
-        """Return the generated text on which each file is based, where `there` are the contents of
-        the present files. For an unfinished call this is the newer text if its file has arrived: to
-        merge it again could repeat lines. A file that was not there before came from that call,
-        even if it was edited since."""
+        """Return the generated text on which each file is based, by path. `there`: the contents of
+        the present files. If a call was interrupted, this is the newer text for each file that it
+        has written: to merge that again could repeat lines. A file that was not generated before
+        came from that call, even if it was edited since."""
         arrived = {
             path: each.text
             for path, each in self.unfinished.items()

@@ -134,8 +134,9 @@ def _announced(
 def readable_paths(
     package: str, now: Mapping[str, bytes], base: GenerationBase | None
 ) -> tuple[str, ...]:
-    """Return the paths of the files whose present contents `regenerated` needs. The parameters are
-    as there."""
+    """Return the paths of the files that have to be read before the package `package` is generated
+    again. `now`: the newly generated texts by path; `base`: the texts generated before, None
+    without."""
     known = base or GenerationBase()
     named = (*known.files, *known.unfinished)
     return tuple(sorted({*now, *(path for path in named if _is_possible(package, now, path))}))

@@ -160,9 +160,9 @@ class Engine(Graphs):
 
     def modify(self, graph: Graph, at_ms: float, continue_from: str = "") -> list[Trace]:
         """Give, at `at_ms`, a running, paused or halted graph of this name a new structure and let
-        it continue; return the trace up to then. `continue_from`: as for `resume`. Raise
-        `GraphRefused` as the engine does; a graph that was paused for the modify then stays PAUSED.
-        """
+        it continue; return the trace up to then. `continue_from`: the full name of an action to
+        run, "" for none. Raise `GraphRefused` as the engine does; a graph that was paused for the
+        modify then stays PAUSED."""
         self._run_until(at_ms)
         old = self.graphs.get(graph.name)
         if old is not None and not self.crashed and not self.locked:

@@ -135,7 +135,7 @@ class Graphs(Core):
     def _refuse_broken(self, graph: Running, *, matched: bool) -> None:
         """Raise `GraphRefused` if an action of the graph cannot be built. The graph then stays in
         the engine, without that action and the following ones. If other actions stand before it, a
-        get kills the engine. `matched`: as in `_not_built`."""
+        get kills the engine. `matched`: the engine has looked the actions up in its index."""
         found = self._not_built(graph, matched=matched)
         if found is None:
             return
@@ -163,7 +163,7 @@ class Graphs(Core):
 
     def _again(self, old: Running, new: Running, *, matched: bool) -> None:
         """Start the graph `new` although the engine holds one of that name (`old`), which has
-        ended. `matched`: as in `_not_built`."""
+        ended. `matched`: the engine has looked the actions up in its index."""
         if any(node.holds_thread(self.now) for node in old.nodes.values()):
             self._command(partial(self._replace, old, new, matched))
             return
@@ -173,7 +173,7 @@ class Graphs(Core):
 
     def _replace(self, old: Running, new: Running, matched: bool) -> None:
         """Start a graph again although actions of the finished one (`old`) still run: they are
-        stopped first. `matched`: as in `_not_built`."""
+        stopped first. `matched`: the engine has looked the actions up in its index."""
         self._graph_state(old, "CLEARING")
         left_over = [node for node in old.nodes.values() if node.holds_thread(self.now)]
         self._busy = True

@@ -78,11 +78,11 @@ def _unresolved_by(
     own: tuple[str, str], graph: Graph, library: Mapping[str, Graph], known: Container[str]
 ) -> Iterator[Unresolved]:
     """Yield the sub-graphs that the engine which resolves the actions of the actors `own` refuses.
-    `library`, `known`: as in `unresolved`. The engine goes through the actions by full name. Once
-    it has used a graph, it takes this graph off its list for the later actions of the same graph
-    and for all graphs inside, but not for graphs beside it. So the engine refuses one sub-graph
-    twice in one graph, and a sub-graph beside a later one that contains it; it accepts the same
-    sub-graph inside two different ones (measured)."""
+    `library`: the indexed graphs by name; `known`: names of plain actions. The engine goes through
+    the actions by full name. Once it has used a graph, it takes this graph off its list for the
+    later actions of the same graph and for all graphs inside, but not for graphs beside it. So the
+    engine refuses one sub-graph twice in one graph, and a sub-graph beside a later one that
+    contains it; it accepts the same sub-graph inside two different ones (measured)."""
     indexed = IndexedGraphs(library)
     levels = [_Level(graph, frozenset(), frozenset())]
     top: Action | None = None

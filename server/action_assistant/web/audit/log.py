@@ -53,7 +53,8 @@ class AuditStore(Protocol):
     """The parts of a journal that the audit uses."""
 
     async def append(self, stream: str, drafts: Sequence[Draft]) -> int:
-        """Store events at the end of a stream. Raise Unavailable if that is not possible."""
+        """Store events at the end of a stream, and return the number of the last one. Raise
+        Unavailable if that is not possible."""
         ...
 
 
@@ -132,7 +133,8 @@ class RepeatCounts:
         self.rows: Final = DailyRows(REPEATED_ROWS)
 
     def is_first(self, event: Repeated, author: str) -> bool:
-        """Return whether a fact gets a row now; if not, it is counted."""
+        """Return whether a fact gets a row now. If it was repeated within the minute, or too many
+        rows were made today, it is only counted. `author`: the id of the person."""
         at = self._clock_us()
         key = (author, event)
         found = self._seen.get(key)
@@ -185,8 +187,8 @@ class AuditLog:
 
     @asynccontextmanager
     async def writing(self, journal: "AuditStore") -> AsyncIterator[None]:
-        """Store inside of the `async with` what is noted; at its end store the remainder, for a second
-        at most."""
+        """Return a context during which facts are stored as they are noted; at its end the
+        remainder is stored, for a second at most."""
         if isinstance(journal, JournalReader):
             await self._recall(journal)
         self._closing = False

@@ -58,7 +58,8 @@ def audit_routes(
 
 
 def _us(moment: datetime | None, path: str) -> int | None:
-    """Return a time in microseconds UTC. Raise BadInput for one without an offset."""
+    """Return a time in microseconds UTC; None for None. Raise BadInput, with `path` as its place,
+    for one without an offset."""
     if moment is None:
         return None
     if moment.tzinfo is None:

@@ -110,7 +110,8 @@ def audit_page(
     describe: Describe,
     never: Collection[str],
 ) -> AuditPage:
-    """Return a page of the audit of one log. `never`: kinds of events that are no facts about people,
+    """Return a page of the audit of one log (`branch`): the rows for which `wanted` asks.
+    `describe`: returns an event in words; `never`: kinds of events that are no facts about people,
     most of a log."""
     end: int = connection.execute(select(func.max(_event.position))).scalar() or 0
     cursor = end + 1 if wanted.before is None else min(wanted.before, end + 1)
@@ -153,7 +154,8 @@ def _events(
 
 
 def _times(connection: Connection, position: int) -> tuple[int | None, int | None]:
-    """Return the time of the newest events up to a position, and of the event there."""
+    """Return the time of the newest of the events up to a position of the log, and the time of the
+    event there (µs UTC); None if there is none."""
     chosen = select(_event.at).where(_event.position <= position)
     times = list(connection.scalars(chosen.order_by(_event.position.desc()).limit(_SLICE)))
     return (max(times), times[0]) if times else (None, None)
@@ -189,8 +191,9 @@ def _row(branch: Branch, event: Event, wanted: AuditFilter, describe: Describe) 
 
 
 def _described(event: Event, describe: Describe, origin: Origin | None) -> Fact | None:
-    """Return an event in words. An event of an unknown kind that has the origin of a person is shown by
-    its kind, so that no newer kind is left out."""
+    """Return an event in words, by `describe`; None for an event that is no fact about people. An
+    event of an unknown kind that has the origin of a person is shown by its kind, so that no newer
+    kind is left out."""
     try:
         fact = describe(event)
     except (msgspec.DecodeError, TypeError):

@@ -380,7 +380,8 @@ class _Worker:
     @classmethod
     def born(cls, name: str, nice: int, preloaded: Sequence[str]) -> "_Worker":
         """Start a worker process named `name`, and wait until it exists: milliseconds, longer for
-        the first one. `nice` and `preloaded`: as for `child`."""
+        the first one. `nice`: how much lower its priority is; `preloaded`: modules that the fork
+        server imports before the first fork."""
         ours, theirs = wire()
         process = child(serve, theirs, name=name, nice=nice, preloaded=preloaded)
         theirs.close()

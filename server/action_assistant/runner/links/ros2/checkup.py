@@ -280,7 +280,8 @@ def _robot(robot: Registration, standing: Standing, elsewhere: Sequence[Candidat
 
 def _silent(robot: Registration, standing: Standing, elsewhere: Sequence[Candidate]) -> Diagnostic:
     """Return the finding for a robot that does not answer, with the reason as far as it can be seen
-    from this computer. The parameters are those of `_robot`."""
+    from this computer. `standing`: the condition of its engine; `elsewhere`: engines on other
+    domains that may be the engine of this robot."""
     if "RMW_IMPLEMENTATION" in standing.why:
         return found(
             "robot-middleware",
