@@ -147,7 +147,7 @@ def check_flow(subject: Subject, nested: Container[str] = frozenset()) -> Flow |
     _check_exit(subject, reachability)
     check_spontaneous(subject)
     check_instant_loops(subject, reachability.runs, reachability.reports)
-    check_endless(subject, reachability.reports, concurrency)
+    check_endless(subject, concurrency)
     check_stragglers(subject, reachability.reports, concurrency)
     return flow
 

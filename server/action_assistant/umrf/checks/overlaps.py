@@ -197,11 +197,11 @@ def _failing_starts(
                 break
 
 
-def check_endless(subject: Subject, reports: _Reports, concurrency: Concurrency) -> None:
+def check_endless(subject: Subject, concurrency: Concurrency) -> None:
     """Report as one problem (hazard H12) all spontaneous actions that continue when the graph is
     FINISHED. They begin again and again, and no stop reaches them. The problem is an error if this
-    happens even when all actions end with on_true, else a warning. `reports`: the outcomes that
-    each action can report, by key; `concurrency`: which actions can run at the same time."""
+    happens even when all actions end with on_true, else a warning. `concurrency`: which actions can
+    run at the same time."""
     lively = {action.key for action in subject.real if action.type == "spontaneous"}
     if "H12" not in subject.facts.hazards or not lively:
         return
