@@ -22,6 +22,7 @@ WITHOUT_BODY = frozenset(
         "/api/devices/end",
         "/api/devices/codes",
         "/api/devices/{session}/end",
+        "/api/tokens/{token}/revoke",
         "/api/runs/{run}/pause",
         "/api/runs/{run}/resume",
         "/api/robots/{name}/stop",

@@ -20,7 +20,7 @@ SECTIONS: Final = (
             *("backups", "audit", "monitoring", "doctor"),
         ),
     ),
-    ("For programs", ("api/editor", "api/runner", "contracts", "room-protocol")),
+    ("For programs", ("programs", "api/editor", "api/runner", "contracts", "room-protocol")),
     (
         "How it is built",
         (

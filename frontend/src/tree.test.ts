@@ -87,6 +87,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   ]),
   account: ["words", "ui", "api"],
   administration: ["clock", "words", "ui", "api"],
+  programs: ["words", "ui", "api"],
   app: [
     "clock",
     "words",
@@ -99,7 +100,16 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "sync",
     "dry-run",
     "editor",
-  ].concat(["runs", "review", "robots", "home", "library", "account", "administration"]),
+  ].concat([
+    "runs",
+    "review",
+    "robots",
+    "home",
+    "library",
+    "account",
+    "administration",
+    "programs",
+  ]),
 };
 
 test("folders import only what lies below them", () => {

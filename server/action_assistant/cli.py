@@ -98,6 +98,15 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
         "people", "print the link that signs the owner in, of a server that runs", described=True
     ),
     "people": CommandEntry("people", "links that let people in: list, invite, revoke"),
+    "login": CommandEntry(
+        "logins",
+        "sign in to a server elsewhere: a person confirms a code on its page",
+        described=True,
+    ),
+    "logout": CommandEntry(
+        "logins", "revoke the token that `login` stored, and delete it", described=True
+    ),
+    "tokens": CommandEntry("logins", "tokens of programs: list, make, revoke, stored"),
     "robots": CommandEntry(
         "robots", "robots that the runner reaches over ROS 2: list, add, remove", described=True
     ),

@@ -59,3 +59,9 @@ def data() -> Path:
         return Path(named)
     base = os.environ.get("XDG_DATA_HOME") or Path.home() / ".local" / "share"
     return Path(base) / "temoto-action-assistant"
+
+
+def config() -> Path:
+    """Return the folder of this user's settings, in their XDG configuration directory."""
+    base = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return Path(base) / "temoto-action-assistant"

@@ -32,6 +32,7 @@ _TURNED: Final = re.compile(f"\u2068({_WORDS})\u2069|({_WORDS})|([{_DIRECTING}])
 #: Secrets that let a person in, as patterns, and the part of each that may be shown.
 _SECRETS: Final[tuple[tuple[re.Pattern[str], str], ...]] = (
     (re.compile(r"\b([A-Za-z0-9]{12})\.[\w-]{43}(?![\w-])"), r"\1.…"),  # an invitation
+    (re.compile(r"\b(aat_[A-Za-z0-9]{1,12}_)\w+"), r"\1…"),  # a token of a program
     (re.compile(r"(?i)\b(bearer\s+)[^\s,;'\"]+"), r"\1…"),
     (re.compile(r"\b(aa_\d+=)[^\s;,'\"]+"), r"\1…"),  # a session
     (re.compile(r"([#?&/](?:t|i|token|password)=)[^\s&'\"]+"), r"\1…"),

@@ -40,6 +40,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
     "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
     "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "a file with that token",
+    "ACTION_ASSISTANT_TOKEN_DAYS": "the longest life of a token of a program, in days (365)",
     "ACTION_ASSISTANT_BACKUP_TO": "the folder of regular backups, as --backup-to of serve and --into of "
     "backup",
     "ACTION_ASSISTANT_BACKUP_EVERY": "how often `serve` makes one (24h), as --backup-every",
@@ -64,6 +65,8 @@ _SECRET: Final = 65_536  # characters of such a file
 ARCHIVE: Final = "archive"
 #: Stands in a data folder while `restore` puts things into it.
 RESTORING: Final = "restore.unfinished"
+#: The longest life of a token of a program, in days, where no setting says otherwise.
+TOKEN_DAYS: Final = 365.0
 #: The host that stands for every address of this computer, of both families.
 EVERYWHERE: Final = "*"
 _MIN_TOKEN: Final = 32  # characters, as of the token that programs present
@@ -98,6 +101,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     reached: Reachability = Reachability()
     metrics_token: str | None = None
     sessions: str = ""
+    token_days: float = TOKEN_DAYS
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -289,6 +293,13 @@ def keep(data: Path, environ: Mapping[str, str] = os.environ) -> Keep:
         runs=_days("ACTION_ASSISTANT_KEEP_RUNS", environ),
         raw=_days("ACTION_ASSISTANT_KEEP_RAW", environ),
     )
+
+
+def token_days(environ: Mapping[str, str] = os.environ) -> float:
+    """Return the longest life of a token of a program, in days. Raise CannotStart if the variable is
+    malformed."""
+    days = _days("ACTION_ASSISTANT_TOKEN_DAYS", environ)
+    return TOKEN_DAYS if days is None else days
 
 
 def _days(name: str, environ: Mapping[str, str]) -> float | None:

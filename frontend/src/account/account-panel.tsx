@@ -17,6 +17,7 @@ import {
   IconServerCog,
   IconShare,
   IconSun,
+  IconTerminal2,
 } from "@tabler/icons-react";
 import { type ButtonHTMLAttributes, cloneElement, type ReactElement, useState } from "react";
 import { Link } from "wouter";
@@ -115,6 +116,15 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
             Share with others …
           </Button>
         )}
+        <Button
+          component={Link}
+          to="/programs"
+          variant="default"
+          leftSection={<IconTerminal2 size={15} aria-hidden />}
+          onClick={onClose}
+        >
+          Programs
+        </Button>
         {mayLook && (
           <Button
             component={Link}

@@ -1,6 +1,7 @@
 /** The colours of people: the server assigns one that nobody else here has. */
 import { useQuery } from "@tanstack/react-query";
 import { createContext, use, useCallback, useEffect } from "react";
+import { isolated } from "../words/isolated";
 import { editor } from "./client";
 import type { EditorApi } from "./schema/editor";
 import { may, type Permission, type Person } from "./session";
@@ -66,6 +67,13 @@ export const NAMELESS = "somebody";
 interface Named {
   readonly id: string;
   readonly name: string;
+  /** The name of the token by which a program acted for the person. */
+  readonly program?: string;
+}
+
+/** Return the name of somebody who acted, with that of the program that did it for them. */
+export function actorWords({ program }: Pick<Named, "program">, name: string): string {
+  return program ? `${name} by program ${isolated(program)}` : name;
 }
 
 /**
@@ -82,10 +90,11 @@ export function currentName(
   return now?.name || author.name || NAMELESS;
 }
 
-/** Return the present name of the author of a run. */
+/** Return the present name of the author of a run, with the program that acted for them. */
 export function useCurrentName(author: Named | null | undefined): string {
   const { person } = usePerson();
-  return currentName(author, person, useKnownPeople(author ? [author.id] : NO_IDS));
+  const name = currentName(author, person, useKnownPeople(author ? [author.id] : NO_IDS));
+  return author ? actorWords(author, name) : name;
 }
 
 export interface SignedIn {

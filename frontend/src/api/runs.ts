@@ -23,10 +23,11 @@ export type Visit = RunnerApi["VisitShown"];
 export type ActionRun = RunnerApi["ActionShown"];
 export type { Run };
 
-/** Return the address of a person as words that follow the name; "" if none was recorded. */
+/** Return the address of a person as words that follow `actorWords`; "" if none was recorded. */
 export function requesterPlace(asker: Requester | null): string {
   if (asker?.by === undefined) return "";
-  return ` · by ${isolated(asker.by)}, from ${asker.address ?? "this computer"}`;
+  const means = asker.program ? "" : `by ${isolated(asker.by)}, `;
+  return ` · ${means}from ${asker.address ?? "this computer"}`;
 }
 
 /** Return in a few words on which engines a run ran. */

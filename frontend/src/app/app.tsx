@@ -25,6 +25,7 @@ import {
   CompareScreen,
   GraphScreen,
   HomeScreen,
+  ProgramsScreen,
   RobotsScreen,
   RunScreen,
   RunsScreen,
@@ -101,6 +102,11 @@ function Screens() {
       <Route path="/audit">
         <Screen crumbs={[graphs, { label: "Audit" }]}>
           <AuditScreen />
+        </Screen>
+      </Route>
+      <Route path="/programs">
+        <Screen crumbs={[graphs, { label: "Programs" }]}>
+          <ProgramsScreen />
         </Screen>
       </Route>
       <Route path="/runs">

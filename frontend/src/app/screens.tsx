@@ -19,6 +19,9 @@ const AdministrationPage = lazyPart(() =>
 const AuditPage = lazyPart(() =>
   import("../administration/audit-page").then((part) => part.AuditPage),
 );
+const ProgramsPage = lazyPart(() =>
+  import("../programs/programs-page").then((part) => part.ProgramsPage),
+);
 export const ActionsScreen = lazyPart(() =>
   import("./actions-screen").then((part) => part.ActionsScreen),
 );
@@ -35,6 +38,7 @@ const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "pr
   ["/actions", ActionsScreen],
   ["/admin", AdministrationPage],
   ["/audit", AuditPage],
+  ["/programs", ProgramsPage],
   ["/", HomeScreen],
 ];
 
@@ -100,6 +104,16 @@ export function AuditScreen() {
     <PageFrame>
       <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Audit" }]} />
       <AuditPage />
+    </PageFrame>
+  );
+}
+
+export function ProgramsScreen() {
+  useTitle("Programs");
+  return (
+    <PageFrame>
+      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Programs" }]} />
+      <ProgramsPage />
     </PageFrame>
   );
 }

@@ -6,6 +6,7 @@ import { IconPin, IconPinFilled } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useVersions, versionName } from "../api/graphs";
 import { errorText } from "../api/http";
+import { actorWords } from "../api/people";
 import { type RunMarks, setMarks, useLabels, useMarks, useRaw } from "../api/review";
 import { type Run, requesterPlace, runPlace } from "../api/runs";
 import { boundsText } from "../status/durations";
@@ -25,7 +26,9 @@ interface Props {
 }
 
 function restWords(rest: Rest, moment: (at: number | null) => string): string {
-  const who = rest.by ? `by ${isolated(rest.by.name)}${requesterPlace(rest.by)}` : "by the runner";
+  const who = rest.by
+    ? `by ${actorWords(rest.by, isolated(rest.by.name))}${requesterPlace(rest.by)}`
+    : "by the runner";
   return `${moment(instant(rest.at))} ${who}: “${rest.how}”`;
 }
 
@@ -44,10 +47,10 @@ export function RunFacts({ runner, run, version, by }: Props) {
     ["Started", moment(start)],
     ...(run.stopped_by
       ? [
-          ["Stopped by", `${run.stopped_by.name}${requesterPlace(run.stopped_by)}`] as [
-            string,
-            string,
-          ],
+          [
+            "Stopped by",
+            `${actorWords(run.stopped_by, run.stopped_by.name)}${requesterPlace(run.stopped_by)}`,
+          ] as [string, string],
         ]
       : []),
     ["End known", moment(end)],

@@ -1,5 +1,6 @@
 /** The record of a run on paper: what each action did, when as far as that is known, and who started it. */
 
+import { actorWords } from "../api/people";
 import { type Run, requesterPlace, runPlace, type Visit } from "../api/runs";
 import { serverNow } from "../clock/server-clock";
 import { boundsText, durationText } from "../status/durations";
@@ -110,7 +111,14 @@ export function RunPrint({ run, version, by }: { run: Run; version: string; by: 
         ["Robot", runPlace(run)],
         ["Started by", `${by}${requesterPlace(run.author)}`],
         ["Started", start === null ? "not known to have begun" : moment(start)],
-        ...(stopped ? [["Stopped by", `${stopped.name}${requesterPlace(stopped)}`] as const] : []),
+        ...(stopped
+          ? [
+              [
+                "Stopped by",
+                `${actorWords(stopped, stopped.name)}${requesterPlace(stopped)}`,
+              ] as const,
+            ]
+          : []),
         ["End known", end === null ? "goes on" : moment(end)],
         ["Took", (end !== null && boundsText(run.took)) || "not known"],
         ["Outcome", end === null ? "goes on" : runEndText(run)],

@@ -15,8 +15,11 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 import msgspec
 
 from action_assistant import paths, settings
+from action_assistant.commands.stored_tokens import StoredToken, stored_token
 from action_assistant.errors import CannotStart, RequestRefused
+from action_assistant.logs import say
 from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.token_text import token_id
 from action_assistant.web.network.certificate import Certificate
 
 if TYPE_CHECKING:  # slow to load, and most commands do not need it
@@ -25,6 +28,7 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
 
 T = TypeVar("T")
 
+_TOKEN: Final = "ACTION_ASSISTANT_TOKEN"
 #: The form of a graph's id.
 _MADE_ID: Final = re.compile(r"[A-Za-z0-9]{12}")
 
@@ -72,12 +76,12 @@ class Server:
     def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
         """Send a request to the editor, wait for the answer and return it. `body`: further
         arguments of httpx. Raise RequestRefused, with one sentence, if it is refused."""
-        return _asked(self._client, method, path, **body)
+        return request(self._client, method, path, **body)
 
     def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
         """Send a request to the runner, wait for the answer and return it. `body`: further
         arguments of httpx. Raise RequestRefused, with one sentence, if it is refused."""
-        return _asked(self._client, method, self._runner_url + path, **body)
+        return request(self._client, method, self._runner_url + path, **body)
 
     def graph_id(self, asked: str) -> str:
         """Return the id of the graph with the id or name `asked`. Raise RequestRefused unless
@@ -98,7 +102,9 @@ class Server:
         return found
 
 
-def _asked(client: "httpx.Client", method: str, path: str, **body: Any) -> "httpx.Response":
+def request(client: "httpx.Client", method: str, path: str, **body: Any) -> "httpx.Response":
+    """Send a request and return its answer. Raise RequestRefused, with one sentence, if it is
+    refused; CannotStart if nobody answers."""
     import httpx
 
     try:
@@ -131,26 +137,77 @@ def running(options: argparse.Namespace) -> Iterator[Server]:
     import httpx
 
     with httpx.Client(**reach(options)) as client:
-        config = _asked(client, "GET", "/api/config").json()
-        yield Server(client, config["runner_url"])
+        yield Server(client, _runner_url(client))
+
+
+def _runner_url(client: "httpx.Client") -> str:
+    """Return the URL of the runner. With a token that has expired the editor does not say it, and the
+    one that was known at the login counts: such a token may still stop."""
+    try:
+        url: str = request(client, "GET", "/api/config").json()["runner_url"]
+    except RequestRefused as refusal:
+        stored = _stored(str(client.base_url))
+        if refusal.status != 401 or stored is None or not stored.runner_url:
+            raise
+        return stored.runner_url
+    return url
 
 
 def reach(options: argparse.Namespace) -> dict[str, Any]:
-    """Return the arguments of an httpx client for the server that a command (its options) is meant
-    for. The client sends the token only after the server has proven that it knows the token. Raise
-    CannotStart if the data folder has no token that can be read."""
+    """Return the arguments of an httpx client that talks to the server which a command is meant
+    for.
+
+    The client sends a token only after the server has proven that it knows the token: that of the
+    environment or of the data folder, else the one that `login` has stored for this server. Raise
+    CannotStart if there is no token that can be read.
+    """
     from action_assistant.commands.token_proof import AfterProof
 
     data = options.data.resolve()
     trust = Certificate(data).trusting_too()
     named = options.url or os.environ.get("ACTION_ASSISTANT_URL")
+    url = named or _here(trust)
+    stored = _given(url)
+    keys = _keys(data, url, stored)
     return {
-        "base_url": named or _here(trust),
-        "auth": AfterProof(Keys.known(data), supposed=not named),
+        "base_url": url,
+        "auth": AfterProof(keys, stored, supposed=not named),
         "timeout": 30,
         "trust_env": False,
         "verify": trust,
     }
+
+
+def _stored(url: str) -> StoredToken | None:
+    """Return the token that `login` has stored for a server. A file that cannot be used is told, and
+    stops no command that has another token."""
+    try:
+        return stored_token(url)
+    except CannotStart as error:
+        say(str(error), "warning")
+        return None
+
+
+def _given(url: str) -> StoredToken | None:
+    """Return the program's token for a server: that of the environment, else what `login` stored
+    there. None if the environment has the token of a server."""
+    text = os.environ.get(_TOKEN, "")
+    if not text:
+        return _stored(url)
+    return None if token_id(text) is None else StoredToken(url, text, f"of {_TOKEN}", (), 0.0)
+
+
+def _keys(data: Path, url: str, stored: StoredToken | None) -> Keys | None:
+    """Return the keys of a data folder, or None where it has none and `login` has stored a token.
+    Raise CannotStart if there is neither."""
+    if stored is not None and os.environ.get(_TOKEN):
+        return None
+    try:
+        return Keys.known(data)
+    except CannotStart as error:
+        if stored is not None:
+            return None
+        raise CannotStart(f"{error} Or sign in: `action-assistant login {url}`.") from error
 
 
 def _here(trust: ssl.SSLContext) -> str:

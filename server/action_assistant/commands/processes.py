@@ -238,6 +238,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         reached=reached(options),
         metrics_token=settings.metrics_token(),
         sessions=settings.sessions(),
+        token_days=settings.token_days(),
     )
 
 

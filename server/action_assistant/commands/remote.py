@@ -4,6 +4,8 @@ import argparse
 import sys
 import time
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -235,18 +237,19 @@ def _stop(options: argparse.Namespace) -> int:
     with running(options) as server:
         path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
         asked = insisting(server, "POST", path)
-        others = asked.get("graphs", {})
-        is_over = not asked["runs"] and not options.all
-        ids = [options.run] if is_over and _is_run(server, options.run) else asked["runs"]
-        deadline = time.monotonic() + options.wait
-        while True:
-            runs = [insisting(server, "GET", f"/api/runs/{run}") for run in ids]
-            robots = insisting(server, "GET", "/api/robots") if others else []
-            graphs = _unproven(others, robots)
-            settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
-            if (settled and not graphs) or time.monotonic() > deadline:
-                break
-            time.sleep(_POLL)
+        with _following():
+            others = asked.get("graphs", {})
+            is_over = not asked["runs"] and not options.all
+            ids = [options.run] if is_over and _is_run(server, options.run) else asked["runs"]
+            deadline = time.monotonic() + options.wait
+            while True:
+                runs = [insisting(server, "GET", f"/api/runs/{run}") for run in ids]
+                robots = insisting(server, "GET", "/api/robots") if others else []
+                graphs = _unproven(others, robots)
+                settled = all(_is_at_rest(run) or run["unconfirmed"] for run in runs)
+                if (settled and not graphs) or time.monotonic() > deadline:
+                    break
+                time.sleep(_POLL)
     doubts = [_unconfirmed(run) for run in runs if not _is_at_rest(run)]
     doubts += [f"STOP UNCONFIRMED for {each}. {_LOOK_AT_ROBOT}" for each in graphs]
     doubts += [
@@ -260,6 +263,21 @@ def _stop(options: argparse.Namespace) -> int:
     for said in dict.fromkeys(ends):
         print(one_line(said))
     return 1 if doubts else 0
+
+
+@contextmanager
+def _following() -> Iterator[None]:
+    """Say that a Stop was sent, if what becomes of it is refused: a token that has expired may stop
+    and see nothing."""
+    try:
+        yield
+    except RequestRefused as error:
+        if error.status not in {401, 403}:
+            raise
+        raise RequestRefused(
+            f"Stop was sent; what became of it is not known here. {error} {_LOOK_AT_ROBOT}",
+            error.status,
+        ) from error
 
 
 def _is_run(server: Server, run: str) -> bool:

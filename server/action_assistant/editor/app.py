@@ -27,6 +27,7 @@ from action_assistant.editor.api import (
     packages,
     room,
     subgraphs,
+    tokens,
     versions,
 )
 from action_assistant.editor.log import database_location, epochs
@@ -50,6 +51,7 @@ from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.session_limits import limits_of
 from action_assistant.web.auth.sessions import session_routes
 from action_assistant.web.auth.standing import Standings
+from action_assistant.web.auth.tokens import TokenFiles
 from action_assistant.web.monitoring.gauges import Family
 from action_assistant.web.monitoring.monitoring import Monitoring, Watched
 from action_assistant.web.monitoring.status import Activity
@@ -96,6 +98,7 @@ async def open_services(
                 async with (
                     services.invitations.opened(),
                     services.members.opened(),
+                    services.token_log.opened(),
                     services.change_index.kept_up(),
                     services.graph_checks.names.read_ahead(),
                     services.audit.writing(journal),
@@ -123,6 +126,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     browsers = SessionFiles(settings.data, revoked)
     standings = Standings(people_files, browsers, limits_of(settings.sessions))
     browsers.every()  # forgets those that are over
+    token_files = TokenFiles(settings.data, keys, revoked, most_days=settings.token_days)
     codes = DeviceCodes(limits=settings.limits)
     addresses = _addresses(settings)
     monitoring = Monitoring("editor", settings.data)
@@ -156,6 +160,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
             *signing_in,
             *_routes(app_state, addresses, browsers),
             *devices.routes(codes, browsers, addresses),
+            *tokens.routes(app_state, token_files, limits=settings.limits),
             *doctor.routes(settings),
         ],
         title="TeMoto Action Assistant: editor",
@@ -167,6 +172,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         monitoring=monitoring,
         scraped=ScrapeToken(settings.metrics_token),
         standings=standings,
+        tokens=token_files,
         page=paths.page(),
         help_site=paths.help_site(),
         runner_port=settings.runner_port,

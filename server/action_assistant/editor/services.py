@@ -21,6 +21,7 @@ from action_assistant.editor.people.invitations import Invitations
 from action_assistant.editor.people.members import Members
 from action_assistant.editor.people.people import People
 from action_assistant.editor.people.reception import Reception
+from action_assistant.editor.people.token_log import TokenLog
 from action_assistant.editor.rooms.member import ByteRateLimits
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.presence import PersonColours
@@ -81,6 +82,7 @@ class EditorServices:
             settings.data,
         )
         self.reception = Reception(self.invitations, self.members)
+        self.token_log = TokenLog(journal)
         self.change_index = ChangeIndex(journal, workers.graphs)
         self.history = GraphHistory(self.change_index)
         self.restoring = Restoring(

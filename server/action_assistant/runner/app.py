@@ -55,6 +55,8 @@ from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.session_limits import limits_of
 from action_assistant.web.auth.sessions import revocation
 from action_assistant.web.auth.standing import Standings
+from action_assistant.web.auth.token_routes import adoption, shared_token_routes
+from action_assistant.web.auth.tokens import TokenFiles
 from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.connection_limits import ConnectionLimits
@@ -235,13 +237,20 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         ):
             yield
 
+    keys = Keys.of(settings.data)
+    tokens = TokenFiles(settings.data, keys, revoked)
     people_files = PeopleFiles(settings.data)
     browsers = SessionFiles(settings.data, revoked)
     standings = Standings(people_files, browsers, limits_of(settings.sessions))
     return application(
-        [*routes(services), *revocation(revoked, people_files)],
+        [
+            *routes(services),
+            *revocation(revoked, people_files),
+            *shared_token_routes(tokens),
+            *adoption(tokens, limits=settings.limits),
+        ],
         title="TeMoto Action Assistant: runner",
-        keys=Keys.of(settings.data),
+        keys=keys,
         revoked=revoked,
         addresses=addresses_of(
             host=settings.host,
@@ -256,6 +265,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         monitoring=monitoring,
         scraped=ScrapeToken(settings.metrics_token),
         standings=standings,
+        tokens=tokens,
         mount=public.path + RUNNER if public is not None else "",
         body_limit=SMALL,
     )

@@ -158,6 +158,16 @@ export interface EditorApi {
         is_late: boolean;
     };
     /**
+     * BeginLogin
+     * @description The request of a program for a token that a person confirms.
+     */
+    BeginLogin: {
+        name: string;
+        scopes: ("edit" | "hooks" | "operate" | "read" | "scrape" | "simulate")[];
+        /** @default null */
+        days?: number | null;
+    };
+    /**
      * Behaviour
      * @description The behaviour of one call of an action. Times are seconds.
      *
@@ -283,6 +293,18 @@ export interface EditorApi {
         claim: string;
     };
     /**
+     * Claimed
+     * @description The answer to a program that waits. `slower`: it asked too early, and waits `interval` seconds
+     *     from now on. `gone`: the code has expired, was cancelled, or was used already.
+     */
+    Claimed: {
+        /** @enum {string} */
+        state: "gone" | "granted" | "refused" | "slower" | "waiting";
+        /** @default 2 */
+        interval?: number;
+        made?: EditorApi["MadeToken"];
+    };
+    /**
      * CodeOfDevice
      * @description The code that a browser of the person shows, typed in on another one.
      */
@@ -308,6 +330,18 @@ export interface EditorApi {
         version: string;
         runner_url: string;
         commit: string | null;
+    };
+    /**
+     * ConfirmLogin
+     * @description The word of a person for a login: the name and the scopes, which are among those that the
+     *     program asked for.
+     */
+    ConfirmLogin: {
+        name: string;
+        scopes: ("edit" | "hooks" | "operate" | "read" | "scrape" | "simulate")[];
+        /** @default null */
+        days?: number | null;
+        code: string;
     };
     /**
      * Counts
@@ -1094,6 +1128,47 @@ export interface EditorApi {
         loop_lag_s: number;
     };
     /**
+     * LoginBegun
+     * @description The code for the person, and the secret with which the program fetches its token. `interval`:
+     *     seconds between two questions.
+     */
+    LoginBegun: {
+        code: string;
+        secret: string;
+        interval: number;
+        expires_in: number;
+    };
+    /**
+     * LoginCode
+     * @description The code that the program shows, as a person types it.
+     */
+    LoginCode: {
+        code: string;
+    };
+    /**
+     * LoginRequest
+     * @description A login that waits for a person, as that person sees it. `address`: from where the program
+     *     asks, "" for the server's own computer. `state`: `confirmed` until the program has fetched its
+     *     token. `expires_in`: seconds.
+     */
+    LoginRequest: {
+        code: string;
+        name: string;
+        scopes: ("edit" | "hooks" | "operate" | "read" | "scrape" | "simulate")[];
+        address: string;
+        expires_in: number;
+        /** @enum {string} */
+        state: "confirmed" | "fetched" | "waiting";
+        days?: number;
+    };
+    /**
+     * LoginSecret
+     * @description The secret that the program got when it began the login.
+     */
+    LoginSecret: {
+        secret: string;
+    };
+    /**
      * MadeGraph
      * @description A new graph. `reading`: the report on the file it was read from, if any.
      */
@@ -1137,6 +1212,25 @@ export interface EditorApi {
     MadeSubGraph: {
         graph: EditorApi["GraphView"];
         changes: EditorApi["KeyChange"][];
+    };
+    /**
+     * MadeToken
+     * @description A new token. `token`: its text, which is not stored and never shown again.
+     */
+    MadeToken: {
+        token: string;
+        record: EditorApi["TokenRecord"];
+    };
+    /**
+     * MakeToken
+     * @description The request for a new token. `days`: its life; by default 90, or less where the server says
+     *     so.
+     */
+    MakeToken: {
+        name: string;
+        scopes: ("edit" | "hooks" | "operate" | "read" | "scrape" | "simulate")[];
+        /** @default null */
+        days?: number | null;
     };
     /**
      * Member
@@ -1807,10 +1901,12 @@ export interface EditorApi {
      * @description The proof that a server knows the token.
      *
      *     It is an HMAC over a challenge and over the address, `HOST:PORT`, that accepted the connection.
+     *     `token_proof`: the same under the digest of a program's token; "" if none was asked about.
      */
     ServerProof: {
         address: string;
         proof: string;
+        token_proof: string;
     };
     /**
      * Sharing
@@ -1925,6 +2021,51 @@ export interface EditorApi {
         seq: number;
         changes: EditorApi["KeyChange"][];
         problems: EditorApi["Problem"][];
+    };
+    /**
+     * TokenList
+     * @description The tokens of a server. `most_days`: the longest life that a new one may get.
+     */
+    TokenList: {
+        tokens: EditorApi["TokenShown"][];
+        most_days: number;
+    };
+    /**
+     * TokenRecord
+     * @description A token as its file has it, without the secret. `sha256`: of the whole text, in hex. `made_at`
+     *     and `expires`: seconds since 1970. `invitation`: the link by which the maker came, if any.
+     *     `seal`: proves that a server with the same token made it.
+     */
+    TokenRecord: {
+        id: string;
+        name: string;
+        sha256: string;
+        scopes: ("edit" | "hooks" | "operate" | "read" | "scrape" | "simulate")[];
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+        person: EditorApi["PersonRef"];
+        made_at: number;
+        expires: number;
+        invitation?: string;
+        /** @default  */
+        seal?: string;
+    };
+    /**
+     * TokenShown
+     * @description A token in a list. `used` is missing if the process never saw it.
+     */
+    TokenShown: {
+        record: EditorApi["TokenRecord"];
+        used?: EditorApi["TokenUse"];
+    };
+    /**
+     * TokenUse
+     * @description The last use of a token, up to a minute old. `at`: seconds since 1970. `address`: "" for the
+     *     server's own computer.
+     */
+    TokenUse: {
+        at: number;
+        address: string;
     };
     /**
      * UnpackingAction
@@ -2298,6 +2439,31 @@ export interface EditorPaths {
     };
     "/api/devices/codes/{code}/qr": {
         get: EditorOperations["getDeviceQrCode"];
+    };
+    "/api/tokens": {
+        get: EditorOperations["listTokens"];
+        post: EditorOperations["makeToken"];
+    };
+    "/api/tokens/{token}/revoke": {
+        post: EditorOperations["revokeToken"];
+    };
+    "/api/logins": {
+        post: EditorOperations["beginLogin"];
+    };
+    "/api/logins/claim": {
+        post: EditorOperations["claimLogin"];
+    };
+    "/api/logins/cancel": {
+        post: EditorOperations["cancelLogin"];
+    };
+    "/api/logins/look": {
+        post: EditorOperations["lookAtLogin"];
+    };
+    "/api/logins/confirm": {
+        post: EditorOperations["confirmLogin"];
+    };
+    "/api/logins/refuse": {
+        post: EditorOperations["refuseLogin"];
     };
     "/api/doctor": {
         get: EditorOperations["examine"];
@@ -3853,6 +4019,115 @@ interface EditorOperations {
             };
         };
     };
+    listTokens: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["TokenList"];
+                };
+            };
+        };
+    };
+    makeToken: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["MakeToken"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["MadeToken"];
+                };
+            };
+        };
+    };
+    revokeToken: {
+        parameters: {
+            path: {
+                token: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    beginLogin: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["BeginLogin"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["LoginBegun"];
+                };
+            };
+        };
+    };
+    claimLogin: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["LoginSecret"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Claimed"];
+                };
+            };
+        };
+    };
+    cancelLogin: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["LoginSecret"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    lookAtLogin: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["LoginCode"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["LoginRequest"];
+                };
+            };
+        };
+    };
+    confirmLogin: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["ConfirmLogin"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    refuseLogin: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["LoginCode"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
     examine: {
         responses: {
             200: {
@@ -3916,6 +4191,7 @@ interface EditorOperations {
         parameters: {
             query: {
                 challenge: string;
+                token?: string;
             };
         };
         responses: {

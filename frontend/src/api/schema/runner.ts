@@ -92,6 +92,13 @@ export interface RunnerApi {
         robots: RunnerApi["RobotLink"][];
     };
     /**
+     * Adopted
+     * @description The record of a token that the editor made. It is no secret, and its seal proves it.
+     */
+    Adopted: {
+        record: RunnerApi["TokenRecord"];
+    };
+    /**
      * AlarmShown
      * @description A message that a person must see now.
      */
@@ -232,7 +239,8 @@ export interface RunnerApi {
     /**
      * Author
      * @description The person behind a command, and the origin of the command. `address`: on the network; "" for
-     *     the runner's own computer. `by`: "" if it was not recorded.
+     *     the runner's own computer. `by`: "" if it was not recorded. `program`: the name of the token by
+     *     which a program acted for the person; "" without one.
      */
     Author: {
         id: string;
@@ -244,6 +252,8 @@ export interface RunnerApi {
         by?: "" | "browser" | "program";
         /** @default  */
         address?: string;
+        /** @default  */
+        program?: string;
     };
     /**
      * BackupsShown
@@ -1686,10 +1696,12 @@ export interface RunnerApi {
      * @description The proof that a server knows the token.
      *
      *     It is an HMAC over a challenge and over the address, `HOST:PORT`, that accepted the connection.
+     *     `token_proof`: the same under the digest of a program's token; "" if none was asked about.
      */
     ServerProof: {
         address: string;
         proof: string;
+        token_proof: string;
     };
     /**
      * Sighting
@@ -1858,6 +1870,52 @@ export interface RunnerApi {
         raw: number;
         more: boolean;
         problems: string[];
+    };
+    /**
+     * TokenList
+     * @description The tokens of a server. `most_days`: the longest life that a new one may get.
+     */
+    TokenList: {
+        tokens: RunnerApi["TokenShown"][];
+        most_days: number;
+    };
+    /**
+     * TokenRecord
+     * @description A token as its file has it, without the secret. `sha256`: of the whole text, in hex. `made_at`
+     *     and `expires`: seconds since 1970. `invitation`: the link by which the maker came, if any.
+     *     `seal`: proves that a server with the same token made it.
+     */
+    TokenRecord: {
+        id: string;
+        name: string;
+        sha256: string;
+        scopes: ("edit" | "hooks" | "operate" | "read" | "scrape" | "simulate")[];
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+        person: RunnerApi["PersonRef"];
+        made_at: number;
+        expires: number;
+        /** @default null */
+        invitation?: string | null;
+        /** @default  */
+        seal?: string;
+    };
+    /**
+     * TokenShown
+     * @description A token in a list. `used` is missing if the process never saw it.
+     */
+    TokenShown: {
+        record: RunnerApi["TokenRecord"];
+        used?: RunnerApi["TokenUse"];
+    };
+    /**
+     * TokenUse
+     * @description The last use of a token, up to a minute old. `at`: seconds since 1970. `address`: "" for the
+     *     server's own computer.
+     */
+    TokenUse: {
+        at: number;
+        address: string;
     };
     /**
      * VisitShown
@@ -2100,6 +2158,15 @@ export interface RunnerPaths {
     };
     "/api/session": {
         delete: RunnerOperations["signOut"];
+    };
+    "/api/tokens": {
+        get: RunnerOperations["listTokens"];
+    };
+    "/api/tokens/{token}/revoke": {
+        post: RunnerOperations["revokeToken"];
+    };
+    "/api/tokens/records": {
+        post: RunnerOperations["adoptToken"];
     };
     "/healthz": {
         get: RunnerOperations["getHealth"];
@@ -2990,6 +3057,37 @@ interface RunnerOperations {
             };
         };
     };
+    listTokens: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["TokenList"];
+                };
+            };
+        };
+    };
+    revokeToken: {
+        parameters: {
+            path: {
+                token: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    adoptToken: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["Adopted"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
     getHealth: {
         responses: {
             200: {
@@ -3030,6 +3128,7 @@ interface RunnerOperations {
         parameters: {
             query: {
                 challenge: string;
+                token?: string;
             };
         };
         responses: {

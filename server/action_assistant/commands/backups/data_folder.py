@@ -38,7 +38,9 @@ RECORDINGS: Final = "recordings"
 #: What is taken along beside journals and archives. A folder of these is put back file by file, if
 #: its files never change; the others are put back where there is none.
 MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
-WHOLE: Final = frozenset({keys.TOKEN_FILE, certificate.FOLDER, "people", "sessions", "sessions.db"})
+WHOLE: Final = frozenset(
+    {keys.TOKEN_FILE, certificate.FOLDER, "people", "sessions", "sessions.db", "tokens"}
+)
 #: Files that are created again, or that belong to this data folder only.
 _OWN: Final = frozenset(
     {

@@ -9,7 +9,7 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.qr_codes import qr_code
 from action_assistant.errors import BadInput, NotFound
-from action_assistant.web.auth.access import Needs, live_session
+from action_assistant.web.auth.access import Needs, PersonOnly, live_session
 from action_assistant.web.auth.device_codes import DeviceAsking, DeviceCode, DeviceCodes
 from action_assistant.web.auth.session_files import OpenSession, SessionFiles
 from action_assistant.web.network.addresses import Addresses
@@ -48,7 +48,7 @@ def _own(browsers: SessionFiles, addresses: Addresses) -> list[ControllerRouterH
         "/api/devices",
         summary="The devices on which one is signed in oneself",
         operation_id="listDevices",
-        guards=[Needs("see")],
+        guards=[PersonOnly(), Needs("see")],
     )
     async def list_devices(request: _Asking) -> OwnDevices:
         session = live_session(request)
@@ -60,7 +60,7 @@ def _own(browsers: SessionFiles, addresses: Addresses) -> list[ControllerRouterH
         status_code=204,
         summary="Sign out on one of one's own devices",
         operation_id="endDevice",
-        guards=[Needs("see")],
+        guards=[PersonOnly(), Needs("see")],
     )
     async def end(session: str, request: _Asking) -> None:
         mine = await to_thread.run_sync(own, live_session(request).person.id)
@@ -73,7 +73,7 @@ def _own(browsers: SessionFiles, addresses: Addresses) -> list[ControllerRouterH
         status_code=204,
         summary="Sign out on all of one's other devices",
         operation_id="endOtherDevices",
-        guards=[Needs("see")],
+        guards=[PersonOnly(), Needs("see")],
     )
     async def end_others(request: _Asking) -> None:
         session = live_session(request)
@@ -87,7 +87,7 @@ def _adding(codes: DeviceCodes, addresses: Addresses) -> list[ControllerRouterHa
         "/api/devices/codes",
         summary="Make a code with which another device of one's own signs in, valid for 2 minutes",
         operation_id="makeDeviceCode",
-        guards=[Needs("see")],
+        guards=[PersonOnly(), Needs("see")],
     )
     async def make(request: _Asking) -> DeviceCode:
         return codes.open(live_session(request))
@@ -96,7 +96,7 @@ def _adding(codes: DeviceCodes, addresses: Addresses) -> list[ControllerRouterHa
         "/api/devices/codes/{code:str}",
         summary="Which device has sent a code",
         operation_id="lookAtDevice",
-        guards=[Needs("see")],
+        guards=[PersonOnly(), Needs("see")],
     )
     async def look(code: str, request: _Asking) -> DeviceAsking:
         return codes.look(code, live_session(request))
@@ -106,7 +106,7 @@ def _adding(codes: DeviceCodes, addresses: Addresses) -> list[ControllerRouterHa
         status_code=204,
         summary="Confirm that the device which has sent a code is one's own, or refuse it",
         operation_id="answerDevice",
-        guards=[Needs("see")],
+        guards=[PersonOnly(), Needs("see")],
     )
     async def say(code: str, data: DeviceIsMine, request: _Asking) -> None:
         codes.answer(code, live_session(request), is_mine=data.yes)
@@ -116,7 +116,7 @@ def _adding(codes: DeviceCodes, addresses: Addresses) -> list[ControllerRouterHa
         status_code=204,
         summary="Make a code invalid",
         operation_id="cancelDeviceCode",
-        guards=[Needs("see")],
+        guards=[PersonOnly(), Needs("see")],
     )
     async def cancel(code: str, request: _Asking) -> None:
         codes.cancel(code, live_session(request))
@@ -125,7 +125,7 @@ def _adding(codes: DeviceCodes, addresses: Addresses) -> list[ControllerRouterHa
         "/api/devices/codes/{code:str}/qr",
         summary="A code as a QR code (SVG) that opens the page at `origin`",
         operation_id="getDeviceQrCode",
-        guards=[Needs("see")],
+        guards=[PersonOnly(), Needs("see")],
         responses={200: answer(str, media="image/svg+xml", text="The picture")},
     )
     async def picture(code: str, origin: str, request: _Asking) -> Response[bytes]:

@@ -15,6 +15,7 @@ from action_assistant.editor.log.graph_events import (
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
+from action_assistant.web.auth.caller import caller
 from action_assistant.web.auth.keys import PersonRef
 
 _OURS = {SERVER: "Action Assistant", EXAMPLES: "Examples"}
@@ -34,9 +35,12 @@ class People:
         return cls(journal, {row.id: row.name for row in rows})
 
     async def seen(self, person: PersonRef) -> None:
-        """Store the name of a person if it is new or has changed. Raise Unavailable if the journal
-        cannot be written."""
-        if self._names.get(person.id) == person.name:
+        """Store the name of a person if it is new or has changed. A program's token has the name of
+        its time, and changes none. Raise Unavailable if the journal cannot be written."""
+        asking = caller()
+        token = "" if asking is None or asking.origin is None else asking.origin.token
+        of_program = token not in {"", "server"}
+        if self._names.get(person.id) == person.name or (of_program and person.id in self._names):
             return
         before = self._names.get(person.id)
         self._names[person.id] = person.name

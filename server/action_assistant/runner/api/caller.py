@@ -28,12 +28,13 @@ _BODY_S: Final = 60.0
 def author_of(connection: ASGIConnection[Any, Any, Any, Any]) -> Author:
     """Return the person who sent a request or opened a socket (`connection`). A caller with a
     session counts as a browser, a caller that sends the token instead counts as a program."""
-    person = person_of(connection)
+    person, token = person_of(connection), identity_of(connection).token
     return Author(
         person.id,
         person.name,
         by="program" if session_of(connection) is None else "browser",
         address=identity_of(connection).address,
+        program="" if token is None else token.name,
     )
 
 

@@ -13,7 +13,7 @@ from action_assistant.errors import Refused
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.start.admission import GroupRequest, StartRequest
 from action_assistant.web.audit.events import StartRefused
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, PersonOnly, person_of
 from action_assistant.web.auth.roles import Permission
 
 _What: TypeAlias = Literal["start", "change", "go_on"]
@@ -23,14 +23,21 @@ _MOST: Final = 20  # robots
 
 
 class StartNeeds(Needs):
-    """A guard of a route that may set a robot going. A refusal by it is kept in the audit."""
+    """A guard of a route that may set a robot going. A refusal by it is kept in the audit.
+    `of_people`: programs' tokens are refused."""
 
     def __init__(
-        self, services: RunnerServices, what: _What, permission: Permission = "simulate"
+        self,
+        services: RunnerServices,
+        what: _What,
+        permission: Permission = "simulate",
+        *,
+        of_people: bool = False,
     ) -> None:
         super().__init__(permission)
         self._services: Final = services
         self._what: Final[_What] = what
+        self._of_people: Final = of_people
 
     async def __call__(
         self, connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler
@@ -38,6 +45,8 @@ class StartNeeds(Needs):
         """Raise Forbidden if the person's role lacks the permission."""
         run = str(connection.path_params.get("run", ""))[:_LONGEST]
         with noted(self._services, connection, StartRefused(what=self._what, why="", run=run)):
+            if self._of_people:
+                await PersonOnly()(connection, handler)
             await super().__call__(connection, handler)
 
 

@@ -53,7 +53,7 @@ from action_assistant.umrf.semantics import Script
 from action_assistant.web.audit.events import StartRefused
 from action_assistant.web.audit.routes import audit_routes
 from action_assistant.web.audit.rows import AuditFilter
-from action_assistant.web.auth.access import Needs, person_of, refuse, require
+from action_assistant.web.auth.access import Needs, PersonOnly, person_of, refuse, require
 from action_assistant.web.server.openapi import answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once
@@ -202,7 +202,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="Confirm that a run is at rest which no answer of its engine can prove so",
         opt=reads(RestRequest),
-        guards=[Needs("operate")],
+        guards=[PersonOnly(), Needs("operate")],
     )
     async def at_rest(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), RestRequest)
@@ -214,7 +214,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=202,
         summary="Let a held run go on: its robots may begin to move",
         opt=reads(GoOnRequest),
-        guards=[StartNeeds(services, "go_on", "operate")],
+        guards=[StartNeeds(services, "go_on", "operate", of_people=True)],
     )
     async def go_on(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), GoOnRequest)
@@ -227,7 +227,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         status_code=200,
         summary="Give the outcome of an action in a led run, where nothing shows it",
         opt=reads(WordRequest),
-        guards=[Needs("operate")],
+        guards=[PersonOnly(), Needs("operate")],
     )
     async def outcome(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), WordRequest)
@@ -454,7 +454,7 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         summary="Say yes to exactly one graph, so that somebody else may start it on robots that "
         "demand a second person",
         operation_id="approve",
-        guards=[Needs("operate")],
+        guards=[PersonOnly(), Needs("operate")],
     )
     async def approve(data: ApprovalRequest, request: _Asking) -> Approval:
         return _approval(await services.control.approvals.give(data, author_of(request)))

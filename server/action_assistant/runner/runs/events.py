@@ -23,12 +23,15 @@ End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "l
 
 class Author(msgspec.Struct, frozen=True, omit_defaults=True):
     """The person behind a command, and the origin of the command. `address`: on the network; "" for
-    the runner's own computer. `by`: "" if it was not recorded."""
+    the runner's own computer. `by`: "" if it was not recorded. `program`: the name of the token by
+    which a program acted for the person; "" without one.
+    """
 
     id: str
     name: str
     by: Literal["browser", "program", ""] = ""
     address: str = ""
+    program: str = ""
 
 
 class Override(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

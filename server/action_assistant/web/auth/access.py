@@ -139,6 +139,17 @@ class SignedIn(DeclaredRight):
     """Declares a route for everybody who is signed in, and for all tokens."""
 
 
+class PersonOnly(DeclaredRight):
+    """Declares a route for everybody who is signed in, and for no token of a program."""
+
+    async def __call__(
+        self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler
+    ) -> None:
+        """Raise Forbidden if a program asks."""
+        if identity_of(connection).token is not None:
+            raise Forbidden("A program's token may not do this: it takes a person.")
+
+
 class Needs(DeclaredRight):
     """Declares a route for those who have a permission. Others are refused before their request
     is read."""
@@ -334,6 +345,8 @@ class Access:
             found = self._program(text.strip(), method, path)
             if found is not None:
                 state["identity"] = replace(found, device=device, address=address)
+                if found.token is not None:
+                    self._tokens.note_use(found.token.id, address)
                 return
         genuine = self._sessions(headers)
         state["sessions"] = genuine

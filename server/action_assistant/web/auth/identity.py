@@ -18,7 +18,8 @@ class Token(msgspec.Struct, frozen=True):
     """A token of a program, without its secret.
 
     `person`: the person for whom the program acts, with the role that counts for it. `expires`:
-    seconds since 1970; None for a token that does not expire.
+    seconds since 1970; None for a token that does not expire. `invitation`: the link by which that
+    person came, with which the token ends; None without one.
     """
 
     id: str
@@ -26,6 +27,7 @@ class Token(msgspec.Struct, frozen=True):
     person: Person
     scopes: frozenset[Scope]
     expires: float | None = None
+    invitation: str | None = None
 
     @property
     def expired(self) -> bool:
@@ -73,6 +75,12 @@ class Tokens(Protocol):
         """Return the token with this text; None if the text is no token of a program. Raise
         Unauthenticated or Withdrawn if it is one that opens nothing. Called at each request."""
 
+    def note_use(self, token: str, address: str) -> None:
+        """Remember that a token was used, and from where. Called at each request."""
+
+    def prove(self, token: str, challenge: str, address: str) -> str:
+        """Return the proof that this process knows a token, as `token_text.proof` makes it."""
+
 
 class NoTokens:
     """Accepts no token: used where a process knows of no programs."""
@@ -80,3 +88,10 @@ class NoTokens:
     def opens(self, text: str) -> Token | None:
         """Return None for every text."""
         return None
+
+    def note_use(self, token: str, address: str) -> None:
+        """Forget at once that a token was used."""
+
+    def prove(self, token: str, challenge: str, address: str) -> str:
+        """Return an empty text, which proves nothing."""
+        return ""

@@ -77,10 +77,12 @@ class ServerProof(msgspec.Struct, frozen=True):
     """The proof that a server knows the token.
 
     It is an HMAC over a challenge and over the address, `HOST:PORT`, that accepted the connection.
+    `token_proof`: the same under the digest of a program's token; "" if none was asked about.
     """
 
     address: str
     proof: str
+    token_proof: str = ""
 
 
 class Keys:
@@ -152,6 +154,10 @@ class Keys:
         """Return the secret of an invitation (256 bit), which cannot be derived from its id without
         the token."""
         return _text(hmac.digest(self._seal, b"invitation\0" + invitation.encode(), "sha256"))
+
+    def token_seal(self, record: bytes) -> str:
+        """Return the seal of a program's token, which only a server with this token can make."""
+        return _text(hmac.digest(self._seal, b"program token\0" + record, "sha256"))
 
     def prove(self, challenge: str, address: str) -> ServerProof:
         """Prove to a client that this server knows the token, before the client shows it.

@@ -75,9 +75,11 @@ class Revocations:
 
     def ends(self, credential: Credential) -> bool:
         """Return whether a session or token may do nothing any more, not even Stop."""
+        if self.holds(credential.invitation):
+            return True
         if isinstance(credential, Token):
             return self.token_ended(credential.id) or self.person_ended(credential.person.id)
-        return self.holds(credential.invitation) or self.ended(credential)
+        return self.ended(credential)
 
     def ends_now(self) -> Callable[[Credential], bool]:
         """Return the function `ends` as of now. It reads the folder once, and so suits a check of
@@ -149,7 +151,7 @@ class Revocations:
             return True
         if not (_MARKED_ID.fullmatch(credential.id) and _MARKED_ID.fullmatch(credential.person.id)):
             return True
-        invitation = None if isinstance(credential, Token) else credential.invitation
+        invitation = credential.invitation
         return invitation is not None and (
             invitation in self._marks or _ID.fullmatch(invitation) is None
         )

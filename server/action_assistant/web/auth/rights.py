@@ -11,7 +11,7 @@ from action_assistant.web.auth.roles import Permission, allowed, role_words
 #: The scopes of a token that include a permission. Tokens never register, share or restore.
 SCOPES_FOR: Final[Mapping[Permission, frozenset[Scope]]] = {
     "see": frozenset({"read", "edit", "simulate", "operate"}),
-    "stop": frozenset({"simulate", "operate"}),
+    "stop": frozenset({"read", "edit", "simulate", "operate"}),
     "edit": frozenset({"edit"}),
     "simulate": frozenset({"simulate", "operate"}),
     "operate": frozenset({"operate"}),
@@ -49,8 +49,8 @@ def may(
     """Return whether an identity has a permission, for a thing if one is given. `now`: seconds
     since 1970.
 
-    Stop depends on no thing: everybody who is signed in may stop everything, and so may a token
-    with which a run can be started.
+    Stop depends on no thing: everybody who is signed in may stop everything, and so may each token
+    that sees runs.
     """
     role = identity.person.role
     if not allowed(role, permission):

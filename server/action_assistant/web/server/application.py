@@ -16,7 +16,7 @@ from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive,
 from action_assistant.errors import CannotStart, NotFound
 from action_assistant.version import VERSION, commit
 from action_assistant.web.auth.access import Access, DeclaredRight, Needs, Open
-from action_assistant.web.auth.identity import Tokens
+from action_assistant.web.auth.identity import NoTokens, Tokens
 from action_assistant.web.auth.keys import METRICS, Keys, ScrapeToken, ServerProof
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Permission
@@ -78,7 +78,7 @@ def application(
     handlers = [
         *route_handlers,
         *_health(monitoring),
-        _proving(keys),
+        _proving(keys, tokens or NoTokens()),
         *([misrouted(runner_port)] if runner_port is not None else []),
     ]
     openapi = OpenApiText()
@@ -228,7 +228,7 @@ def _socket(url: str) -> str:
 _PASSED_ON: Final = ("x-forwarded-for", "forwarded", "via")
 
 
-def _proving(keys: Keys) -> ControllerRouterHandler:
+def _proving(keys: Keys, tokens: Tokens) -> ControllerRouterHandler:
     keys.prove("", "")  # takes a moment, once
 
     @get(
@@ -240,11 +240,16 @@ def _proving(keys: Keys) -> ControllerRouterHandler:
     async def prove(
         request: Request[Any, Any, Any],
         challenge: Annotated[str, Parameter(min_length=20, max_length=100)],
+        token: Annotated[str, Parameter(max_length=40)] = "",
     ) -> Response[ServerProof]:
         host, port = request.scope.get("server") or ("", 0)
         # Behind a proxy the address of a request proves nothing: anybody could pass it on.
         passed_on = any(name in request.headers for name in _PASSED_ON)
-        proof = keys.prove(challenge, "" if passed_on else f"{host}:{port}")
+        address = "" if passed_on else f"{host}:{port}"
+        proof = keys.prove(challenge, address)
+        if token:
+            of_token = tokens.prove(token, challenge, address)
+            proof = ServerProof(proof.address, proof.proof, of_token)
         return Response(proof, headers={"cache-control": "no-store"})
 
     return prove
