@@ -212,11 +212,9 @@ def hide_password() -> None:
 
 
 def hide_target_password() -> None:
-    """Restart the program so that the URL of `--to` holds no password.
-
-    The options `move --to` and `runs copy --to` may carry one, and everybody may read a command
-    line. The database driver takes the password from the environment instead.
-    """
+    """Restart the program so that the URL of `--to`, which `move` and `runs copy` take, holds no
+    password, since all users may read a command line. The database driver takes the password from
+    the environment instead."""
     for at, word in enumerate(sys.orig_argv):
         name, sign, url = word.partition("=")
         if not sign:

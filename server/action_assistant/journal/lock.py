@@ -76,7 +76,7 @@ def _taken(lock: Path) -> int | None:
 
 def _taken_from_a_stranger(lock: Path, path: Path) -> int | None:
     """Replace the lock file of another user, and return the descriptor of the new lock; None if
-    another process of ours was faster."""
+    another process of this user was faster."""
     guard = opener(str(lock.with_name(f"{lock.name}.new")), os.O_RDWR | os.O_CREAT)
     try:
         posix.wait_for_lock(guard)

@@ -196,11 +196,9 @@ class Postgres:
             raise CannotStart(f"Cannot use {self._the}: {cause_of(error)}.") from error
 
     def connect(self) -> PostgresSession:
-        """Connect, and become the only writer (again).
-
-        A session holds the lock: once we have it, our last session has ended on the server, and its
-        last commit has either happened or never will.
-        """
+        """Connect, become the only writer (again), and return the session. Once it has the lock,
+        this process's last session has ended on the server, and its last commit has either happened
+        or never will."""
         return PostgresSession(
             self._engine({"application_name": self._me}, poolclass=NullPool), self._take_over
         )

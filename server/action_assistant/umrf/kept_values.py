@@ -140,9 +140,9 @@ def _types(action: Action) -> dict[str, str]:
 
 
 def _remap(outputs: tuple[str, ...], types: Mapping[str, str], number: int) -> tuple[Remap, ...]:
-    """Return the renamings of an action's sorted outputs on the arrow to the keeper with this
-    number. `types`: of the outputs by name. Outputs that other keepers take get names that keep the
-    order and are no inputs."""
+    """Return the renamings of an action's outputs (sorted names) on the arrow to the keeper with
+    this number. The outputs that this keeper takes get the names of its inputs, all others get
+    names that keep the order and are no inputs. `types`: of the outputs by name."""
     first = number * _OUTPUTS_EACH
     names: list[Remap] = []
     for index, output in enumerate(outputs):

@@ -86,7 +86,8 @@ async def serve_directly(connection: RoomConnection, socket: DirectSocket) -> in
 
 
 class _Directly:
-    """Reads a socket of our own server, and writes to it at most once per turn of the event loop."""
+    """Reads a socket of this program's own server, and writes to it at most once per turn of the
+    event loop."""
 
     def __init__(self, connection: RoomConnection, socket: DirectSocket) -> None:
         self._connection = connection

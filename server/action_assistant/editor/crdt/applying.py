@@ -21,8 +21,8 @@ class Panicked(Exception):
 
 
 class _Applying:
-    """Context manager that turns failures of the CRDT library into our errors. It has no state, so
-    one instance serves all callers."""
+    """Context manager that raises failures of the CRDT library as Malformed or Panicked. It has no
+    state, so one instance serves all callers."""
 
     def __enter__(self) -> None:
         pass

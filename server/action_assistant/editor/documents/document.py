@@ -317,7 +317,7 @@ def read(doc: Doc) -> Graph:  # type: ignore[type-arg]
 
 
 def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
-    """Return the root maps of a document as plain values, without nested shared types, which our
+    """Return the root maps of a document as plain values, without nested shared types, which the
     page never writes."""
     return {
         root: {key: value for key, value in _root(doc, root).items() if isinstance(value, PLAIN)}

@@ -113,7 +113,7 @@ def maps_of(state: Mapping[Place, Packed]) -> Maps:
 
 def document(changes: Sequence[LoggedChange]) -> bytes:
     """Return the JSON of the root maps of a document after `changes`; values that are bytes, which
-    our page never writes, are missing."""
+    the page never writes, are missing."""
     maps = maps_of(state_of(changes))
     plain = {
         root: {key: value for key, value in fields.items() if not isinstance(value, bytes)}

@@ -319,7 +319,7 @@ def _map(replica: Replica, root: Root) -> "Map[Any]":
 
 
 def _plain(value: object) -> object:
-    """Return a plain value; None for nested shared types, which our page never writes."""
+    """Return a plain value; None for nested shared types, which the page never writes."""
     return value if isinstance(value, PLAIN) else None
 
 

@@ -142,12 +142,13 @@ class Member:
         self.on_news()
 
     def post_epoch(self, epoch: str) -> None:
-        """Send the epoch of the log to a client that knows our own messages."""
+        """Send the epoch of the log to a client that understands this program's own messages."""
         if self.acks:
             self.post(messages.epoch(epoch))
 
     def post_read_only(self, why: str) -> None:
-        """Send the reason why the document is read-only to a client that knows our own messages."""
+        """Send the reason why the document is read-only to a client that understands this program's
+        own messages."""
         if self.acks:
             self.post(messages.read_only(why))
 

@@ -77,8 +77,8 @@ class LateActivity:
 
     def sent_by_others(self, command: ForeignCommand) -> None:
         """Remember that another program has published a start message of this runner again, so that
-        the graph it starts is not taken for our run. `command`: the message as it was observed;
-        other commands are ignored."""
+        the graph which it starts is not taken for the runner's own run. `command`: the message as
+        it was observed; other commands are ignored."""
         run = run_in(command.umrf) if command.umrf else None
         if run is not None:
             self._others.put(run, True)

@@ -162,7 +162,7 @@ class Monitor:
 
     def started_by_others(self) -> None:
         """Record that another program has started something, so that the engine's log lines about a
-        start may not be about ours."""
+        start may not be about this run."""
         self._start.doubt()
 
     def disturbed(self, *, meddles: bool) -> None:

@@ -28,8 +28,8 @@ class VisitCount(msgspec.Struct, frozen=True):
 
 
 def visit_counts(run: Run) -> dict[str, VisitCount]:
-    """Return how often each action of a run ran, by its name in the run, with visits that nobody
-    saw but that must have happened."""
+    """Return how often each action of a run ran, by its name in the run, counting visits that were
+    not seen but must have happened."""
     seen = {name: each.older + len(each.visits) for name, each in run.actions.items()}
     exact = {name for name, each in run.actions.items() if _is_exact(run, name, each)}
     inside = tuple(_inside(run)) if run.inner else ()
@@ -101,8 +101,9 @@ def _needs_inside(inside: Iterable[tuple[str, str, Laps]]) -> Iterator[tuple[str
 
 
 def _forced(proven: Mapping[str, int], needs: Iterable[tuple[str, str, int]]) -> dict[str, int]:
-    """Return the least number of visits of each action: `proven` by observations, or forced by
-    `needs`, items of (action, needed action, visits possible without it)."""
+    """Return the least number of visits of each action. `proven`: the numbers that observations
+    prove; `needs`: items (action, parent, count): the action ran at most `count` times more often
+    than its parent, so that a visit of it may prove one of the parent."""
     least = dict(proven)
     parents: dict[str, list[tuple[str, int]]] = {}
     for child, parent, besides in needs:

@@ -91,5 +91,6 @@ class RestProof:
 
 
 def _long_enough(shown: Sequence[Snapshot]) -> float:
-    """Return for how many seconds such a graph must be seen without motion to count as at rest."""
+    """Return for how many seconds a graph (`shown`: with its sub-graphs) must be seen without
+    motion to count as at rest: longer with spontaneous actions, which begin again."""
     return _AGAIN_S if any(each.spontaneous for each in shown) else _STARTING_S

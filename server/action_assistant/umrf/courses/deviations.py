@@ -232,8 +232,9 @@ class _DeviatingCourse:
             self._push(instants[following])
 
     def _await_halt(self, after: int) -> None:
-        """If fewer actions run here than in the baseline, queue its next instant that would halt
-        the graph then. `after`: the first number that counts."""
+        """Queue, if fewer actions run in this course than in the baseline, the next instant of the
+        baseline at which the graph would have halted with so few. `after`: the number of the first
+        instant that counts."""
         if self._running < 0:
             halting = self.course.halting.get(-self._running, ())
             following = bisect_left(halting, after)
@@ -301,8 +302,9 @@ class _DeviatingCourse:
             self.forgotten |= 1 << index
 
     def _as_before(self, after: int) -> Outcome | None:
-        """Return the outcome of another course that came to the same situation; None if no course
-        did. `after`: the number of the following instant of the baseline."""
+        """Return the outcome of another course that came to the same states of all actions, since
+        this course then ends in the same way; None if no course did. `after`: the number of the
+        following instant of the baseline."""
         if self.course.active[after - 1] + self._active == 1:
             alone = [index for index, state in self.apart.items() if state.does == RUNS]
             if alone and self._is_fresh(alone[0], after):

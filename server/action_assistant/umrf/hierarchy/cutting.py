@@ -393,8 +393,9 @@ def middle_of(places: Iterator[Position | None]) -> Position | None:
 def _into(
     selection: Selection, action: Action, against: list[FlatteningReason]
 ) -> Iterator[Relation]:
-    """Yield, for each action outside that leads to the selection, one arrow to `action` that
-    replaces its arrows to all entries. Reasons against it are added to `against`."""
+    """Yield the arrows to `action`, which stands for the selected actions, from outside: one for
+    each action outside that leads to any of them, in place of all its arrows to them. Reasons why
+    that would not do the same are added to `against`."""
     by_parent: dict[Key, list[Relation]] = {}
     for relation in selection.into:
         by_parent.setdefault(relation.parent, []).append(relation)

@@ -283,8 +283,8 @@ class _Http(H11Protocol):
 
 
 class _Strict(h11.Connection):
-    """Refuses a body without a length: reading chunks of one byte costs us a thousand times more
-    than sending them, before the client is authenticated."""
+    """Refuses a body without a length: to read chunks of one byte costs the server a thousand times
+    more than the client, which is not authenticated yet."""
 
     in_crumbs = False
 
@@ -310,9 +310,9 @@ class _Server(uvicorn.Server):
         self._connections = connections
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        """Run the startup of the application, then accept connections on `sockets`. Our own code
-        accepts connections in place of uvicorn's: uvicorn counts a connection only after its
-        handshake, when there may be no free file descriptor any more."""
+        """Run the startup of the application, then accept connections on `sockets` by `Connections`
+        and not by uvicorn, which counts a connection only after its handshake, when there may be no
+        free file descriptor any more."""
         await self.lifespan.startup()
         if self.lifespan.should_exit:
             sys.exit(_FAILED)

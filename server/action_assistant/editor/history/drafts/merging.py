@@ -44,8 +44,8 @@ class FoundConflict(msgspec.Struct, frozen=True):
 
 
 class KeyMerge(msgspec.Struct, frozen=True):
-    """The values that our side has to set so that it is merged; UNSET for a key that is removed. A conflict
-    without a choice keeps the value of our side."""
+    """The values that the side "ours" has to set so that it is merged; UNSET for a key that is
+    removed. A conflict without a choice keeps the value of this side."""
 
     targets: dict[Place, Any]
     conflicts: tuple[FoundConflict, ...]
@@ -181,8 +181,9 @@ class _Merge:
         return self._choices.get(name, "ours")
 
     def _join(self, place: Place) -> None:
-        """Merge an ordered list of names at `place` (root map and key): our list, without the names
-        that they removed, and with the names that they added at its end."""
+        """Merge an ordered list of names at `place` (root map and key): the list of the side
+        "ours", without the names that the other side removed, and with the names that it added at
+        the end."""
         values = [side.get(place, UNSET) for side in (self._base, *self._sides.values())]
         if (side := chosen(*values)) is not None:
             self._take([place], side)
@@ -207,8 +208,8 @@ class _Merge:
     # --- arrows without ends -----------------------------------------------------------------------
 
     def _drop(self, arrows: Iterable[str]) -> None:
-        """Remove arrows that would have lost an end by the merge; arrows without an end that our
-        side had before stay."""
+        """Remove arrows that would have lost an end by the merge; arrows without an end that the
+        side "ours" had before stay."""
         alive = exist(self._result) | _ENDS
         ours, there = self._sides["ours"], self._there["ours"]
         for arrow in arrows:

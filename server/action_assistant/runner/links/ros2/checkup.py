@@ -320,7 +320,7 @@ def _engines(
     strangers: Sequence[Candidate],
     unseen: Sequence[Registration],
 ) -> list[Diagnostic]:
-    """Return findings for engines that nobody registered, and for faults of any engine.
+    """Return findings for engines that are not registered, and for faults of any engine.
     `candidates`: all engines in sight; `strangers`: those that belong to no registered robot;
     `unseen`: robots whose engine does not answer; an engine without a name may be any of them,
     which the finding says."""
