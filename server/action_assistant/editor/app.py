@@ -154,12 +154,13 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         standings=standings,
         codes=codes,
         device_added=device_added,
+        audit=audit,
     )
     return application(
         [
             *signing_in,
             *_routes(app_state, addresses, browsers),
-            *devices.routes(codes, browsers, addresses),
+            *devices.routes(codes, browsers, addresses, audit),
             *tokens.routes(app_state, token_files, limits=settings.limits),
             *doctor.routes(settings),
         ],

@@ -245,7 +245,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     return application(
         [
             *routes(services),
-            *revocation(revoked, people_files),
+            *revocation(revoked, people_files, services.audit),
             *shared_token_routes(tokens),
             *adoption(tokens, limits=settings.limits),
         ],

@@ -114,7 +114,8 @@ export interface EditorApi {
     /**
      * AuditRow
      * @description One fact of the audit. `id`: `editor` or `runner`, and the position in its log. `person`: none
-     *     for strangers. `from`: the connection of the person; none where it was not recorded.
+     *     for strangers. `from`: the connection of the person; none where it was not recorded. `times`: how
+     *     often it happened, where repetitions have one row.
      */
     AuditRow: {
         id: string;
@@ -137,6 +138,8 @@ export interface EditorApi {
         run_number?: number;
         /** @default [] */
         robots?: string[];
+        /** @default 1 */
+        times?: number;
     };
     /**
      * BackupsShown

@@ -208,7 +208,8 @@ export interface RunnerApi {
     /**
      * AuditRow
      * @description One fact of the audit. `id`: `editor` or `runner`, and the position in its log. `person`: none
-     *     for strangers. `from`: the connection of the person; none where it was not recorded.
+     *     for strangers. `from`: the connection of the person; none where it was not recorded. `times`: how
+     *     often it happened, where repetitions have one row.
      */
     AuditRow: {
         id: string;
@@ -235,6 +236,8 @@ export interface RunnerApi {
         run_number?: number | null;
         /** @default [] */
         robots?: string[];
+        /** @default 1 */
+        times?: number;
     };
     /**
      * Author

@@ -9,6 +9,8 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.qr_codes import qr_code
 from action_assistant.errors import BadInput, NotFound
+from action_assistant.web.audit.events import SessionEnded
+from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import Needs, PersonOnly, live_session
 from action_assistant.web.auth.device_codes import DeviceAsking, DeviceCode, DeviceCodes
 from action_assistant.web.auth.session_files import OpenSession, SessionFiles
@@ -34,13 +36,16 @@ class DeviceIsMine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(
-    codes: DeviceCodes, browsers: SessionFiles, addresses: Addresses
+    codes: DeviceCodes, browsers: SessionFiles, addresses: Addresses, audit: AuditLog
 ) -> list[ControllerRouterHandler]:
-    """Return the routes under `/api/devices`. They are for browsers: a token has no devices."""
-    return [*_own(browsers, addresses), *_adding(codes, addresses)]
+    """Return the routes under `/api/devices`. They are for browsers: a token has no devices.
+    `audit` keeps which sessions were ended."""
+    return [*_own(browsers, addresses, audit), *_adding(codes, addresses)]
 
 
-def _own(browsers: SessionFiles, addresses: Addresses) -> list[ControllerRouterHandler]:
+def _own(
+    browsers: SessionFiles, addresses: Addresses, audit: AuditLog
+) -> list[ControllerRouterHandler]:
     def own(person: str) -> list[OpenSession]:
         return [each for each in browsers.every() if each.person.id == person]
 
@@ -67,6 +72,7 @@ def _own(browsers: SessionFiles, addresses: Addresses) -> list[ControllerRouterH
         if session not in {each.id for each in mine}:
             raise NotFound(f"You have no open session {session!r}.")
         await to_thread.run_sync(browsers.end, session)
+        audit.note(SessionEnded(session), live_session(request).person.id)
 
     @post(
         "/api/devices/end",
@@ -77,7 +83,11 @@ def _own(browsers: SessionFiles, addresses: Addresses) -> list[ControllerRouterH
     )
     async def end_others(request: _Asking) -> None:
         session = live_session(request)
+        mine = await to_thread.run_sync(own, session.person.id)
         await to_thread.run_sync(lambda: browsers.end_all_of(session.person.id, but=session.id))
+        for each in mine:
+            if each.id != session.id:
+                audit.note(SessionEnded(each.id), session.person.id)
 
     return [list_devices, end, end_others]
 

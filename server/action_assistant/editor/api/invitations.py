@@ -11,6 +11,7 @@ from action_assistant.editor.api.qr_codes import qr_code
 from action_assistant.editor.people.invitations import Invitation
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput, Conflict
+from action_assistant.web.audit.events import SessionEnded
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.auth.session_files import OpenSession, SessionFiles
@@ -43,10 +44,14 @@ def routes(
     app_state: EditorState, addresses: Addresses, browsers: SessionFiles
 ) -> list[ControllerRouterHandler]:
     """Return the routes under `/api/invitations` and `/api/sessions`."""
-    return [*_links(app_state, addresses), *_one(app_state, addresses), *_sessions(browsers)]
+    return [
+        *_links(app_state, addresses),
+        *_one(app_state, addresses),
+        *_sessions(app_state, browsers),
+    ]
 
 
-def _sessions(browsers: SessionFiles) -> list[ControllerRouterHandler]:
+def _sessions(app_state: EditorState, browsers: SessionFiles) -> list[ControllerRouterHandler]:
     @get(
         "/api/sessions",
         summary="Browsers that are signed in, the newest first",
@@ -63,8 +68,9 @@ def _sessions(browsers: SessionFiles) -> list[ControllerRouterHandler]:
         operation_id="endSession",
         guards=[Needs("share")],
     )
-    async def end(session: str) -> None:
+    async def end(session: str, request: Request[Any, Any, Any]) -> None:
         await to_thread.run_sync(browsers.end, session)
+        app_state.services.audit.note(SessionEnded(session), person_of(request).id)
 
     return [list_sessions, end]
 

@@ -8,6 +8,7 @@ import msgspec
 from sqlalchemy import Connection, select
 
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.log import people_events as e
 from action_assistant.editor.people.people import stored_people
 from action_assistant.journal.databases import ask_from_worker
 from action_assistant.journal.events import Event
@@ -15,6 +16,7 @@ from action_assistant.schema import editor_tables
 from action_assistant.web.audit import events as audit
 from action_assistant.web.audit.facts import described
 from action_assistant.web.audit.rows import AuditFilter, AuditKind, AuditPage, Fact, audit_page
+from action_assistant.web.auth.caller import Origin
 
 #: Events that are no facts about people: most of the log. A sitting of edits has an event of its own.
 _NEVER: Final = (h.UPDATED, h.DEFERRED, h.IMPORTED)
@@ -36,8 +38,9 @@ class _Body(msgspec.Struct, frozen=True):
     note: str = ""
     kind: str = "graph"
     ended_well: bool = True
-    folder: str | None = None
-    reason: str = ""
+    person: str = ""
+    browser: str = ""
+    address: str | None = None
 
 
 #: What the events of one graph say, after the name of the person; fields of the body in braces.
@@ -63,6 +66,16 @@ _PEOPLE: Final[Mapping[str, tuple[AuditKind, str]]] = {
     h.INVITED: ("people", "made a link for the role {role}"),
     h.ACCEPTED: ("people", "came in by the link {id}"),
     h.REVOKED: ("people", "revoked the link {id}"),
+    e.ADDED: ("people", "added the person {name} as {role}"),
+    e.CHANGED: ("people", "set name, role and groups of {name} ({role})"),
+    e.ENDED: ("people", "ended the person {who} everywhere"),
+    e.LINKED: ("people", "made a personal link for {who}"),
+    e.LINK_USED: ("people", "came in by a personal link with {browser}"),
+    e.LINK_WITHDRAWN: ("people", "withdrew the personal link {id}"),
+    e.DEVICE_ADDED: ("people", "added the device {browser}"),
+    e.GROUP_MADE: ("people", "made the group {name}"),
+    e.GROUP_RENAMED: ("people", "renamed a group to {name}"),
+    e.GROUP_REMOVED: ("people", "removed the group {id}"),
     "token.made.v1": ("people", "made the token {name}"),
     "token.revoked.v1": ("people", "revoked the token {name}"),
     "folder.made.v1": ("graphs", "made the folder {name}"),
@@ -92,9 +105,8 @@ class EditorFacts:
         if event.stream == audit.STREAM:
             return described(event, self._graph_name)
         if event.kind == h.EPOCH:
-            return Fact(
-                kind="other", text="The log begins anew here: a new server, or a restored backup"
-            )
+            text = "The log begins anew here: a new server, or a restored backup"
+            return Fact(kind="other", text=text, is_of_program=True)
         if event.author in _OURS:
             return None
         graph = h.graph_of(event.stream)
@@ -105,7 +117,10 @@ class EditorFacts:
         if known is None:
             return None
         kind, sentence = known
-        return Fact(kind=kind, text=sentence.format_map(_words(body)))
+        about = body.person or body.id
+        words = {**_words(body), "who": self._person(about).name or about}
+        told = None if body.address is None else Origin(address=body.address)
+        return Fact(kind=kind, text=sentence.format_map(words), origin=told)
 
     def _about(self, kind: str, graph: str, body: _Body) -> Fact | None:
         name = self._graph_name(graph)

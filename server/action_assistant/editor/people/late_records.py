@@ -3,6 +3,7 @@
 import asyncio
 import logging
 from collections.abc import Awaitable, Callable
+from contextvars import Context, copy_context
 from typing import Final
 
 from action_assistant.errors import Unavailable
@@ -18,12 +19,13 @@ class LateRecords:
 
     def __init__(self, what: str) -> None:
         self._what = what
-        self._waiting: list[Callable[[], Awaitable[None]]] = []
+        #: With the context of whoever asked, so that an event has the connection of that request.
+        self._waiting: list[tuple[Callable[[], Awaitable[None]], Context]] = []
         self._task: asyncio.Task[None] | None = None
 
     async def add(self, store: Callable[[], Awaitable[None]]) -> None:
         """Store something now or later. Wait a short time for it."""
-        self._waiting.append(store)
+        self._waiting.append((store, copy_context()))
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._store(), name=self._what)
         await asyncio.wait([self._task], timeout=_PATIENCE_S)
@@ -38,7 +40,8 @@ class LateRecords:
         told = False
         while self._waiting:
             try:
-                await self._waiting[0]()
+                store, context = self._waiting[0]
+                await asyncio.get_running_loop().create_task(_stored(store), context=context)
             except Unavailable as error:
                 if not told:
                     log.warning("the log does not have %s yet: %s", self._what, error.detail)
@@ -48,3 +51,7 @@ class LateRecords:
             self._waiting.pop(0)
         if told:
             log.info("the log has %s now", self._what)
+
+
+async def _stored(store: Callable[[], Awaitable[None]]) -> None:
+    await store()

@@ -4,18 +4,16 @@ Each process has one such stream in its own log. All other facts of the audit ar
 streams, whose bodies hold the origin of their author (`web/auth/caller.py`).
 """
 
-from typing import ClassVar, Final, Literal, Protocol, TypeAlias
+from typing import ClassVar, Final, Literal, Protocol
 
 import msgspec
 
 from action_assistant.journal.events import Draft
 from action_assistant.web.auth.caller import stamped
+from action_assistant.web.auth.sessions import SignInMeans
 
 #: The stream of the audit in the log of a process.
 STREAM: Final = "audit"
-
-#: The means by which somebody signed in.
-SignInMeans: TypeAlias = Literal["token", "link", "personal", "device"]
 
 
 class EditingBegan(msgspec.Struct, frozen=True):

@@ -63,12 +63,13 @@ def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | No
             what = f"on {robot}" if robot else "of a run" if run else "of everything"
             robots = (robot,) if robot else ()
             text = f"pressed Stop {what}{_again(times)}; nothing of this program was going on"
-            return Fact(kind="stops", text=text, run=run, robots=robots)
+            return Fact(kind="stops", text=text, run=run, robots=robots, times=times)
         case events.StrangersRefused() as strangers:
             noun = "request" if strangers.count == 1 else "requests"
             whence = strangers.address or "this computer"
             text = f"{strangers.count} {noun} from {whence} without a sign-in: {strangers.first}"
-            return Fact(kind="strangers", text=text, at=strangers.minute)
+            times = strangers.count
+            return Fact(kind="strangers", text=text, at=strangers.minute, times=times)
         case events.Unlisted(what=what, count=count):
             kind: AuditKind = "strangers" if what == "strangers_refused" else "other"
             return Fact(kind=kind, text=f"{count} {_UNLISTED[what]}")
@@ -90,4 +91,5 @@ def _refused(refused: events.StartRefused) -> Fact:
         graph_name=refused.graph_name,
         run=refused.run,
         robots=refused.engines,
+        times=refused.times,
     )

@@ -23,13 +23,17 @@ from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.audit.events import (
     STREAM,
     AuditEvent,
+    SessionEnded,
+    SignedIn,
     StartRefused,
     StopPressed,
     StrangersRefused,
     Unlisted,
     draft_of,
 )
-from action_assistant.web.auth.caller import network_address
+from action_assistant.web.auth.caller import Origin, acting_for, network_address, origin_of
+from action_assistant.web.auth.keys import Session
+from action_assistant.web.auth.sessions import SignInMeans
 
 log: Final = logging.getLogger(__name__)
 
@@ -129,14 +133,15 @@ class RepeatCounts:
 
     def __init__(self, clock_us: ClockUs) -> None:
         self._clock_us = clock_us
-        self._seen: dict[tuple[str, Repeated], tuple[int, int]] = {}  # minute, further times
+        #: By author, connection and fact: the minute, and how often it came again.
+        self._seen: dict[tuple[str, Origin | None, Repeated], tuple[int, int]] = {}
         self.rows: Final = DailyRows(REPEATED_ROWS)
 
     def is_first(self, event: Repeated, author: str) -> bool:
         """Return whether a fact gets a row now. If it was repeated within the minute, or too many
         rows were made today, it is only counted. `author`: the id of the person."""
         at = self._clock_us()
-        key = (author, event)
+        key = (author, origin_of(author), event)
         found = self._seen.get(key)
         if found is not None:
             self._seen[key] = found[0], found[1] + 1
@@ -146,17 +151,19 @@ class RepeatCounts:
         self._seen[key] = at - at % _MINUTE_US, 0
         return True
 
-    def over(self, *, all_of_them: bool = False) -> list[tuple[Repeated, str]]:
-        """Forget the facts of minutes that are over, or all. Return those that were repeated, with the
-        number of their repetitions, and their authors."""
+    def over(self, *, all_of_them: bool = False) -> list[Draft]:
+        """Forget the facts of minutes that are over, or all. Return the events of those that were
+        repeated, with the number of their repetitions."""
         at = self._clock_us()
-        repeated: list[tuple[Repeated, str]] = []
+        repeated: list[Draft] = []
         for key, (minute, times) in list(self._seen.items()):
             if all_of_them or minute + _MINUTE_US <= at:
                 del self._seen[key]
-                author, event = key
+                author, origin, event = key
                 if times:
-                    repeated.append((msgspec.structs.replace(event, times=times), author))
+                    with acting_for(author, origin):
+                        again = msgspec.structs.replace(event, times=times)
+                        repeated.append(draft_of(again, author))
         return repeated
 
 
@@ -175,6 +182,16 @@ class AuditLog:
     def note(self, event: AuditEvent, author: str = "") -> None:
         """Queue a fact for storing. Never waits and never fails. `author`: the id of the person."""
         self._add(draft_of(event, author))
+
+    def signed_in(self, session: Session, how: SignInMeans) -> None:
+        """Queue that the person of a session has signed in."""
+        person = session.person
+        came = SignedIn(how, person.role, person.name, session.id, session.invitation or "")
+        self.note(came, person.id)
+
+    def signed_out(self, session: Session) -> None:
+        """Queue that the person of a session has ended it."""
+        self.note(SessionEnded(session.id, own=True), session.person.id)
 
     def refused_stranger(self, address: str, what: str) -> None:
         """Count a refused request without valid credentials. `what`: its method and path."""
@@ -248,8 +265,8 @@ class AuditLog:
         at = self._clock_us()
         for refused in self._strangers.over(all_of_them=all_of_them):
             self._add(draft_of(refused))
-        for repeated, author in self._repeats.over(all_of_them=all_of_them):
-            self._add(draft_of(repeated, author))
+        for repeated in self._repeats.over(all_of_them=all_of_them):
+            self._add(repeated)
         if counts_unlisted or all_of_them:
             if count := self._strangers.rows.take_count(at):
                 self._add(draft_of(Unlisted("strangers_refused", count)))

@@ -65,13 +65,16 @@ class Fact(msgspec.Struct, frozen=True, kw_only=True):
     person: PersonRef | None = None
     origin: Origin | None = None
     at: int | None = None  # where it differs from the time of the event
+    is_of_program: bool = False  # this program did it by itself
+    times: int = 1  # how often, where repetitions have one event
 
 
 class AuditRow(
     msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True, rename={"origin": "from"}
 ):
     """One fact of the audit. `id`: `editor` or `runner`, and the position in its log. `person`: none
-    for strangers. `from`: the connection of the person; none where it was not recorded."""
+    for strangers. `from`: the connection of the person; none where it was not recorded. `times`: how
+    often it happened, where repetitions have one row."""
 
     id: str
     position: int
@@ -87,6 +90,7 @@ class AuditRow(
     run: str = ""
     run_number: int | None = None
     robots: tuple[str, ...] = ()
+    times: int = 1
 
 
 class AuditPage(msgspec.Struct, frozen=True):
@@ -170,7 +174,7 @@ def _row(branch: Branch, event: Event, wanted: AuditFilter, describe: Describe) 
         return None
     if wanted.graph and wanted.graph not in {fact.graph, fact.graph_name}:
         return None
-    person = fact.person or _person(event, origin)
+    person = None if fact.is_of_program else fact.person or _person(event, origin)
     found = AuditRow(
         id=f"{branch}:{event.position}",
         position=event.position,
@@ -186,6 +190,7 @@ def _row(branch: Branch, event: Event, wanted: AuditFilter, describe: Describe) 
         run=fact.run,
         run_number=fact.run_number,
         robots=fact.robots,
+        times=fact.times,
     )
     return found if not wanted.text or _holds(found, wanted.text) else None
 

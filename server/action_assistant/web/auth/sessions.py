@@ -3,7 +3,7 @@
 import contextlib
 import time
 from collections.abc import Awaitable, Callable
-from typing import Annotated, Any, Final, Protocol
+from typing import Annotated, Any, Final, Literal, Protocol, TypeAlias
 
 import msgspec
 from anyio import to_thread
@@ -28,6 +28,7 @@ from action_assistant.web.auth.access import (
     session_of,
 )
 from action_assistant.web.auth.browser_names import browser_name
+from action_assistant.web.auth.caller import Origin, acting_for
 from action_assistant.web.auth.device_codes import DeviceCodes, WaitingDevice
 from action_assistant.web.auth.keys import SESSION_SECONDS, Keys, Person, PersonRef, Session
 from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
@@ -124,6 +125,30 @@ class InvitationRegistry(Protocol):
         """Record that a person came in by an invitation."""
 
 
+#: The means by which somebody signs in.
+SignInMeans: TypeAlias = Literal["token", "link", "personal", "device"]
+
+
+class SessionAudit(Protocol):
+    """Keeps who signed in and out."""
+
+    def signed_in(self, session: Session, how: SignInMeans) -> None:
+        """Keep that the person of a session has signed in."""
+
+    def signed_out(self, session: Session) -> None:
+        """Keep that the person of a session has ended it."""
+
+
+class NoAudit:
+    """Ignores who signs in and out, for tests and programs without a log."""
+
+    def signed_in(self, session: Session, how: SignInMeans) -> None:
+        """Ignore that somebody has signed in."""
+
+    def signed_out(self, session: Session) -> None:
+        """Ignore that somebody has signed out."""
+
+
 class Sessions:
     """Trades tokens and invitations for sessions."""
 
@@ -137,7 +162,9 @@ class Sessions:
         *,
         addresses: Addresses | None,
         limits: bool,
+        audit: SessionAudit,
     ) -> None:
+        self._audit = audit
         self._keys = keys
         self._revoked = revoked
         self._standings = standings
@@ -152,6 +179,17 @@ class Sessions:
         if this address tries too often."""
         self.admit(request)
         return await self._reception().look(invitation)
+
+    def note_sign_in(self, session: Session, how: SignInMeans, request: _Asking) -> None:
+        """Keep in the audit that somebody signed in. A person who keeps their session has not."""
+        if session == session_of(request):
+            return
+        with acting_for(session.person.id, connection_of(session, request)):
+            self._audit.signed_in(session, how)
+
+    def note_end(self, request: _Asking) -> None:
+        """Keep in the audit that the person of this browser signed out."""
+        note_sign_out(self._audit, request)
 
     async def session(self, data: SignIn, request: _Asking) -> Session:
         """Return the session for a sign-in. Raise Unauthenticated, TooMany or BadInput."""
@@ -197,7 +235,8 @@ class Sessions:
         if now is not None and rank(identity_of(request).person.role) >= rank(invited.role):
             return _renamed(self._keys, now, name)
         session = self._begun(name, request, role=invited.role, invitation=invited.id)
-        await self._reception().welcome(invited.id, session.person)
+        with acting_for(session.person.id, connection_of(session, request)):
+            await self._reception().welcome(invited.id, session.person)
         return session
 
     async def _came(self, link: str, request: _Asking) -> Session:
@@ -313,11 +352,19 @@ def session_routes(
     device_added: Callable[[Session, str, str], Awaitable[None]] | None = None,
     addresses: Addresses | None = None,
     limits: bool = True,
+    audit: SessionAudit | None = None,
 ) -> list[ControllerRouterHandler]:
     """Return the routes under `/api/session`. `device_added` stores that a device was added, with
-    its session, browser and address."""
+    its session, browser and address; `audit` keeps who signed in and out."""
     sessions = Sessions(
-        keys, page_port, reception, revoked, standings, addresses=addresses, limits=limits
+        keys,
+        page_port,
+        reception,
+        revoked,
+        standings,
+        addresses=addresses,
+        limits=limits,
+        audit=audit or NoAudit(),
     )
     return [
         *_own_session(sessions, revoked, standings),
@@ -361,7 +408,9 @@ def _new_device(
             return Response(DeviceAnswer(), status_code=200)
         session = sessions.follow(confirmed.session)
         codes.collected(data.claim)
-        await added(session, confirmed.browser, confirmed.address)
+        with acting_for(session.person.id, connection_of(session, request)):
+            await added(session, confirmed.browser, confirmed.address)
+        sessions.note_sign_in(session, "device", request)
         await to_thread.run_sync(
             standings.browsers.note, session, confirmed.browser, confirmed.address
         )
@@ -400,6 +449,9 @@ def _own_session(
     async def sign_in(data: JSONBody[SignIn], request: _Asking) -> Response[SignedIn]:
         session = await sessions.session(data, request)
         await note(session, request)
+        if data.token is not None or data.invitation is not None:
+            by_link: SignInMeans = "personal" if session.personal else "link"
+            sessions.note_sign_in(session, "token" if data.token else by_link, request)
         return sessions.answer(session, request)
 
     @post(
@@ -421,6 +473,7 @@ def _own_session(
         guards=[Open()],
     )
     async def sign_out(request: _Asking) -> Response[None]:
+        sessions.note_end(request)
         try:
             await _end(revoked, request)
         except Unavailable as unwritten:
@@ -430,9 +483,11 @@ def _own_session(
     return [who, sign_in, look, sign_out]
 
 
-def revocation(revoked: Revocations, people: PeopleFiles) -> list[ControllerRouterHandler]:
+def revocation(
+    revoked: Revocations, people: PeopleFiles, audit: SessionAudit
+) -> list[ControllerRouterHandler]:
     """Return the routes by which owners end sessions and change persons in a process without
-    people of its own: the runner, which may be on another computer."""
+    people of its own: the runner, which may be on another computer. `audit` keeps who signed out."""
 
     @put(
         "/api/members/{person:str}",
@@ -480,6 +535,7 @@ def revocation(revoked: Revocations, people: PeopleFiles) -> list[ControllerRout
         guards=[Open()],
     )
     async def sign_out(request: _Asking) -> None:
+        note_sign_out(audit, request)
         await _end(revoked, request)
 
     return [store, revoke, sign_out]
@@ -497,6 +553,20 @@ async def _end(revoked: Revocations, request: _Asking) -> None:
             unwritten = error
     if unwritten is not None:
         raise unwritten
+
+
+def connection_of(session: Session, request: _Asking) -> Origin:
+    """Return the connection by which the person of a session sends this request."""
+    return Origin(session.person.name, session.id, address=client_address(request.scope))
+
+
+def note_sign_out(audit: SessionAudit, request: _Asking) -> None:
+    """Keep in the audit that the sessions of this browser end by its person. Sessions that have ended
+    before end no second time."""
+    session = session_of(request) or expired_session(request)
+    if session is not None:
+        with acting_for(session.person.id, connection_of(session, request)):
+            audit.signed_out(session)
 
 
 def _signed_in(session: Session) -> SignedIn:
