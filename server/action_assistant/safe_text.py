@@ -79,6 +79,13 @@ def _in_order(found: re.Match[str]) -> str:
     return f"\u2068{found[1] or found[2]}\u2069"
 
 
+def is_name(text: str) -> bool:
+    """Return whether a text can be a name: it has a character that is seen, and none that controls a
+    terminal, ends a line or turns the words around it."""
+    seen = any(each.isprintable() and not each.isspace() for each in text)
+    return seen and _STEERING.search(text) is None
+
+
 def hold_names(told: msgspec.Struct, *fields: str) -> None:
     """Replace the named text fields of a struct by their `sentence`. Structs that people read call
     this in `__post_init__`."""

@@ -117,6 +117,8 @@ def test_what_is_refused_says_why_and_changes_nothing(client: httpx.Client) -> N
     refused("POST", "/api/folders", {"name": "  "}, 400, "1 to 100 characters")
     refused("POST", "/api/folders", {"name": "x" * 101}, 400, "1 to 100 characters")
     refused("POST", "/api/folders", {"name": "a/b"}, 400, "no slash")
+    refused("POST", "/api/folders", {"name": "a\u202eb"}, 400, "no control characters")
+    refused("POST", "/api/folders", {"name": "\u200b"}, 400, "no control characters")
     refused("POST", "/api/folders", {"name": "a", "parent": "nope"}, 404, "no folder 'nope'")
     refused("PUT", f"/api/folders/{lab}/parent", {"parent": lab}, 409, "cannot lie in itself")
     refused("PUT", f"/api/folders/{lab}/parent", {"parent": "nope"}, 404, "no folder 'nope'")

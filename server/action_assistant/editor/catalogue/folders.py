@@ -16,6 +16,7 @@ from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import BadInput, Conflict, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
+from action_assistant.safe_text import is_name
 from action_assistant.schema import editor_tables
 
 NAME_LIMIT: Final = 100  # characters
@@ -130,11 +131,13 @@ class Folders:
 
 
 def fit_name(name: str) -> str:
-    """Return the name of a folder with single spaces. Raise BadInput if it is empty, too long or
-    has a slash, which separates folders in paths."""
+    """Return the name of a folder with single spaces. Raise BadInput if it is empty or too long, or
+    has control characters or a slash, which separates folders in paths."""
     name = " ".join(name.split())
     if not name or len(name) > NAME_LIMIT:
         raise BadInput(f"A name has 1 to {NAME_LIMIT} characters.", where={"path": "/name"})
+    if not is_name(name):
+        raise BadInput("A name has no control characters.", where={"path": "/name"})
     if "/" in name:
         raise BadInput("The name of a folder has no slash.", where={"path": "/name"})
     return name

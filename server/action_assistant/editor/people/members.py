@@ -39,6 +39,7 @@ from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.private_files import make_folder, replace_file
 from action_assistant.random_ids import random_id
+from action_assistant.safe_text import is_name
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth import people_files
 from action_assistant.web.auth.keys import Keys, PersonRef
@@ -55,6 +56,7 @@ MOST_HOURS: Final = 30 * 24.0
 _LINKS: Final = "links"
 _MOST: Final = 1000  # persons that are not ended
 _MOST_GROUPS: Final = 100
+_NEVER: Final = datetime(3000, 1, 1, tzinfo=UTC).timestamp()
 
 
 class PersonalLink(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -251,7 +253,7 @@ class Members:
             await asyncio.to_thread(self._revoked.end_person, person)
         except Unavailable as error:
             unwritten = error
-        if member.ended_at is None:
+        if self._one(person).ended_at is None:
             await self._ended(member, by)
         log.info("the person %s was ended", person)
         if unwritten is not None and self._one(person).unrecorded:
@@ -284,15 +286,19 @@ class Members:
         async with self._turn:
             self._group(group)
             left = {
-                each.id: replace(each, groups=tuple(g for g in each.groups if g != group))
+                each.id: tuple(other for other in each.groups if other != group)
                 for each in self._members.values()
                 if group in each.groups
             }
-            changes = [h.draft(e.CHANGED, author, _state(each)) for each in left.values()]
+            changes = [
+                h.draft(e.CHANGED, author, _state(replace(self._members[person], groups=groups)))
+                for person, groups in left.items()
+            ]
             gone = h.draft(e.GROUP_REMOVED, author, e.GroupRemoved(group))
             await self._append([*changes, gone])
             del self._groups[group]
-            self._members |= left
+            for person, groups in left.items():  # who may have been ended, or come in, meanwhile
+                self._members[person] = replace(self._members[person], groups=groups)
             for person in left:
                 await self._write(person)
             await asyncio.to_thread(_try, self._write_groups)
@@ -316,13 +322,13 @@ class Members:
     async def come_in(self, link: str, browser: str, address: str) -> PersonFile:
         """Use a personal link, and return its person. Of several who use it at once, one comes in.
         Raise Unauthenticated or Withdrawn for the others, Unavailable if the log cannot be written."""
-        member, found = self._usable(link)
-        self._set_link(replace(found, used_at=datetime.now(UTC), browser=browser, address=address))
+        member, _ = self._usable(link)
+        self._set_link(link, datetime.now(UTC), browser, address)
         try:
             used = e.LinkUsed(link, browser, address)
             await self._append([h.draft(e.LINK_USED, member.id, used)])
         except Unavailable:
-            self._set_link(found)  # nobody came in by it
+            self._set_link(link, None)  # nobody came in by it
             raise
         # A backup that is restored later does not know of this use; the mark stays.
         await asyncio.to_thread(_try, lambda: self._revoked.add(link))
@@ -375,8 +381,9 @@ class Members:
 
     async def _ended(self, member: Member, by: PersonRef) -> None:
         """Make a person's end known here, and store it in the log now or later."""
-        ended = replace(member, ended_at=datetime.now(UTC), ended_by=by, unrecorded=True)
-        self._members[member.id] = ended
+        self._members[member.id] = replace(
+            self._members[member.id], ended_at=datetime.now(UTC), ended_by=by, unrecorded=True
+        )
 
         async def store() -> None:
             if by.name:
@@ -407,6 +414,8 @@ class Members:
         name = " ".join(text.split())
         if not 0 < len(name) <= NAME_LIMIT:
             raise BadInput(f"A name has 1 to {NAME_LIMIT} characters.", where={"path": "/name"})
+        if not is_name(name):
+            raise BadInput("A name has no control characters.", where={"path": "/name"})
         return name
 
     def _group_name(self, text: str) -> str:
@@ -426,9 +435,17 @@ class Members:
                 raise BadInput(f"There is no group {each!r}.", where={"path": "/groups"})
         return tuple(dict.fromkeys(groups))
 
-    def _set_link(self, link: PersonalLink) -> None:
-        member = self._members[self._owner_of[link.id]]
-        links = tuple(link if each.id == link.id else each for each in member.links)
+    def _set_link(
+        self, link: str, used_at: datetime | None, browser: str = "", address: str = ""
+    ) -> None:
+        """Set when and by which browser a link was used; None: it was not."""
+        member = self._members[self._owner_of[link]]
+        links = tuple(
+            replace(each, used_at=used_at, browser=browser, address=address)
+            if each.id == link
+            else each
+            for each in member.links
+        )
         self._members[member.id] = replace(member, links=links)
 
     async def _append(self, drafts: list[Draft]) -> None:
@@ -447,7 +464,8 @@ class Members:
         self._files.write_groups({each.id: each.name for each in self._groups.values()})
 
     async def _read(self, person: str | None = None) -> None:
-        """Read one person from the tables into memory; without an id all persons and groups."""
+        """Read one person from the tables into memory; without an id all persons and groups. An end
+        or a use of a link that is not in the log yet stays."""
         table, links = editor_tables.member, editor_tables.personal_link
         members, made = select(table), select(links).order_by(links.c.made_at.desc())
         if person is not None:
@@ -475,7 +493,7 @@ class Members:
             )
         for row in await self._journal.query(members):
             over = row.ended_at is not None
-            self._members[row.id] = Member(
+            stored = Member(
                 id=row.id,
                 name=row.name,
                 role=row.role,
@@ -487,6 +505,7 @@ class Members:
                 ended_by=PersonRef(row.ended_by, "") if over else None,
                 links=tuple(theirs.get(row.id, ())),
             )
+            self._members[row.id] = _with_news(stored, self._members.get(row.id))
 
     def _view(self, member: Member, *, with_links: bool) -> Member:
         return replace(
@@ -526,6 +545,29 @@ def make_offline(data: Path, keys: Keys, name: str, role: Role, hours: float) ->
     return f"/#i={link.id}.{keys.secret_of(link.id)}"
 
 
+def _with_news(stored: Member, known: Member | None) -> Member:
+    """Return a person as stored, with what is known of them here and not stored yet: their end, and
+    the uses of links."""
+    if known is None:
+        return stored
+    used = {each.id: each for each in known.links if each.used_at is not None}
+    links = tuple(
+        each
+        if each.used_at is not None or (use := used.get(each.id)) is None
+        else replace(each, used_at=use.used_at, browser=use.browser, address=use.address)
+        for each in stored.links
+    )
+    if stored.ended_at is not None or known.ended_at is None:
+        return replace(stored, links=links)
+    return replace(
+        stored,
+        links=links,
+        ended_at=known.ended_at,
+        ended_by=known.ended_by,
+        unrecorded=known.unrecorded,
+    )
+
+
 def _link_for(person: str, hours: float) -> e.LinkMade:
     if not 0 < hours <= MOST_HOURS:
         raise BadInput(
@@ -547,6 +589,8 @@ def _state(member: Member) -> e.MemberState:
 def _later(until: datetime | None) -> datetime | None:
     if until is not None and until.tzinfo is None:
         raise BadInput("A time names its time zone.", where={"path": "/until"})
+    if until is not None and not 0 <= until.timestamp() < _NEVER:
+        raise BadInput("A time lies between the years 1970 and 3000.", where={"path": "/until"})
     return until
 
 
