@@ -188,7 +188,10 @@ def test_a_revoked_token_is_said_to_be(elsewhere: Elsewhere) -> None:
 
 def test_an_expired_token_still_stops_and_says_what_it_cannot_see(elsewhere: Elsewhere) -> None:
     elsewhere.sign_in()
-    run = elsewhere.run("run", "valve_inspection", "--no-wait").stdout.strip()
+    script = elsewhere.home / "endless.json"
+    script.write_text('{"behaviours": {"*": [{"never": true}]}}')
+    started = elsewhere.run("run", "valve_inspection", "--script", str(script), "--no-wait")
+    run = started.stdout.strip()
     (file,) = elsewhere.tokens.iterdir()
     kept = msgspec.json.decode(file.read_bytes(), type=StoredToken)
     expire(elsewhere.product, kept.token)

@@ -115,9 +115,9 @@ def _login(options: argparse.Namespace) -> int:
         wanted["days"] = options.days
     with _client(url, options) as client:
         begun = decoded(request(client, "POST", "/api/logins", json=wanted), LoginBegun)
-        print(f"Code: {begun.code}")
-        print(f"Confirm it on the page: {url}/programs#code={begun.code}", flush=True)
-        try:
+        try:  # whoever has seen the code may press Ctrl-C
+            print(f"Code: {begun.code}")
+            print(f"Confirm it on the page: {url}/programs#code={begun.code}", flush=True)
             granted = _wait(client, begun)
         except KeyboardInterrupt:
             request(client, "POST", "/api/logins/cancel", json={"secret": begun.secret})
