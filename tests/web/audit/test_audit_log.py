@@ -175,3 +175,17 @@ async def test_refused_starts_that_all_differ_are_bounded_too() -> None:
     (unlisted,) = store.of(Unlisted.kind)
     counted = msgspec.json.decode(unlisted.body, type=Unlisted)
     assert len(store.of(StartRefused.kind)) + counted.count == 10_000
+
+
+async def test_a_person_who_is_refused_all_day_hides_no_other_person() -> None:
+    audit, store = AuditLog(clock := Clock()), Store()
+    async with audit.writing(store):
+        for day in range(2):
+            clock.now = MORNING + day * DAY
+            for number in range(5_000):
+                refused = StartRefused(what="start", why=f"No {number}.")
+                audit.note_repeated(refused, "mallory")
+            audit.note_repeated(StopPressed("arm", ""), "ada")
+            audit.note_repeated(StartRefused(what="start", why="The robot is lost."), "ben")
+    theirs = [each.author for each in store.drafts if each.author in {"ada", "ben"}]
+    assert sorted(theirs) == ["ada", "ada", "ben", "ben"]

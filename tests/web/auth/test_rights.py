@@ -1,5 +1,6 @@
 """Rights: the one decision about them, routes that declare none, and tokens of programs."""
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, get_args
@@ -16,7 +17,7 @@ from action_assistant.editor import app as editor
 from action_assistant.errors import CannotStart
 from action_assistant.runner import app as runner
 from action_assistant.settings import EditorSettings, RunnerSettings
-from action_assistant.web.auth.access import Needs, Open, SignedIn, identity_of
+from action_assistant.web.auth.access import Needs, Open, SignedIn, identity_of, is_expired
 from action_assistant.web.auth.identity import Identity, NoTokens, Scope, Token
 from action_assistant.web.auth.keys import Keys, Person
 from action_assistant.web.auth.revocations import Revocations
@@ -145,6 +146,7 @@ class Programs(NoTokens):
         return {
             "reads": Token("r", "dashboard", person, frozenset({"read"})),
             "starts": Token("s", "nightly", person, frozenset({"simulate"})),
+            "short": Token("t", "short", person, frozenset({"simulate"}), time.time() + 0.5),
             "old": Token("o", "old", person, frozenset({"simulate"}), expires=1.0),
         }.get(text)
 
@@ -170,9 +172,10 @@ async def stop() -> str:
 
 @websocket("/api/live", guards=[Needs("simulate")])
 async def live(socket: WebSocket[Any, Any, Any]) -> None:
-    """Stay open until the client goes or is put out."""
+    """Say to each message whether the client has expired, until it goes or is put out."""
     await socket.accept()
-    await socket.receive()
+    async for _ in socket.iter_data():
+        await socket.send_json(is_expired(socket))
 
 
 @pytest.fixture
@@ -245,6 +248,15 @@ def test_open_sockets_of_a_token_close_when_it_is_revoked(
         with pytest.raises(WebSocketDisconnect) as closed:
             socket.receive()
         assert closed.value.code == 4401
+
+
+def test_a_live_socket_says_when_its_token_has_expired(client: TestClient[Any]) -> None:
+    with client.websocket_connect("/api/live", headers=bearer("short")) as socket:
+        socket.send_text("")
+        assert socket.receive_json() is False
+        time.sleep(0.6)
+        socket.send_text("")
+        assert socket.receive_json() is True
 
 
 @pytest.mark.parametrize("hostile", ["", "../x", "a/b", "x" * 41, "ä", "session-\0"])

@@ -7,7 +7,7 @@ counted, and the count is stored.
 
 import asyncio
 import logging
-from collections import deque
+from collections import Counter, deque
 from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Final, Protocol, TypeAlias
@@ -41,6 +41,8 @@ log: Final = logging.getLogger(__name__)
 STRANGER_ROWS: Final = 1_000
 #: Rows in one day about what programs may repeat: refused starts, and Stops that found nothing to stop.
 REPEATED_ROWS: Final = 2_000
+#: Of these, rows about one person: nobody hides what others do by repeating something else.
+REPEATED_ROWS_OF_ONE: Final = 200
 _KEPT_FREE: Final = 50  # of the rows of a day, for the counts of what has no row
 _WAITING: Final = 10_000  # events that wait for the journal
 _BATCH: Final = 200  # events of one transaction
@@ -63,22 +65,26 @@ class AuditStore(Protocol):
 
 
 class DailyRows:
-    """Counts the rows of one day (UTC), of which there are at most `most`."""
+    """Counts the rows of one day (UTC), of which there are at most `most`, and at most `most_of_one`
+    about one person."""
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int, most_of_one: int | None = None) -> None:
         self._most: Final = most
+        self._most_of_one: Final = most if most_of_one is None else most_of_one
+        self._of: Counter[str] = Counter()
         self._day = 0
         self.rows = 0
         self.unlisted = 0
 
-    def take(self, at: int) -> bool:
+    def take(self, at: int, who: str = "") -> bool:
         """Return whether one more row may be made at this time, and count it; if not, count what has
-        no row. A part of the rows is kept for those counts."""
+        no row. A part of the rows is kept for those counts. `who`: the id of the person."""
         self.begin(at)
-        if self.rows >= self._most - _KEPT_FREE:
+        if self.rows >= self._most - _KEPT_FREE or self._of[who] >= self._most_of_one:
             self.unlisted += 1
             return False
         self.rows += 1
+        self._of[who] += 1
         return True
 
     def take_count(self, at: int) -> int:
@@ -95,6 +101,7 @@ class DailyRows:
         day = at // _DAY_US
         if day != self._day:
             self._day, self.rows = day, 0
+            self._of.clear()
 
 
 class RefusalCounts:
@@ -135,7 +142,7 @@ class RepeatCounts:
         self._clock_us = clock_us
         #: By author, connection and fact: the minute, and how often it came again.
         self._seen: dict[tuple[str, Origin | None, Repeated], tuple[int, int]] = {}
-        self.rows: Final = DailyRows(REPEATED_ROWS)
+        self.rows: Final = DailyRows(REPEATED_ROWS, REPEATED_ROWS_OF_ONE)
 
     def is_first(self, event: Repeated, author: str) -> bool:
         """Return whether a fact gets a row now. If it was repeated within the minute, or too many
@@ -146,7 +153,7 @@ class RepeatCounts:
         if found is not None:
             self._seen[key] = found[0], found[1] + 1
             return False
-        if not self.rows.take(at):
+        if not self.rows.take(at, author):
             return False
         self._seen[key] = at - at % _MINUTE_US, 0
         return True

@@ -172,8 +172,8 @@ def expired_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session |
 
 
 def is_expired(connection: ASGIConnection[Any, Any, Any, Any]) -> bool:
-    """Return whether the session of an open socket has expired by now. It then allows nothing but
-    Stop."""
+    """Return whether the session or token of an open socket has expired by now. It then allows
+    nothing but Stop."""
     check: Callable[[], bool] = connection.scope["state"].get("is_expired", lambda: False)
     return check()
 
@@ -345,8 +345,10 @@ class Access:
             found = self._program(text.strip(), method, path)
             if found is not None:
                 state["identity"] = replace(found, device=device, address=address)
-                if found.token is not None:
-                    self._tokens.note_use(found.token.id, address)
+                token = found.token
+                if token is not None:
+                    self._tokens.note_use(token.id, address)
+                    state["is_expired"] = lambda: self._standing(token).expired
                 return
         genuine = self._sessions(headers)
         state["sessions"] = genuine

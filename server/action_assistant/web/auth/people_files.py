@@ -8,6 +8,7 @@ a full disk signs nobody out. What could not be written holds in this process un
 
 import logging
 import re
+import threading
 from pathlib import Path
 from typing import Final
 
@@ -15,6 +16,7 @@ import msgspec
 
 from action_assistant.errors import Unavailable
 from action_assistant.private_files import make_folder, replace_file
+from action_assistant.random_ids import random_id
 from action_assistant.web.auth.roles import Role
 
 log: Final = logging.getLogger(__name__)
@@ -43,37 +45,41 @@ class PeopleFiles:
         self._folder = data / FOLDER
         self._read: dict[str, tuple[_State, PersonFile | None]] = {}
         self._unwritten: dict[str, PersonFile] = {}
+        self._writing = threading.Lock()
 
     def get(self, person: str) -> PersonFile | None:
-        """Return what is known of a person; None if there is no file, or none that can be read."""
+        """Return what is known of a person; None if there was never a file that could be read. While
+        a file cannot be read, the person is what it said last: an old cookie may say more."""
         if person in self._unwritten:
             return self._unwritten[person]
         if _ID.fullmatch(person) is None:
             return None
         path = self._path(person)
+        known = self._read.get(person)
         try:
             found = path.stat()
+            state = (found.st_mtime_ns, found.st_ino, found.st_size)
+            if known is None or known[0] != state:
+                known = (state, _decoded(path, person) or (known[1] if known else None))
+                self._read[person] = known
         except OSError:  # not there, or the disk is gone, for which nobody is put out
-            return None
-        state = (found.st_mtime_ns, found.st_ino, found.st_size)
-        known = self._read.get(person)
-        if known is None or known[0] != state:
-            known = (state, _decoded(path, person))
-            self._read[person] = known
-        return known[1]
+            pass
+        return None if known is None else known[1]
 
     def write(self, person: PersonFile) -> None:
         """Store a person durably. Raise Unavailable if that fails; it then holds in this process
         until the process ends. Raise ValueError for a malformed id."""
         if _ID.fullmatch(person.id) is None or person.id == _GROUPS:
             raise ValueError(f"{person.id!r} is no id of a person")
-        self._unwritten[person.id] = person
-        self._replace(person.id, msgspec.json.encode(person))
-        del self._unwritten[person.id]
+        with self._writing:
+            self._unwritten[person.id] = person
+            self._replace(person.id, msgspec.json.encode(person))
+            del self._unwritten[person.id]
 
     def write_groups(self, names: dict[str, str]) -> None:
         """Store the names of all groups by id. Raise Unavailable if that fails."""
-        self._replace(_GROUPS, msgspec.json.encode(names))
+        with self._writing:
+            self._replace(_GROUPS, msgspec.json.encode(names))
 
     def groups(self) -> dict[str, str]:
         """Return the names of all groups by id, as far as they can be read."""
@@ -88,7 +94,8 @@ class PeopleFiles:
     def _replace(self, name: str, content: bytes) -> None:
         try:
             make_folder(self._folder)
-            replace_file(self._path(name), content)
+            part = self._folder / f"{name}.{random_id()}.part"  # the other process may write, too
+            replace_file(self._path(name), content, part=part)
         except OSError as error:
             raise Unavailable(
                 f"It holds here and now, but could not be written to {self._folder}: "
@@ -97,9 +104,11 @@ class PeopleFiles:
 
 
 def _decoded(path: Path, person: str) -> PersonFile | None:
+    """Return the person in a file; None for another one or none. Raise OSError."""
+    content = path.read_bytes()
     try:
-        found = msgspec.json.decode(path.read_bytes(), type=PersonFile)
-    except (OSError, msgspec.DecodeError) as error:
+        found = msgspec.json.decode(content, type=PersonFile)
+    except msgspec.DecodeError as error:
         log.error("%s cannot be read: %s", path, error)
         return None
     return found if found.id == person else None

@@ -30,6 +30,7 @@ from action_assistant.errors import (
 )
 from action_assistant.private_files import replace_file, sync
 from action_assistant.random_ids import random_id
+from action_assistant.safe_text import is_name
 from action_assistant.settings import TOKEN_DAYS
 from action_assistant.web.auth.identity import Identity, Scope, Token
 from action_assistant.web.auth.keys import Keys, Person, PersonRef
@@ -284,6 +285,8 @@ class TokenFiles:
             raise BadInput(
                 f"A token has a name of up to {NAME_LIMIT} characters.", where={"path": "/name"}
             )
+        if not is_name(name):
+            raise BadInput("A name has no control characters.", where={"path": "/name"})
         if days is not None and not 0 < days <= self.most_days:
             raise BadInput(
                 f"A token lasts at most {self.most_days:g} days here.", where={"path": "/days"}

@@ -1,0 +1,51 @@
+"""The files of persons: what holds when they cannot be read, and when several write at once."""
+
+import errno
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
+from action_assistant.web.auth.roles import Role
+
+
+def person(role: Role, name: str = "Mari") -> PersonFile:
+    return PersonFile("mari", name, role)
+
+
+def test_a_failed_read_gives_nobody_an_earlier_role_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    editor, runner = PeopleFiles(tmp_path), PeopleFiles(tmp_path)
+    editor.write(person("viewer"))
+    assert runner.get("mari") == person("viewer")
+    editor.write(person("viewer", "Mari K."))
+
+    def fails(_: Path) -> Any:
+        raise OSError(errno.EMFILE, "Too many open files")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "read_bytes", fails)
+        assert runner.get("mari") == person("viewer")  # as known; a cookie may say owner
+    assert runner.get("mari") == person("viewer", "Mari K.")
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, "stat", fails)
+        assert runner.get("mari") == person("viewer", "Mari K.")
+    (tmp_path / "people" / "mari.json").write_bytes(b"{")
+    assert runner.get("mari") == person("viewer", "Mari K.")
+
+
+def test_several_that_write_a_person_at_once_all_succeed(tmp_path: Path) -> None:
+    processes = [PeopleFiles(tmp_path) for _ in range(2)]
+    last = PeopleFiles(tmp_path)
+
+    def write(n: int) -> None:
+        processes[n % 2].write(person("viewer", f"Mari {'x' * (n % 40)}"))
+        assert last.get("mari") is not None
+
+    with ThreadPoolExecutor(8) as threads:
+        list(threads.map(write, range(400)))
+    assert {path.name for path in (tmp_path / "people").iterdir()} == {"mari.json"}
+    assert processes[0].get("mari") == processes[1].get("mari")
