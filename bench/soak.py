@@ -117,9 +117,11 @@ PARTS: Final[dict[str, Part]] = {
         ("-s", "tests/test_nobody_delays_stop.py"),
     ),
     "robots": Part(
-        "10,000 histories of runs with false confirmations, 1,000 stops and races, 300 clicks on Stop",
+        "10,000 histories of runs with false confirmations, 1,000 stops and races, 300 clicks on Stop, "
+        "12,000 races for a baton",
         {
             "TEST_HISTORIES": "10000",
+            "TEST_BATON_RACES": "4000",
             "TEST_STOPS": "1000",
             "TEST_RACES": "1000",
             "TEST_STOP_CLICKS": "300",
@@ -128,6 +130,7 @@ PARTS: Final[dict[str, Part]] = {
             "-s",
             "tests/runner/stop/test_false_confirmations.py",
             "tests/runner/stop/test_stops_and_starts.py",
+            "tests/runner/start/test_rights_registry.py",
             "tests/test_stop_latency.py",
         ),
     ),

@@ -26,6 +26,7 @@ WITHOUT_BODY = frozenset(
         "/api/runs/{run}/pause",
         "/api/runs/{run}/resume",
         "/api/robots/{name}/stop",
+        "/api/robots/{name}/baton/drop",
         "/api/examples",
     }
 )

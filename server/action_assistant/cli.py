@@ -108,7 +108,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     ),
     "tokens": CommandEntry("logins", "tokens of programs: list, make, revoke, stored"),
     "robots": CommandEntry(
-        "robots", "robots that the runner reaches over ROS 2: list, add, remove", described=True
+        "robots",
+        "robots that the runner reaches over ROS 2: list, add, remove, rights, baton, lock, unlock",
+        described=True,
     ),
     "simulate-robot": CommandEntry(
         "simulate_robot", "a robot that behaves like a real engine, on ROS 2, to practise with"

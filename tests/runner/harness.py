@@ -41,6 +41,7 @@ from action_assistant.runner.runs.events import Author, RunEvent, decode
 from action_assistant.runner.runs.fold import replay
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
+from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.schema.runner_tables import RUNNER, runner_event
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.facts import SIMULATED
@@ -356,14 +357,15 @@ class Harness:
         self.shown: list[tuple[float, Run]] = []
 
     @asynccontextmanager
-    async def runner(self) -> AsyncIterator[ExecutionService]:
-        """A runner, up to its end."""
+    async def runner(self, now: IdentityNow = unchanged) -> AsyncIterator[ExecutionService]:
+        """A runner, up to its end. `now`: who was ended."""
         async with ExecutionService.opened(
             self.journal,
             Robots(self.links),
             clock_us=clock_us,
             run_in_worker=at_once,
             simulator=self.simulator,
+            identity_now=now,
         ) as control:
             control.watch(self._saw)
             yield control

@@ -154,7 +154,7 @@ function Inside({ id }: { id: string }) {
   const placeable = usePlaceable(id);
   const known = useMemo(() => templatesOf(placeable), [placeable]);
   const { going, choose: chooseRun, live, run, label, unsure, inside } = useShownRun(id);
-  const { runner } = useLive();
+  const { runner, now } = useLive();
   const replay = useReplay(runner, run ?? null, useEdge(run ?? null), null);
   const past = replay.at !== null;
   const drawn = past ? replay.run : live;
@@ -212,7 +212,7 @@ function Inside({ id }: { id: string }) {
           />
         }
         seed={seed}
-        held={live && asksPeople(live) && <RunQuestions run={live} />}
+        held={live && asksPeople(live, now.engines) && <RunQuestions run={live} />}
         corner={<ConnectionStatus run={live} whose={going.length > 1} />}
       />
     </>

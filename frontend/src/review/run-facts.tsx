@@ -44,6 +44,12 @@ export function RunFacts({ runner, run, version, by }: Props) {
     ["Digest", run.digest],
     ["Engine", runPlace(run)],
     ["Started by", `${by}${requesterPlace(run.author)}`],
+    ...(run.batons
+      ? [["Baton", `${by} held that of ${run.batons.map(isolated).join(", ")}`] as [string, string]]
+      : []),
+    ...(run.lead
+      ? [["Led on for", `${run.lead.name}${requesterPlace(run.lead)}`] as [string, string]]
+      : []),
     ["Started", moment(start)],
     ...(run.stopped_by
       ? [

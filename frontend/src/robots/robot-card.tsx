@@ -1,20 +1,38 @@
 /** One robot: its engine in words, what makes answers a proof, what runs there. */
 import { ActionIcon, Button, Menu, Tabs, Text } from "@mantine/core";
 import { notifications } from "@mantine/notifications";
-import { IconAlertTriangle, IconCheck, IconDots, IconPencil, IconTrash } from "@tabler/icons-react";
+import {
+  IconAlertTriangle,
+  IconBarrierBlock,
+  IconCheck,
+  IconDots,
+  IconPencil,
+  IconSquareFilled,
+  IconTrash,
+  IconUserCheck,
+} from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { errorText } from "../api/http";
 import { useLive, useRobotAnsweredAt } from "../api/page-link";
 import { useMay } from "../api/people";
-import { forgetRobot, type Registration, type Robot, useIndexedByRobot } from "../api/robots";
+import { useRight } from "../api/rights";
+import {
+  forgetRobot,
+  type Registration,
+  type Robot,
+  stopRobot,
+  useIndexedByRobot,
+} from "../api/robots";
+import { Baton, OutOfService } from "../status/robot-rights";
 import { EngineLabel } from "../status/state-label";
 import { colorOfName } from "../ui/name-colors";
 import { ago, clock, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
+import { LockForm, RightsForm } from "./rights-form";
 import style from "./robot-card.module.css";
 import { RobotLog } from "./robot-log";
-import { RobotRuns } from "./robot-runs";
+import { notifyRobotFailure, RobotRuns } from "./robot-runs";
 
 interface Props {
   robot: Robot;
@@ -72,6 +90,9 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
   const { runner } = useLive();
   const client = useQueryClient();
   const may = useMay("register");
+  const isOwner = useMay("share");
+  const [asks, setAsks] = useState<"rights" | "lock" | null>(null);
+  const close = () => setAsks(null);
   const forget = async () => {
     try {
       await forgetRobot(runner ?? "", robot.name);
@@ -82,40 +103,86 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
     }
   };
   return (
-    <Menu>
-      <Menu.Target>
-        <ActionIcon size={32} aria-label={`More about ${isolated(robot.name)}`}>
-          <IconDots size={17} aria-hidden />
-        </ActionIcon>
-      </Menu.Target>
-      <Menu.Dropdown>
-        {!may && <Menu.Label>Operators register robots</Menu.Label>}
-        <Menu.Item
-          leftSection={<IconPencil size={15} />}
-          disabled={!may}
-          onClick={() =>
-            onEdit({
-              name: robot.name,
-              domain: robot.domain ?? 0,
-              rmw: robot.rmw,
-              get_service: robot.get_service,
-              profile: robot.profile,
-              led: robot.led,
-            })
-          }
-        >
-          Change …
-        </Menu.Item>
-        <Menu.Item
-          c="var(--error)"
-          leftSection={<IconTrash size={15} />}
-          disabled={!may}
-          onClick={() => void forget()}
-        >
-          Forget
-        </Menu.Item>
-      </Menu.Dropdown>
-    </Menu>
+    <>
+      {asks === "rights" && <RightsForm robot={robot} onClose={close} />}
+      {asks === "lock" && <LockForm robot={robot} onClose={close} />}
+      <Menu>
+        <Menu.Target>
+          <ActionIcon size={32} aria-label={`More about ${isolated(robot.name)}`}>
+            <IconDots size={17} aria-hidden />
+          </ActionIcon>
+        </Menu.Target>
+        <Menu.Dropdown>
+          {!may && <Menu.Label>Operators register robots</Menu.Label>}
+          <Menu.Item
+            leftSection={<IconPencil size={15} />}
+            disabled={!may}
+            onClick={() =>
+              onEdit({
+                name: robot.name,
+                domain: robot.domain ?? 0,
+                rmw: robot.rmw,
+                get_service: robot.get_service,
+                profile: robot.profile,
+                led: robot.led,
+              })
+            }
+          >
+            Change …
+          </Menu.Item>
+          <Menu.Item
+            leftSection={<IconUserCheck size={15} />}
+            disabled={!isOwner}
+            onClick={() => setAsks("rights")}
+          >
+            Who may start here …{!isOwner && " (owners)"}
+          </Menu.Item>
+          <Menu.Item
+            leftSection={<IconBarrierBlock size={15} />}
+            disabled={!may}
+            onClick={() => setAsks("lock")}
+          >
+            Put out of service …
+          </Menu.Item>
+          <Menu.Item
+            c="var(--error)"
+            leftSection={<IconTrash size={15} />}
+            disabled={!may}
+            onClick={() => void forget()}
+          >
+            Forget
+          </Menu.Item>
+        </Menu.Dropdown>
+      </Menu>
+    </>
+  );
+}
+
+/** The reason why the signed-in person may not start here, in the words of the runner. */
+function WhyNot({ robot }: { robot: Robot }) {
+  const why = useRight(robot.name)?.why ?? "";
+  const may = useMay("operate");
+  if (why === "" || !may || robot.locks.length > 0) return null;
+  return <p className={style.why}>{why}</p>;
+}
+
+function StopHere({ robot }: { robot: Robot }) {
+  const { runner } = useLive();
+  const stop = () =>
+    stopRobot(runner ?? "", robot.name).catch((error: unknown) =>
+      notifyRobotFailure(`NOT SENT: use the hardware stop of ${isolated(robot.name)}`, error),
+    );
+  return (
+    <Button
+      size="compact-sm"
+      variant="filled"
+      color="red"
+      leftSection={<IconSquareFilled size={11} aria-hidden />}
+      aria-label={`Stop what runs on ${isolated(robot.name)}`}
+      onClick={() => void stop()}
+    >
+      Stop
+    </Button>
   );
 }
 
@@ -133,7 +200,10 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
         <span className="flex-1" />
         <More robot={robot} onEdit={onEdit} />
       </header>
+      <OutOfService robot={robot} stop={<StopHere robot={robot} />} />
       <Facts robot={robot} />
+      <Baton robot={robot} />
+      <WhyNot robot={robot} />
       {robot.why !== "" && <p className={style.why}>{robot.why}</p>}
       <ul className={style.signs}>
         {robotSigns(robot).map(({ good, text }) => (

@@ -43,6 +43,24 @@ function writtenText({ sender, files, why }: RobotLogLine): string {
   return why === "" ? done : `${done}: ${why}`;
 }
 
+/** Return a sentence about a baton that has passed. */
+function batonText({ how, sender, was, to, why }: RobotLogLine): string {
+  switch (how) {
+    case "handed":
+      return `${isolated(was)} handed the baton to ${isolated(to)}`;
+    case "forced":
+      return `${isolated(to)} took the baton over from ${isolated(was)}: ${why}`;
+    case "dropped":
+      return `${isolated(was)} dropped the baton`;
+    case "fell":
+      return `The baton of ${isolated(was)} fell: ${why}`;
+    case "off":
+      return `${isolated(sender)} took the baton of ${isolated(was)} away: it has none any more`;
+    default:
+      return `${isolated(to)} took the baton`;
+  }
+}
+
 /** A sentence of one line; what it did to a run of ours comes after it. */
 function robotLogText(told: RobotLogLine): string {
   switch (told.kind) {
@@ -60,6 +78,14 @@ function robotLogText(told: RobotLogLine): string {
       return `${isolated(told.sender)} asked to write ${told.graphs.map(isolated).join(", ")} into its index folder`;
     case "index_written":
       return writtenText(told);
+    case "baton":
+      return batonText(told);
+    case "rights_set":
+      return `${isolated(told.sender)} set who may start there`;
+    case "locked":
+      return `${isolated(told.sender)} put it out of service: ${told.why}`;
+    case "unlocked":
+      return `${isolated(told.sender)} took the lock of ${isolated(told.was)} off`;
   }
 }
 

@@ -15,6 +15,7 @@ import { isolated } from "../words/isolated";
 import style from "./held-notice.module.css";
 import { actionWords } from "./level-places";
 import { OutcomeQuestions } from "./outcome-question";
+import { ServiceNotices } from "./robot-rights";
 
 /** Return what goes on while a run is held, and what nobody knows since its robot does not answer. */
 function movingWords(run: Run, silent: ReadonlySet<string>): string {
@@ -89,6 +90,7 @@ function GoOnButton({ run, since }: { run: Run; since: string }) {
 export function RunQuestions({ run }: { run: Run }) {
   return (
     <>
+      <ServiceNotices run={run} />
       <HeldNotice run={run} />
       <OutcomeQuestions run={run} />
     </>

@@ -1,4 +1,6 @@
 /** Says in words for each robot of a led run how far its rest is proven. */
+import { enginesOf } from "../api/led-runs";
+import type { Robot } from "../api/robots";
 import { type Run, silentRests } from "../api/run-stop";
 import type { RunnerApi } from "../api/schema/runner";
 import { clock, instant } from "../ui/times";
@@ -79,8 +81,16 @@ export function knownRest(run: Run, robot: string): RobotRest | null {
 }
 
 /** Return whether a run waits for something that a person has to say. */
-export function asksPeople(run: Run): boolean {
-  return Boolean(run.held) || askedOutcomes(run).length > 0;
+export function asksPeople(run: Run, robots: readonly Robot[]): boolean {
+  const isHeld = Boolean(run.held) || askedOutcomes(run).length > 0;
+  return isHeld || isOutOfService(run, robots);
+}
+
+/** Return whether a robot of an open run is out of service. */
+function isOutOfService(run: Run, robots: readonly Robot[]): boolean {
+  if (run.ended_at !== null) return false;
+  const engines = enginesOf(run);
+  return robots.some(({ name, locks }) => locks.length > 0 && engines.includes(name));
 }
 
 /** Return the actions of a run whose outcome a person has to give, by full name. */

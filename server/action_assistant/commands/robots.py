@@ -1,13 +1,15 @@
-"""The command `robots`: which robots are registered, registering one, and forgetting one."""
+"""The command `robots`: which robots are registered, registering one, forgetting one; who may start there,
+who holds its baton, and who has put it out of service."""
 
 import argparse
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 from urllib.parse import quote
 
 import msgspec
 
-from action_assistant.commands.client import command, decoded, print_json, running
+from action_assistant.commands.client import Server, command, decoded, print_json, running
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 from action_assistant.umrf.facts import SECOND_PERSON
@@ -60,6 +62,76 @@ def _add_robots(robots: argparse.ArgumentParser) -> None:
     remove = command(words, "remove", "forget a robot; its runs stay in the history", "David")
     remove.add_argument("name", metavar="NAME")
     remove.set_defaults(handler=_remove)
+    _add_rights(words)
+    _add_baton(words)
+    _add_service(words)
+
+
+def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    rights = command(
+        words,
+        "rights",
+        "say who may start on a robot, and whether it has a baton; without options, show it",
+        "David --operator gY2kq=2027-01-31 --baton on",
+    )
+    rights.add_argument("name", metavar="NAME")
+    rights.add_argument("--all", action="store_true", help="every operator may start there")
+    rights.add_argument(
+        "--operator",
+        action="append",
+        metavar="ID[=DATE]",
+        help="only people and groups with these ids may, until "
+        "the end of that day if it is given; again for each",
+    )
+    rights.add_argument(
+        "--baton", choices=["on", "off"], help="only the person who holds its baton may start there"
+    )
+    rights.set_defaults(handler=_rights)
+
+
+def _add_baton(words: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    baton = words.add_parser(
+        "baton",
+        help="take the baton of a robot, hand it over, or drop it",
+        description="The baton.",
+    )
+    baton.add_argument("name", metavar="NAME")
+    does = baton.add_subparsers(dest="does", required=True, metavar="show | take | hand | drop")
+    shown = command(does, "show", "say who holds the baton of a robot", "")
+    shown.set_defaults(handler=_show_baton)
+    take = command(does, "take", "take the baton of a robot", '--reason "Ann is at lunch."')
+    take.add_argument("--reason", default="", help="why it is taken over from its holder")
+    take.set_defaults(handler=_take_baton)
+    hand = command(does, "hand", "hand it to somebody who has a page open", "--to Ben")
+    hand.add_argument("--to", required=True, metavar="PERSON", help="name or id")
+    hand.add_argument(
+        "--run",
+        metavar="RUN",
+        help="hand over this led run with all batons of its robots: it goes on",
+    )
+    hand.set_defaults(handler=_hand_baton)
+    drop = command(
+        does, "drop", "drop the baton of a robot: whoever may start there can take it", ""
+    )
+    drop.set_defaults(handler=_drop_baton)
+
+
+def _add_service(words: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    lock = command(
+        words,
+        "lock",
+        "put a robot out of service: nothing starts or goes on there; what runs is not stopped",
+        'David --reason "It leaks oil."',
+    )
+    lock.add_argument("name", metavar="NAME")
+    lock.add_argument("--reason", required=True)
+    lock.set_defaults(handler=_lock)
+    unlock = command(
+        words, "unlock", "take your lock off a robot; owners also those of others", "David"
+    )
+    unlock.add_argument("name", metavar="NAME")
+    unlock.add_argument("--of", default="", metavar="PERSON", help="whose lock it is: name or id")
+    unlock.set_defaults(handler=_unlock)
 
 
 COMMANDS: Final = {"robots": _add_robots}
@@ -108,11 +180,159 @@ def _remove(options: argparse.Namespace) -> int:
     return 0
 
 
+def _rights(options: argparse.Namespace) -> int:
+    """Change the rights that the options name, and show them."""
+    with running(options) as server:
+        robot = _robot(server, options.name)
+        if options.all and options.operator:
+            raise RequestRefused("Say --all or --operator, not both.")
+        if options.all or options.operator or options.baton:
+            operators: Any = robot.operators
+            if options.all:
+                operators = "all"
+            elif options.operator:
+                operators = [_operator(each, server) for each in options.operator]
+            wanted = {
+                "operators": operators,
+                "baton": robot.baton if options.baton is None else options.baton == "on",
+                "drill_days": robot.drill_days,
+                "watcher": robot.watcher,
+            }
+            body = msgspec.to_builtins(wanted)
+            robot = _changed(server, "PUT", f"{_path(options)}/rights", body)
+    print(one_line(f"{robot.name}: {_operators_text(robot)}"))
+    print(one_line(_baton_text(robot)))
+    return 0
+
+
+def _operator(asked: str, server: Server) -> dict[str, Any]:
+    """Return a right from ID[=DATE]. Raise RequestRefused if the date is none."""
+    id_, _, day = asked.partition("=")
+    names = _names(server)
+    right: dict[str, Any] = {"id": id_, "name": names.get(id_, id_)}
+    if day:
+        try:
+            end = datetime.fromisoformat(day) + timedelta(days=1)
+        except ValueError as wrong:
+            raise RequestRefused(f"{day!r} is no date; write it as 2027-01-31.") from wrong
+        right["until"] = end.astimezone().isoformat()
+    return right
+
+
+def _names(server: Server) -> dict[str, str]:
+    """Return the names of people and groups by id, as far as the editor knows them."""
+    try:
+        found = server.editor("GET", "/api/members").json()
+    except RequestRefused:
+        return {}
+    return {each["id"]: each["name"] for each in (*found["people"], *found["groups"])}
+
+
+def _show_baton(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        print(one_line(_baton_text(_robot(server, options.name))))
+    return 0
+
+
+def _take_baton(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        body = {"reason": options.reason}
+        print(one_line(_baton_text(_changed(server, "POST", f"{_path(options)}/baton/take", body))))
+    return 0
+
+
+def _hand_baton(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        here = server.runner("GET", "/api/rights").json()["people"]
+        found = [each for each in here if options.to in {each["id"], each["name"]}]
+        if len(found) != 1:
+            names = ", ".join(f"{each['name']} ({each['id']})" for each in here) or "nobody"
+            raise RequestRefused(
+                f"{len(found) or 'No'} person{'s' * (len(found) != 1)} called {options.to!r} can get it. Here "
+                f"are: {names}."
+            )
+        body = {"to": found[0]["id"]}
+        if options.run is not None:
+            server.runner("POST", f"/api/runs/{options.run}/hand_over", json=body)
+            print(one_line(f"run {options.run} goes on; it was handed over to {found[0]['name']}"))
+        else:
+            robot = _changed(server, "POST", f"{_path(options)}/baton/hand", body)
+            print(one_line(_baton_text(robot)))
+    return 0
+
+
+def _drop_baton(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        print(one_line(_baton_text(_changed(server, "POST", f"{_path(options)}/baton/drop"))))
+    return 0
+
+
+def _lock(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        robot = _changed(server, "POST", f"{_path(options)}/lock", {"reason": options.reason})
+    print(one_line(f"{robot.name} is out of service. What runs there was not stopped."))
+    return 0
+
+
+def _unlock(options: argparse.Namespace) -> int:
+    with running(options) as server:
+        locks = _robot(server, options.name).locks
+        named = [each.by.id for each in locks if options.of in {each.by.id, each.by.name}]
+        of = named[0] if options.of and len(named) == 1 else options.of
+        robot = _changed(server, "POST", f"{_path(options)}/unlock", {"of": of})
+    left = ", ".join(f"{each.by.name} ({each.reason})" for each in robot.locks)
+    print(one_line(f"{robot.name} is {f'still locked by {left}' if left else 'in service'}"))
+    return 0
+
+
+def _path(options: argparse.Namespace) -> str:
+    return f"/api/robots/{quote(options.name, safe='')}"
+
+
+def _robot(server: Server, name: str) -> "Robot":
+    from action_assistant.runner.robots.registration import Robot
+
+    return decoded(server.runner("GET", f"/api/robots/{quote(name, safe='')}"), Robot)
+
+
+def _changed(server: Server, method: str, path: str, body: Any = None) -> "Robot":
+    """Send a change of a robot, and return the robot after it."""
+    from action_assistant.runner.robots.registration import Robot
+
+    sent = {} if body is None else {"json": body}
+    return decoded(server.runner(method, path, **sent), Robot)
+
+
+def _operators_text(robot: "Robot") -> str:
+    if robot.operators == "all":
+        return "every operator may start there"
+    named = [
+        f"{each.name} ({each.id})"
+        + (f" until {each.until.astimezone():%Y-%m-%d %H:%M}" if each.until else "")
+        for each in robot.operators
+    ]
+    return f"only {', '.join(named) or 'nobody'} may start there"
+
+
+def _baton_text(robot: "Robot") -> str:
+    if not robot.baton:
+        return f"{robot.name} has no baton: every operator who may start there can"
+    if robot.holder is None:
+        return f"nobody holds the baton of {robot.name}, and nothing starts there until somebody takes it"
+    is_here = "" if robot.holder.here else ", and has no page open"
+    return f"{robot.holder.person.name} holds the baton of {robot.name}{is_here}"
+
+
 def _line(robot: "Robot") -> str:
-    """Return one robot as a line: its name, domain and state, and why it does not answer."""
+    """Return one robot as a line: its name, domain and state, why it does not answer, who holds its baton,
+    and who has put it out of service."""
     domain = "" if robot.domain is None else f"  domain {robot.domain}"
     why = f": {robot.why}" if robot.why else ""
-    return one_line(f"{robot.name}{domain}  {robot.state}{why}")
+    baton = ""
+    if robot.baton:
+        baton = f"  baton: {robot.holder.person.name if robot.holder else 'nobody'}"
+    locks = "".join(f"  OUT OF SERVICE ({each.by.name}: {each.reason})" for each in robot.locks)
+    return one_line(f"{robot.name}{domain}  {robot.state}{why}{baton}{locks}")
 
 
 def _profile(path: Path) -> dict[str, Any]:

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Final
 
 import anyio
+import msgspec
 from litestar import Litestar
 from litestar.types import ASGIApp
 
@@ -48,6 +49,7 @@ from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.audit.events import StopPressed
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.caller import BackgroundTasks
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, ScrapeToken
 from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.revocations import Revocations
@@ -119,6 +121,20 @@ async def open_services(
         await journal.close()
 
 
+def _identity_now(
+    standings: Standings, revoked: Revocations, identity: Identity
+) -> Identity | None:
+    """Return an identity with the role and groups of its person now; None if it, or its person, was
+    ended, or has expired. Without session and token it is that of the owner's token."""
+    credential = identity.session or identity.token
+    if credential is None:
+        return None if revoked.person_ended(identity.person.id) else identity
+    standing = standings.of(credential)
+    if revoked.ends(credential) or standing.expired:
+        return None
+    return msgspec.structs.replace(identity, person=standing.person, groups=standing.groups)
+
+
 def _note_idle_stop(audit: AuditLog, author: Author, robot: str, run: str) -> None:
     audit.note_repeated(StopPressed(robot, run), author.id)
 
@@ -154,6 +170,7 @@ async def _executing(
                     services.index_folders,
                 ),
                 # A run that moves again is read with all its visits, and waits behind no question.
+                identity_now=services.identity_now,
                 past=lambda run, is_whole: (own if is_whole else for_people).past(run, is_whole),
             ) as control,
         ):
@@ -242,6 +259,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     people_files = PeopleFiles(settings.data)
     browsers = SessionFiles(settings.data, revoked)
     standings = Standings(people_files, browsers, limits_of(settings.sessions))
+    services.identity_now = partial(_identity_now, standings, revoked)
     return application(
         [
             *routes(services),

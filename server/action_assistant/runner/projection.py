@@ -10,6 +10,14 @@ from sqlalchemy.dialects.sqlite import insert as upsert
 from action_assistant.journal.events import Event
 from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.robots.registration import RobotRegistered, RobotRemoved
+from action_assistant.runner.robots.rights import (
+    BatonPassed,
+    Holder,
+    Locked,
+    RightsSet,
+    Unlocked,
+)
+from action_assistant.runner.robots.robot_events import event_of, stream_of_robot
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Answered,
@@ -26,8 +34,10 @@ from action_assistant.runner.runs.events import (
 )
 from action_assistant.runner.runs.queries import OPEN
 from action_assistant.runner.runs.word_index import holds
-from action_assistant.schema.runner_tables import review, robot, run
+from action_assistant.schema.runner_tables import review, robot, robot_right, run
+from action_assistant.web.auth.keys import PersonRef
 
+_RIGHTS: Final = frozenset(each.kind for each in (RightsSet, BatonPassed, Locked, Unlocked))
 #: Columns of a run that have the same names in its request.
 _AS_REQUESTED: Final = set(run.c.keys()) & set(Requested.__struct_fields__)
 
@@ -43,6 +53,8 @@ def fold(event: Event) -> Sequence[Executable]:
     if event.kind == RobotRemoved.kind:
         gone = msgspec.json.decode(event.body, type=RobotRemoved)
         return (update(robot).where(robot.c.name == gone.name).values(retired_at=gone.at),)
+    if event.stream.startswith(stream_of_robot("")):
+        return _rights(event)
     if event.stream.startswith("run/"):
         return _run_changes(event.stream.removeprefix("run/"), decode(event.kind, event.body))
     return ()
@@ -126,7 +138,30 @@ def _first_summary(asked: Requested) -> dict[str, object]:
         summary["group"] = asked.group
     if asked.led is not None:
         summary |= {"robots": asked.led.robots, "lost": asked.led.lost}
+    if asked.batons:
+        summary["batons"] = asked.batons
     return summary
+
+
+def _rights(event: Event) -> Sequence[Executable]:
+    """Return the statement that a change of the rights of a robot means."""
+    if event.kind not in _RIGHTS:
+        return ()
+    values: dict[str, object]
+    match event_of(event):
+        case RightsSet(author=author, rules=rules):
+            values = {"rules": rules, "set_by": PersonRef(author.id, author.name)}
+        case BatonPassed(holder=person, at=at):
+            values = {"holder": None if person is None else Holder(person, at)}
+        case Locked(locks=locks) | Unlocked(locks=locks):
+            values = {"locks": locks}
+        case _:
+            return ()
+    values = {name: msgspec.to_builtins(value) for name, value in values.items()}
+    name = event.stream.removeprefix(stream_of_robot(""))
+    first: dict[str, object] = {"rules": {}, "set_by": None, "holder": None, "locks": []}
+    statement = upsert(robot_right).values(name=name, **(first | values))
+    return (statement.on_conflict_do_update(index_elements=["name"], set_=values),)
 
 
 def _robot(robot_: RobotRegistered) -> Executable:

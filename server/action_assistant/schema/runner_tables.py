@@ -74,6 +74,17 @@ robot: Final = Table(
     Column("retired_at", BigInteger),
     Column("led", Boolean(create_constraint=False), nullable=False, server_default=false()),
 )
+#: The rights of a robot, by its name: the rules of an owner, who set them, who holds its baton, and who
+#: has put it out of service. A robot that is forgotten keeps them.
+robot_right: Final = Table(
+    "robot_right",
+    RUNNER,
+    Column("name", Text, primary_key=True),
+    Column("rules", JSON, nullable=False),
+    Column("set_by", JSON(none_as_null=True)),
+    Column("holder", JSON(none_as_null=True)),
+    Column("locks", JSON, nullable=False),
+)
 #: What people noted about a run, and what may be searched of it once it is over (`summed`).
 review: Final = Table(
     "review",

@@ -20,6 +20,7 @@ from action_assistant.runner.runs.events import Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.views import RobotRestShown, run_view, time
 from action_assistant.runner.start.admission import GoOnRequest, WordRequest
+from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.umrf.model import Graph
 from runner.harness import (
     ANN,
@@ -58,9 +59,9 @@ class Lab:
         self.harness = Harness({"David": self.david, "Carol": self.carol})
 
     @asynccontextmanager
-    async def runner(self) -> AsyncIterator[ExecutionService]:
-        """A runner whose robots may be led, with their engines running."""
-        async with self.harness.runner() as control, anyio.create_task_group() as engines:
+    async def runner(self, now: IdentityNow = unchanged) -> AsyncIterator[ExecutionService]:
+        """A runner whose robots may be led, with their engines running. `now`: who was ended."""
+        async with self.harness.runner(now) as control, anyio.create_task_group() as engines:
             engines.start_soon(self.david.engine.run)
             engines.start_soon(self.carol.engine.run)
             for name in ("David", "Carol"):

@@ -278,6 +278,21 @@ export interface RunnerApi {
         is_late: boolean;
     };
     /**
+     * BatonHand
+     * @description Hands a baton, or a run with all batons of its robots, to a person who has a page open.
+     */
+    BatonHand: {
+        to: string;
+    };
+    /**
+     * BatonTake
+     * @description Takes a baton. `reason`: why it is taken over from its holder.
+     */
+    BatonTake: {
+        /** @default  */
+        reason?: string;
+    };
+    /**
      * Behaviour
      * @description The behaviour of one call of an action. Times are seconds.
      *
@@ -665,6 +680,18 @@ export interface RunnerApi {
         body: unknown;
     };
     /**
+     * HolderShown
+     * @description The holder of a baton. `here`: they have a page open; `falls_at`: when the baton falls if they
+     *     open none, null while they are here.
+     */
+    HolderShown: {
+        person: RunnerApi["PersonRef"];
+        /** Format: date-time */
+        since: string;
+        here: boolean;
+        falls_at: string | null;
+    };
+    /**
      * IncidentRequest
      * @description The body of a request to keep a run as an incident. `editor_audit`: the rows of the editor's
      *     audit about its graph, which the runner cannot ask for; they count as told by the client.
@@ -802,6 +829,8 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         held: RunnerApi["HeldShown"] | null;
+        lead?: RunnerApi["Author"];
+        batons?: string[];
         cause: string;
         pinned: boolean;
         note: string;
@@ -821,6 +850,23 @@ export interface RunnerApi {
         open_files: number | null;
         most_files: number;
         loop_lag_s: number;
+    };
+    /**
+     * LockShown
+     * @description A person who has put a robot out of service, since when, and why.
+     */
+    LockShown: {
+        by: RunnerApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        reason: string;
+    };
+    /**
+     * LockWanted
+     * @description Puts a robot out of service.
+     */
+    LockWanted: {
+        reason: string;
     };
     /**
      * MarkShown
@@ -897,6 +943,27 @@ export interface RunnerApi {
         id: string;
         text: string;
         moved: boolean;
+    };
+    /**
+     * OperatorShown
+     * @description A person or a group, by id, who may start on a robot. `until`: when that ends; null for never.
+     */
+    OperatorShown: {
+        id: string;
+        name: string;
+        until: string | null;
+    };
+    /**
+     * OperatorWanted
+     * @description A person or a group, by id, who may start on a robot. `name`: for sentences; `until`: when that
+     *     ends, null for never.
+     */
+    OperatorWanted: {
+        id: string;
+        /** @default  */
+        name?: string;
+        /** @default null */
+        until?: string | null;
     };
     /**
      * Origin
@@ -1293,12 +1360,50 @@ export interface RunnerApi {
         token?: string | null;
     };
     /**
+     * RightShown
+     * @description The rights of the asker on a robot. `why`: why they may not start there, "" if they may; `holds`:
+     *     they hold its baton; `may_take`: they may take its baton, with a reason if somebody holds it.
+     */
+    RightShown: {
+        robot: string;
+        why: string;
+        holds: boolean;
+        may_take: boolean;
+    };
+    /**
+     * RightsShown
+     * @description The rights of the asker on all robots. `people`: those who have a page open and may start on
+     *     robots, to whom a baton can be handed.
+     */
+    RightsShown: {
+        robots: RunnerApi["RightShown"][];
+        people: RunnerApi["PersonRef"][];
+    };
+    /**
+     * RightsWanted
+     * @description The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
+     *     `baton`: only the holder of its baton may; `drill_days`: the age in days of the last Stop drill from
+     *     which nothing starts, null for any; `watcher`: each start names who watches the robot.
+     */
+    RightsWanted: {
+        /** @default all */
+        operators?: "all" | RunnerApi["OperatorWanted"][];
+        /** @default false */
+        baton?: boolean;
+        /** @default null */
+        drill_days?: number | null;
+        /** @default false */
+        watcher?: boolean;
+    };
+    /**
      * Robot
      * @description An engine as people see it. `why`: explains any state but `answering`.
      *
      *     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
      *     besides this runner. `actions`, `graphs`: the size of its index; null before its first answer.
-     *     `pauses`: pausing is safe on it.
+     *     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
+     *     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
+     *     `drill_days`, `watcher`: what an owner asks for before a start.
      */
     Robot: {
         name: string;
@@ -1325,6 +1430,12 @@ export interface RunnerApi {
         holds: RunnerApi["HeldGraph"][];
         actions: number | null;
         graphs: number | null;
+        operators: "all" | RunnerApi["OperatorShown"][];
+        baton: boolean;
+        drill_days: number | null;
+        watcher: boolean;
+        holder: RunnerApi["HolderShown"] | null;
+        locks: RunnerApi["LockShown"][];
     };
     /**
      * RobotChange
@@ -1367,14 +1478,15 @@ export interface RunnerApi {
     /**
      * RobotLogLine
      * @description A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of
-     *     graphs for its index; `files`: the files that were written for it.
+     *     graphs for its index; `files`: the files that were written for it. Of a change of its rights,
+     *     `sender`: who made it, "" for the runner; `how`: how its baton passed, from `was` to `to`.
      */
     RobotLogLine: {
         seq: number;
         /** Format: date-time */
         at: string;
         /** @enum {string} */
-        kind: "became" | "commanded" | "index_write_asked" | "index_written" | "stop_asked" | "stop_proven" | "stop_unproven";
+        kind: "baton" | "became" | "commanded" | "index_write_asked" | "index_written" | "locked" | "rights_set" | "stop_asked" | "stop_proven" | "stop_unproven" | "unlocked";
         command: string;
         graph: string;
         sender: string;
@@ -1385,6 +1497,9 @@ export interface RunnerApi {
         has_graph: boolean;
         graphs: string[];
         files: RunnerApi["GraphFile"][];
+        how: ("dropped" | "fell" | "forced" | "handed" | "off" | "taken") | "";
+        was: string;
+        to: string;
     };
     /**
      * RobotRestShown
@@ -1528,6 +1643,8 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         held: RunnerApi["HeldShown"] | null;
+        lead?: RunnerApi["Author"];
+        batons?: string[];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -1541,7 +1658,8 @@ export interface RunnerApi {
      * @description A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
      *     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a conducted run, the
      *     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
-     *     further.
+     *     further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
+     *     held at the start.
      */
     RunSummary: {
         id: string;
@@ -1577,6 +1695,8 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         held: RunnerApi["HeldShown"] | null;
+        lead?: RunnerApi["Author"];
+        batons?: string[];
     };
     /**
      * RunWhole
@@ -1618,6 +1738,8 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         held: RunnerApi["HeldShown"] | null;
+        lead?: RunnerApi["Author"];
+        batons?: string[];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -1921,6 +2043,14 @@ export interface RunnerApi {
         address: string;
     };
     /**
+     * UnlockWanted
+     * @description Takes one's own lock off a robot, or as an owner that of the person `of`.
+     */
+    UnlockWanted: {
+        /** @default  */
+        of?: string;
+    };
+    /**
      * VisitShown
      * @description One visit of an action. It began between `not_before` and `from`, and ended between `until`
      *     (null: no end was seen) and `not_after` (null: it may still be running). If `until` is before
@@ -2094,6 +2224,30 @@ export interface RunnerPaths {
     };
     "/api/robots/{name}/index": {
         post: RunnerOperations["writeIntoIndex"];
+    };
+    "/api/robots/{name}/rights": {
+        put: RunnerOperations["setRobotRights"];
+    };
+    "/api/rights": {
+        get: RunnerOperations["getRights"];
+    };
+    "/api/robots/{name}/baton/take": {
+        post: RunnerOperations["takeBaton"];
+    };
+    "/api/robots/{name}/baton/hand": {
+        post: RunnerOperations["handBaton"];
+    };
+    "/api/robots/{name}/baton/drop": {
+        post: RunnerOperations["dropBaton"];
+    };
+    "/api/runs/{run}/hand_over": {
+        post: RunnerOperations["handOverRun"];
+    };
+    "/api/robots/{name}/lock": {
+        post: RunnerOperations["lockRobot"];
+    };
+    "/api/robots/{name}/unlock": {
+        post: RunnerOperations["unlockRobot"];
     };
     "/api/approvals": {
         get: RunnerOperations["listApprovals"];
@@ -2690,6 +2844,143 @@ interface RunnerOperations {
             200: {
                 content: {
                     "application/json": RunnerApi["IndexWriteAnswer"];
+                };
+            };
+        };
+    };
+    setRobotRights: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["RightsWanted"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    getRights: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RightsShown"];
+                };
+            };
+        };
+    };
+    takeBaton: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["BatonTake"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    handBaton: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["BatonHand"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    dropBaton: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    handOverRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["BatonHand"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    lockRobot: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["LockWanted"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    unlockRobot: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["UnlockWanted"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
                 };
             };
         };

@@ -17,8 +17,10 @@ import { CONDUCTED } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { serverPath } from "../../api/page-url";
 import { useMay } from "../../api/people";
+import { useRight } from "../../api/rights";
 import { type Preflight, type PreflightItem, SIMULATOR } from "../../api/robots";
 import { type IndexFolderLook, writeIntoIndex } from "../../api/starts";
+import { TakeBaton } from "../../status/robot-rights";
 import { HoldButton } from "../../ui/hold-button";
 import { colorOfName } from "../../ui/name-colors";
 import { isolated } from "../../words/isolated";
@@ -88,6 +90,9 @@ function Line({ item, look, moment }: PreflightLineProps) {
           <IndexWriting item={item} look={look} robot={look.engine} {...moment} />
         )}
         <InsideRemedies item={item} look={look} {...moment} />
+        {item.code === "baton" && item.verdict === "blocked" && (
+          <BatonRemedy engine={look.engine} onTaken={moment.onLookAgain} />
+        )}
         {item.code === "values" && item.verdict === "blocked" && (
           <span className={style.remedies}>
             <a
@@ -101,6 +106,19 @@ function Line({ item, look, moment }: PreflightLineProps) {
         )}
       </span>
     </li>
+  );
+}
+
+/** Offers the baton of a robot that it would need. */
+function BatonRemedy({ engine, onTaken }: { engine: string; onTaken: () => void }) {
+  const { now } = useLive();
+  const robot = now.engines.find(({ name }) => name === engine);
+  const mayTake = useRight(engine)?.may_take ?? false;
+  if (robot === undefined || !mayTake) return null;
+  return (
+    <span className={style.remedies}>
+      <TakeBaton robot={robot} onTaken={onTaken} />
+    </span>
   );
 }
 

@@ -10,10 +10,12 @@ import { fetchInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useMay, usePerson } from "../../api/people";
+import { useRight } from "../../api/rights";
 import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
 import type { Run } from "../../api/runs";
 import { type Approval, approve, fetchApprovals, runPreflight } from "../../api/starts";
 import { HelpLink } from "../../status/help-link";
+import { batonWords } from "../../status/robot-rights";
 import { EngineLabel } from "../../status/state-label";
 import { HoldButton } from "../../ui/hold-button";
 import { textScope, useKeptText } from "../../ui/kept-texts";
@@ -119,7 +121,27 @@ function Choice({ robot, on, may, behaviours, onToggle }: ChoiceProps) {
         <EngineLabel robot={robot} />
       )}
       {!robot.simulated && !may && <span className="quiet-xs">operators only</span>}
+      {!robot.simulated && may && <RightWords robot={robot} />}
     </label>
+  );
+}
+
+/** Says in a few words what keeps a start from a robot; the look says it in whole sentences. */
+function RightWords({ robot }: { robot: Robot }) {
+  const { person } = usePerson();
+  const why = useRight(robot.name)?.why ?? "";
+  const words =
+    robot.locks.length > 0
+      ? "OUT OF SERVICE"
+      : robot.baton
+        ? batonWords(robot, person.id)
+        : why !== ""
+          ? "you may not start here"
+          : "";
+  return words === "" ? null : (
+    <span className={why === "" ? "quiet-xs" : "quiet-xs ink-warn"} title={why}>
+      {words}
+    </span>
   );
 }
 

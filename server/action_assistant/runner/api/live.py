@@ -321,12 +321,17 @@ async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
     box.post(await hub.hello())
     hub.boxes.add(box)
     try:
-        async with anyio.create_task_group() as tasks:
-            tasks.start_soon(_read, socket, hub, box, author, tasks.cancel_scope)
-            await _write(socket, box)
-            tasks.cancel_scope.cancel()
+        with hub.control.rights.here(identity_of(socket)):
+            await _attend(socket, hub, box, author)
     finally:
         hub.boxes.discard(box)
+
+
+async def _attend(socket: WebSocket[Any, Any, Any], hub: Hub, box: Outbox, author: Author) -> None:
+    async with anyio.create_task_group() as tasks:
+        tasks.start_soon(_read, socket, hub, box, author, tasks.cancel_scope)
+        await _write(socket, box)
+        tasks.cancel_scope.cancel()
 
 
 async def _read(

@@ -16,6 +16,14 @@ from action_assistant.runner.links.behaviours.folder import BehaviourList
 from action_assistant.runner.links.port import Candidate, Registration, Sighting
 from action_assistant.runner.robots.recordings import Recording
 from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.robots.rights import (
+    BatonChange,
+    BatonPassed,
+    Locked,
+    RightsEvent,
+    RightsSet,
+    Unlocked,
+)
 from action_assistant.runner.robots.robot_events import (
     Commanded,
     EngineBecame,
@@ -36,11 +44,12 @@ from action_assistant.runner.start.index_writer import (
 )
 from action_assistant.runner.start.preflight import Preflight
 from action_assistant.safe_text import hold_names
+from action_assistant.umrf.facts import SECOND_PERSON
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import write_action
 from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Signature
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, identity_of, require
 from action_assistant.web.server.openapi import FileBytes, answer, reads
 
 _EVENTS: Final = 200
@@ -86,7 +95,8 @@ class RobotKnowledge(msgspec.Struct, frozen=True):
 
 class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
     """A line of a robot's flight record. `has_graph`: its graph can be fetched; `graphs`: names of
-    graphs for its index; `files`: the files that were written for it."""
+    graphs for its index; `files`: the files that were written for it. Of a change of its rights,
+    `sender`: who made it, "" for the runner; `how`: how its baton passed, from `was` to `to`."""
 
     seq: int
     at: datetime
@@ -98,6 +108,10 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
         "stop_unproven",
         "index_write_asked",
         "index_written",
+        "rights_set",
+        "baton",
+        "locked",
+        "unlocked",
     ]
     command: str = ""
     graph: str = ""
@@ -109,6 +123,9 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
     has_graph: bool = False
     graphs: tuple[str, ...] = ()
     files: tuple[GraphFile, ...] = ()
+    how: BatonChange | Literal[""] = ""
+    was: str = ""
+    to: str = ""
 
     def __post_init__(self) -> None:
         hold_names(self, "why")
@@ -188,6 +205,7 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("register")],
     )
     async def register(data: Registration, request: _Asking) -> Response[Robot]:
+        _require_owner_to_loosen(services, data.name, data, request)
         robot = await services.control.register(data, author_of(request))
         return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
 
@@ -205,6 +223,7 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
             registration = msgspec.convert(changed, Registration)
         except msgspec.ValidationError as wrong:
             raise BadInput(str(wrong)) from wrong
+        _require_owner_to_loosen(services, name, registration, request)
         return await services.control.register(registration, author_of(request))
 
     @delete(
@@ -214,9 +233,22 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("register")],
     )
     async def remove(name: str, request: _Asking) -> None:
+        _require_owner_to_loosen(services, name, None, request)
         await services.control.remove(name, author_of(request))
 
     return [robots, reach, candidates, sighting, register, change, remove]
+
+
+def _require_owner_to_loosen(
+    services: RunnerServices, name: str, wanted: Registration | None, request: _Asking
+) -> None:
+    """Raise Forbidden if somebody who is no owner lets a robot start without a second person from now
+    on. `wanted`: its new registration, None if it is to be forgotten."""
+    robots = services.control.robots
+    known = robots.registration(name) if name in robots.names else None
+    asks = known is not None and known.profile.get(SECOND_PERSON) is True
+    if asks and (wanted is None or wanted.profile.get(SECOND_PERSON) is not True):
+        require(request, "share")
 
 
 def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
@@ -339,7 +371,8 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def look(request: _Asking) -> list[Preflight]:
         async with body_of(request, services.body_limit) as body:
-            return await services.control.look(read_group(body), person_of(request).id)
+            group, me = read_group(body), identity_of(request)
+            return await services.control.look(group, me.person.id, me)
 
     @post(
         "/api/groups",
@@ -354,7 +387,9 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         async with body_of(request, services.body_limit) as body:
             group = read_group(body)
             with noted(services, request, refusal_of(group)):
-                grouped = await services.control.start_group(group, author_of(request))
+                grouped = await services.control.start_group(
+                    group, author_of(request), identity_of(request)
+                )
         runs = [views.run_view(run) for run in grouped.runs]
         shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
         return Response(shown, status_code=201 if grouped.fresh else 200)
@@ -422,8 +457,33 @@ def _line(seq: int, event: RobotEvent) -> RobotLogLine:
                 files=event.files,
                 why=event.why,
             )
+        case RightsSet() | BatonPassed() | Locked() | Unlocked():
+            return _rights_line(seq, event)
         case _:
             assert_never(event)
+
+
+def _rights_line(seq: int, event: RightsEvent) -> RobotLogLine:
+    at = views.time(event.at)
+    by = "" if event.author is None else event.author.name
+    match event:
+        case RightsSet():
+            return RobotLogLine(seq=seq, at=at, kind="rights_set", sender=by)
+        case BatonPassed(how=how, was=was, holder=holder, reason=why):
+            return RobotLogLine(
+                seq=seq,
+                at=at,
+                kind="baton",
+                sender=by,
+                why=why,
+                how=how,
+                was="" if was is None else was.name,
+                to="" if holder is None else holder.name,
+            )
+        case Locked(reason=why):
+            return RobotLogLine(seq=seq, at=at, kind="locked", sender=by, why=why)
+        case Unlocked(of=of):
+            return RobotLogLine(seq=seq, at=at, kind="unlocked", sender=by, was=of.name)
 
 
 async def _behaviours(services: RunnerServices) -> BehaviourList | None:

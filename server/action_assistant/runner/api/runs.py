@@ -22,7 +22,7 @@ from action_assistant.runner.analysis.course_checks import (
     propose,
 )
 from action_assistant.runner.analysis.expected_runs import Expect, Expectation
-from action_assistant.runner.api import review, robots
+from action_assistant.runner.api import review, rights, robots
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of, start_of
 from action_assistant.runner.api.live import (
     PageMessage,
@@ -53,7 +53,14 @@ from action_assistant.umrf.semantics import Script
 from action_assistant.web.audit.events import StartRefused
 from action_assistant.web.audit.routes import audit_routes
 from action_assistant.web.audit.rows import AuditFilter
-from action_assistant.web.auth.access import Needs, PersonOnly, person_of, refuse, require
+from action_assistant.web.auth.access import (
+    Needs,
+    PersonOnly,
+    identity_of,
+    person_of,
+    refuse,
+    require,
+)
 from action_assistant.web.server.openapi import answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once
@@ -77,6 +84,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         *_commands(services),
         *_queries(services),
         *robots.routes(services),
+        *rights.routes(services),
         *_approvals(services),
         *_expected_courses(services),
         *_course_checks(services),
@@ -108,7 +116,9 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
             with noted(services, request, refusal_of(start_request)):
                 if engines_of(start_request):
                     require(request, "operate")
-                started = await services.control.start(start_request, author_of(request))
+                started = await services.control.start(
+                    start_request, author_of(request), identity_of(request)
+                )
         return Response(
             await _run_view(services, started.run),
             status_code=201 if started.fresh else 200,
@@ -179,7 +189,9 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def resume(run: str, request: _Asking) -> views.RunShown:
         with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
             await _require_command_role(services, run, request)
-            return views.run_view(await services.control.resume(run, author_of(request)))
+            return views.run_view(
+                await services.control.resume(run, author_of(request), identity_of(request))
+            )
 
     @post(
         "/api/runs/{run:str}/modify",
@@ -194,7 +206,9 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         with noted(services, request, StartRefused(what="change", why="", run=run[:100])):
             await _require_command_role(services, run, request)
             async with body_of(request, services.body_limit) as body:
-                return views.run_view(await services.control.modify(run, body, author_of(request)))
+                me = identity_of(request)
+                changed = await services.control.modify(run, body, author_of(request), me)
+                return views.run_view(changed)
 
     @post(
         "/api/runs/{run:str}/at_rest",
@@ -219,7 +233,8 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def go_on(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), GoOnRequest)
         with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
-            return views.run_view(await services.control.go_on(run, asked, author_of(request)))
+            me = identity_of(request)
+            return views.run_view(await services.control.go_on(run, asked, author_of(request), me))
 
     @post(
         "/api/runs/{run:str}/outcome",
@@ -231,7 +246,10 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def outcome(run: str, request: _Asking) -> views.RunShown:
         asked = decoded(await request.body(), WordRequest)
-        return views.run_view(await services.control.give_outcome(run, asked, author_of(request)))
+        me = identity_of(request)
+        return views.run_view(
+            await services.control.give_outcome(run, asked, author_of(request), me)
+        )
 
     return [stop_all, stop, pause, resume, modify, at_rest, go_on, outcome]
 

@@ -15,6 +15,7 @@ from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_graphs import Sent
 from action_assistant.runner.start.index_writer import IndexWriter
+from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
 from action_assistant.web.workers.lanes import Lane, RunInWorker
@@ -39,9 +40,11 @@ class RunnerServices:
     index_folders: Mapping[str, Path]
     index_writer: IndexWriter
     sent: WeakKeyDictionary[OpenRun, Sent]
+    identity_now: IdentityNow
 
     def __init__(self) -> None:
         self.behaviours = None
+        self.identity_now = unchanged
         self.index_folders = {}
         self.sent = WeakKeyDictionary()
         self.body_limit = ConcurrencyLimit(_BODIES)

@@ -1,6 +1,7 @@
 """The steps of a conducted run, and the gate before them."""
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from math import inf
 from typing import Final, Protocol
@@ -115,6 +116,7 @@ class Step:
         self.is_stopped = False  # the graph or a person wants it to end
         self.is_led = True  # its task goes on
         self.has_not_left = False  # its piece was refused before it left, or by its robot
+        self.was_held_back = False  # by the gate, before it left
         self.lacks_output = False
         self.troubles: set[str] = set()  # those that were reported
         self.alarms: set[tuple[str, str]] = set()  # those of its piece that were passed on
@@ -193,23 +195,26 @@ class Step:
     def renew(self) -> None:
         """Forget a piece that was not sent, so that another one can be sent for the same step."""
         self.piece, self.run, self.shown, self.has_not_left = None, None, None, False
+        self.was_held_back = False
         self.shown_inside = {}
         self.over, self.rested = anyio.Event(), anyio.Event()
 
 
 class Gate:
     """Decides whether a further piece of a conducted run may be sent to a robot. `held`: the event
-    that says why none may for now, None if it is open; `is_final`: none ever will."""
+    that says why none may for now, None if it is open; `is_final`: none ever will;
+    `is_waiting`: none may for a moment, in which a change is stored."""
 
     def __init__(self, held: Held | None = None) -> None:
         self.held = held
         self.is_final = False
+        self.is_waiting = False
         self._opened = anyio.Event()
 
     @property
     def is_open(self) -> bool:
-        """True if a piece may be sent now: the gate is neither held nor closed."""
-        return self.held is None and not self.is_final
+        """True if a piece may be sent now: the gate is neither held, closed nor waiting."""
+        return self.held is None and not self.is_final and not self.is_waiting
 
     def close(self) -> None:
         """Close the gate for good: no piece is sent any more."""
@@ -223,6 +228,19 @@ class Gate:
     def release(self) -> None:
         """Let the pieces go on, unless the gate is closed for good."""
         self.held = None
+        self._open()
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Let no piece begin until the end of the block."""
+        self.is_waiting = True
+        try:
+            yield
+        finally:
+            self.is_waiting = False
+            self._open()
+
+    def _open(self) -> None:
         self._opened.set()
         self._opened = anyio.Event()
 

@@ -28,7 +28,6 @@ from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.conducted_steps import (
     GRAPH,
     RUNNER,
-    Gate,
     Leading,
     LeftOpen,
     RestNews,
@@ -41,7 +40,8 @@ from action_assistant.runner.execution.conducted_steps import (
     seen_inside,
     seen_of,
 )
-from action_assistant.runner.execution.led_look import Cleared, LedLook
+from action_assistant.runner.execution.led_gate import LedGate
+from action_assistant.runner.execution.led_look import Cleared, LedLook, NotAllowed
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.piece_values import PieceValues, returned_of
 from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
@@ -77,10 +77,9 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Author,
-    Held,
     PieceBegan,
-    Released,
     Requested,
+    RunEvent,
 )
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Run
@@ -88,6 +87,7 @@ from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.start.piece_texts import PieceText
 from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.semantics import Returned
+from action_assistant.web.auth.identity import Identity
 
 log: Final = logging.getLogger(__name__)
 
@@ -103,7 +103,8 @@ class Conductor:
     """Leads a conducted run. To that run it is the link to one engine.
     `first`: the first event of the run; `texts`: the pieces by full name of their action; `engine`
     plays the whole graph, and `make_engine` makes another one if it fails; `left`: how far an
-    earlier process led the run."""
+    earlier process led the run; `lead`: for whom it is led, None until somebody lets it go on after a
+    restart."""
 
     simulated: Final = False
     pauses: Final = False
@@ -121,6 +122,7 @@ class Conductor:
         claims: IdempotentStarts,
         clock_us: ClockUs,
         left: "LeftOpen | None" = None,
+        lead: Identity | None = None,
     ) -> None:
         assert first.led is not None
         self._first = first
@@ -140,7 +142,7 @@ class Conductor:
         self._runs = runs
         self._claims = claims
         self._clock_us = clock_us
-        self._gate = Gate()
+        self.gate: Final = LedGate(first, lead, robots, look, clock_us, self._tell)
         self._left = left
         self._leading: Leading | None = None
         self._steps: dict[int, Step] = {}
@@ -203,7 +205,7 @@ class Conductor:
     def _stop_pieces(self, author: Author, *, is_press: bool) -> None:
         """Let no piece begin any more, and begin to stop the open ones. One that is being stopped
         already is stopped again only if a person pressed Stop (`is_press`)."""
-        self._gate.close()
+        self.gate.close()
         for step in self._steps.values():
             step.end()
         for piece in (*(step.piece for step in self._steps.values()), *self._again.values()):
@@ -231,7 +233,7 @@ class Conductor:
 
     def _answer_without_engine(self) -> Answer:
         """Return the whole graph without an engine: stopped when no piece is or becomes open."""
-        at, is_over = self._clock_us(), self._gate.is_final and not self._is_going
+        at, is_over = self._clock_us(), self.gate.is_final and not self._is_going
         ended = {name: state for name, state in self._others.items() if state not in ACTIVE}
         nodes = dict.fromkeys(self._first.actions, "UNINITIALIZED") | ended | self._states
         if is_over and self._unproven is not None:
@@ -255,7 +257,7 @@ class Conductor:
             tasks.start_soon(self._engine.run)
             for step in self._steps.values():  # begun before this task
                 tasks.start_soon(self._lead, step)
-            tasks.start_soon(self._stalls.run, self.hold)
+            tasks.start_soon(self._stalls.run, self.gate.hold_run)
             left, self._left = self._left, None
             if left is not None:
                 self._began, self._course = left.course.began, list(left.course.steps)
@@ -288,7 +290,7 @@ class Conductor:
             case Transitions(run=run, changes=changes):
                 self._show(run, changes)
             case EngineChanged(state=("gone" | "busy"), why=why):
-                self.hold(f"What leads this run has failed, and was begun again. {why}")
+                self.gate.hold_run(f"What leads this run has failed, and was begun again. {why}")
                 self._failed.set()
             case _:
                 return
@@ -325,7 +327,7 @@ class Conductor:
                     await self._engine.returned(each)
         except (EngineRefused, NotSent, NoAnswer) as why:
             log.warning("run %s: no engine leads it: %s", self._first.run, why)
-            self.hold(f"What leads this run cannot be begun again: {why}")
+            self.gate.hold_run(f"What leads this run cannot be begun again: {why}")
             self._failed.set()
 
     def _now_ms(self) -> float:
@@ -343,7 +345,7 @@ class Conductor:
                     self._others[each.node] = each.state
         self._waiting += shown
         self._show_what_may_be(run)
-        if self._ends(self._waiting) and not self._gate.is_final:  # nothing may go on
+        if self._ends(self._waiting) and not self.gate.is_final:  # nothing may go on
             for step in self._steps.values():
                 self._end_step(step, GRAPH)
 
@@ -359,7 +361,7 @@ class Conductor:
             is_end = isinstance(first, GraphResult) or self._ends([first])
             if is_end and self._is_going:
                 break
-            if is_end and self._gate.is_final and self._unproven is not None:
+            if is_end and self.gate.is_final and self._unproven is not None:
                 self._run.rests(self._unproven)
             ready.append(self._waiting.pop(0))
             if isinstance(first, GraphState) and first.graph == self._first.graph_name:
@@ -382,7 +384,7 @@ class Conductor:
                 await self._lead_in_turn(step)
         except Exception as error:  # the other steps go on; nothing further begins
             log.exception("run %s: %s cannot be led", self._first.run, step.node)
-            self.hold(f"The runner has a fault at {step.node}: {error!r}")
+            self.gate.hold_run(f"The runner has a fault at {step.node}: {error!r}")
         step.is_led = False
         self._show_what_may_be(self._first.run)
 
@@ -415,7 +417,7 @@ class Conductor:
     async def _hand_over(self, step: Step) -> None:
         """Send the piece of a step once the gate is open, if its robot may begin it; otherwise hold
         or stop the run, as the starter chose."""
-        await self._gate.wait()
+        await self.gate.wait()
         began = anyio.current_time()
         try:  # nothing begins while its causes are not in the journal
             with anyio.fail_after(_STORED_S):
@@ -428,7 +430,11 @@ class Conductor:
             return
         robot = self._robots.reachable(step.engine)
         try:
-            cleared = await self._look.before_piece(robot, self._first)
+            cleared = await self._look.before_piece(robot, self._first, self.gate.person)
+        except NotAllowed as why:  # whatever the starter has chosen, this stops nothing
+            if not self.gate.is_waiting:
+                self.gate.hold_run(str(why))
+            return
         except NoAnswer as why:
             self._trouble(step, "silent", f"{step.engine} was not given {step.node}: {why}", began)
             return
@@ -479,7 +485,10 @@ class Conductor:
 
     def _may_leave(self, step: Step, cleared: Cleared) -> None:
         """Raise NotSent if a piece that is about to leave may not begin. The call does not wait."""
-        if not self._gate.is_open or step.is_stopped:
+        if self.gate.is_open and (why := self.gate.why_not_allowed(step.engine)):
+            self.gate.hold_run(why)
+        if not self.gate.is_open or step.is_stopped:
+            step.was_held_back = True
             raise NotSent("the run was held or stopped before it left")
         if self._stalls.stands_still:
             raise NotSent("the runner stood still before it left")
@@ -514,6 +523,9 @@ class Conductor:
             return
         step.over.set()
         self._note_end(run)
+
+    def _tell(self, event: RunEvent, author: str = "", /) -> None:
+        self._run.tell(event, author)
 
     def _note_end(self, piece: Run) -> None:
         """Report the end of the whole graph if that waited for the end of this piece."""
@@ -560,7 +572,7 @@ class Conductor:
         where = f"{step.node} on {step.engine}"
         if run.end == "refused":
             step.has_not_left = True
-            if self._gate.is_open and not self._stalls.stands_still:
+            if self.gate.is_open and not (step.was_held_back or self._stalls.stands_still):
                 self._trouble(step, "refused", f"{where} was not begun: {run.detail}")
             return None
         if outcome == "on_stopped" and step.lacks_output:
@@ -623,41 +635,25 @@ class Conductor:
         if self._led.lost == "stop":
             self._run.stop(RUNNER)
         else:
-            self.hold(why)
+            self.gate.hold_run(why)
 
     def _alarm(self, code: str, text: str) -> None:
         self._run.tell(AlarmRaised(self._clock_us(), code, text))
 
     # --- the gate -----------------------------------------------------------------------------
 
-    def hold(self, why: str, by: Author | None = None) -> None:
-        """Send no further piece until a person lets the run go on. `by` is None for the runner. Do
-        nothing if the run is held or stopped already."""
-        if self._gate.held is None and not self._gate.is_final:
-            held = Held(at=self._clock_us(), why=why, by=by)
-            self._gate.hold(held)
-            self._run.tell(held)
-
-    async def go_on(self, author: Author, request_id: str) -> None:
-        """Wait until every robot that has a step has answered, then let a held run go on. Raise
-        Conflict if one may begin no piece or no engine leads the run, or if it is held no more."""
+    async def go_on(self, author: Author, lead: Identity, request_id: str) -> None:
+        """Let a held run go on for `lead`, once every robot that has a step of it has answered. Raise
+        Conflict if no engine leads the run, and as `LedGate.go_on` does."""
         if self._is_past_help:
             raise Conflict("What leads this run has failed too often: only Stop is left.")
         if not self._has_engine:
             raise Conflict("What leads this run is being begun again. Try that in some seconds.")
-        held = self._gate.held
         names = {step.engine for step in self._steps.values() if not step.over.is_set()}
         names |= {piece.run.engine for piece in self._again.values() if piece.run.end is None}
-        await self._look.before_going_on(self._robots, names, self._first)
-        if held is None or self._gate.held is not held or self._gate.is_final:
-            raise Conflict("The run has gone on, or was stopped, meanwhile.")
+        await self.gate.go_on(author, lead, names, request_id)
         for step in self._steps.values():
             step.troubles &= {"ended"}
-        released = Released(
-            at=self._clock_us(), author=author, since=held.at, request_id=request_id
-        )
-        self._run.tell(released, author.id)
-        self._gate.release()
 
     def give_word(self, node: str, word: Word) -> anyio.Event:
         """Take the outcome of an action (`node`) that a person states; return an event that is set
@@ -682,7 +678,7 @@ class Conductor:
                 self._note_end(again)
             return
         is_known, self._again[again.id] = again.id in self._again, piece
-        if self._gate.is_final and again.desired != "stopped":
+        if self.gate.is_final and again.desired != "stopped":
             piece.stop(self._stopped_by, "")
         if not is_known:
             self._act_on(f"{again.graph_name} moves again on {again.engine}.", "moves_again")

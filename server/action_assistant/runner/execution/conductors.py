@@ -1,7 +1,7 @@
 """Opens conducted runs: new ones, and those that an earlier process left."""
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from contextlib import AbstractAsyncContextManager, nullcontext
 from typing import Final, Literal
 from weakref import WeakValueDictionary
@@ -24,6 +24,7 @@ from action_assistant.runner.execution.piece_values import returned_of
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.unread_runs import UNREAD, UnreadRun
 from action_assistant.runner.links.led_calls import LedCourse
+from action_assistant.runner.links.port import Leaves, unwatched
 from action_assistant.runner.links.simulator import LeadableLink, Simulator
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import (
@@ -43,6 +44,7 @@ from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.start.piece_texts import PieceText, piece_texts
 from action_assistant.umrf.semantics import Returned
+from action_assistant.web.auth.identity import Identity
 
 log: Final = logging.getLogger(__name__)
 
@@ -82,10 +84,13 @@ class Conductors:
         *,
         seq: int = 1,
         left: LeftOpen | None = None,
+        lead: Identity | None = None,
+        may_leave: Leaves = unwatched,
     ) -> OpenRun:
         """Open a stored conducted run, and return it. `first`: its first event; `seq`: the number
         of its last stored event; `texts`: its pieces by full name of their action; `engine` plays
-        the whole graph; `left`: how far an earlier process led it, None for a new run."""
+        the whole graph; `left`: how far an earlier process led it, None for a new run;
+        `lead`: for whom it is led; `may_leave`: as for `OpenRuns.open`."""
         conductor = Conductor(
             first,
             texts,
@@ -97,8 +102,16 @@ class Conductors:
             claims=self._claims,
             clock_us=self._runtime.clock_us,
             left=left,
+            lead=lead,
         )
-        opened = self._runs.open(run, conductor, owns_link=True, seq=seq, pressed=conductor.close)
+        opened = self._runs.open(
+            run,
+            conductor,
+            owns_link=True,
+            seq=seq,
+            pressed=conductor.close,
+            may_leave=may_leave,
+        )
         conductor.leads(_leading(opened))
         self._open[run.id] = conductor
         return opened
@@ -113,7 +126,7 @@ class Conductors:
         texts = await self._runtime.run_in_worker(piece_texts, first.umrf, first.subgraphs)
         opened = self.open(first, run, texts, self._engine_for(first), seq=seq, left=left)
         if run.desired != "stopped":
-            self._open[run.id].hold("The runner was restarted while it led this run.")
+            self._open[run.id].gate.hold_run("The runner was restarted while it led this run.")
         for piece, last in left.again:  # each reports itself to the conductor (`_see`) once opened
             link = self._robots.link(piece.engine)
             self._runs.drive(self._runs.open(piece, link, owns_link=False, seq=last))
@@ -157,14 +170,29 @@ class Conductors:
         that a repeat of it waits for the first one. A request without an id ("") has no lock."""
         return self._claims.once(f"{run} {request_id}") if request_id else nullcontext()
 
-    async def go_on(self, run: str, author: Author, request_id: str) -> None:
-        """Let the held run with the id `run` go on, in the name of `author`; wait for the answers
-        of its robots. Raise Conflict if nothing can lead it any more, or one of its robots may
-        begin no piece."""
+    async def go_on(self, run: str, author: Author, lead: Identity, request_id: str) -> None:
+        """Let a held run go on for `lead`. Raise Conflict if nothing can lead it any more, or one of its
+        robots may begin no piece."""
+        await self._conductor(run).go_on(author, lead, request_id)
+
+    async def hand_over(
+        self, run: str, author: Author, to: Identity, pass_batons: Callable[[], Awaitable[None]]
+    ) -> None:
+        """Lead a run for another person, as `LedGate.hand_over` does. Raise Conflict if nothing can
+        lead it any more."""
+        await self._conductor(run).gate.hand_over(author, to, pass_batons)
+
+    def _conductor(self, run: str) -> Conductor:
         conductor = self._open.get(run)
         if conductor is None:
             raise Conflict(f"{UNREAD}: only Stop is left.")
-        await conductor.go_on(author, request_id)
+        return conductor
+
+    def rights_changed(self, robot: str) -> None:
+        """Hold the runs whose persons may begin nothing on a robot any more."""
+        for conductor in tuple(self._open.values()):
+            if robot in conductor.gate.robots:
+                conductor.gate.rights_changed(robot)
 
     async def give_word(self, run: str, node: str, word: Word) -> None:
         """Take the outcome of an action (`node`: its full name) of the run with the id `run`, as a

@@ -1,5 +1,6 @@
 """Interventions in a run besides Stop: pause, resume, modify, confirm rest; where that is safe."""
 
+from collections.abc import Callable
 from typing import Annotated, Final
 
 import msgspec
@@ -72,10 +73,12 @@ async def modify(
     engine: KnownEngine | None,
     approvals: Approvals,
     run_in_worker: RunInWorker,
+    require: Callable[[], None],
 ) -> Run:
     """Give a running graph another structure, in the name of `author`, and return the run. `body`
     is an encoded ModifyRequest; `engine` is None for a simulated run; `approvals` checks the yes of
-    a second person, where the robot demands it. Raise BadInput if the body is wrong, Conflict if
+    a second person, where the robot demands it; `require` raises a refusal if the author may not
+    start on its robot. Raise BadInput if the body is wrong, Conflict if
     the run or its engine does not allow the change, Unavailable if the message could not be sent,
     and OutcomeUnknown if it cannot be known whether the engine has made the change."""
     run = opened.run
@@ -100,6 +103,7 @@ async def modify(
     targets = () if run.simulated else (run.engine,)
     graph = GraphOutline(ready.name, ready.actions)
     order = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
+    require()
     try:
         await opened.modify(author, order, asked.version, ready.digest, asked.continue_from)
     except NotSent as why:

@@ -20,10 +20,22 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author, Requested
 from action_assistant.runner.start.led_items import IndexingWords, indexing_item, led_item
 from action_assistant.runner.start.preflight import Item, is_blocking
+from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.web.auth.identity import Identity
 
 _GET_S: Final = 2.0  # within which a robot has to answer before a piece leaves
 _FRESH_S: Final = 3.0  # for which a look at a robot counts
+
+
+#: Why nothing begins for a run that nobody has let go on since the runner's restart.
+_NOBODY: Final = "nobody has let it go on since the runner was restarted"
+#: The codes of the items about the rights of a robot.
+_RIGHTS: Final = frozenset({"service", "right", "baton"})
+
+
+class NotAllowed(NoAnswer):
+    """The person for whom a run is led may begin nothing on a robot."""
 
 
 class Cleared(msgspec.Struct, frozen=True):
@@ -49,20 +61,38 @@ class LedLook:
     """Checks a robot before a start, or a piece, of a conducted run begins there."""
 
     def __init__(
-        self, runs: OpenRuns, foreign_stops: ForeignStopLoop, indexing: IndexingWords
+        self,
+        runs: OpenRuns,
+        foreign_stops: ForeignStopLoop,
+        indexing: IndexingWords,
+        rights: RightsRegistry,
     ) -> None:
         self._runs = runs
+        self._rights = rights
         self._foreign_stops = foreign_stops
         self._indexing = indexing
 
-    async def items(self, robot: KnownEngine, answer: Answer, cleared: str = "") -> list[Item]:
-        """Return the results of the checks that only conducted runs need, for a robot that has just
-        given this answer. `cleared`: the id of the engine's process as it was at the start of the
-        run, "" before that. Raise Unavailable if the journal cannot be read."""
-        return [
-            led_item(robot.registration),
-            await self._indexing_item(robot, answer.incarnation, cleared),
-        ]
+    async def items(
+        self, robot: KnownEngine, answer: Answer, lead: Identity, cleared: str = ""
+    ) -> list[Item]:
+        """Return an item of each rule for a robot that has just given this answer. `lead`: for whom the
+        run is led; `cleared`: the life of its engine that was looked at before the start, "" before
+        that, when `lead` reads the items. Raise Unavailable if the journal cannot be read."""
+        indexing = await self._indexing_item(robot, answer.incarnation, cleared)
+        name = robot.registration.name
+        rights = self._rights.items(name, lead, is_asking=not cleared)
+        return [led_item(robot.registration), indexing, *rights]
+
+    def why_not_allowed(
+        self, robot: str, lead: Identity | None, *, is_decided: bool = False
+    ) -> str:
+        """Return why a run that is led for `lead` may begin nothing on a robot now; "" if it may.
+        None: nobody has let it go on since the runner's restart. `is_decided`: a change counts before
+        it is stored."""
+        if lead is None:
+            return _NOBODY
+        refused = self._rights.refusals(robot, lead, is_asking=False, is_decided=is_decided)
+        return refused[0].text if refused else ""
 
     async def _indexing_item(self, robot: KnownEngine, life: str, cleared: str) -> Item:
         name, standing = robot.registration.name, robot.standing
@@ -71,11 +101,18 @@ class LedLook:
         word = await self._indexing.of(name, life) if standing.indexes is None else None
         return indexing_item(name, robot.facts, standing, word)
 
-    async def before_piece(self, robot: KnownEngine, run: Requested) -> Cleared:
+    async def before_piece(
+        self, robot: KnownEngine, run: Requested, lead: Identity | None
+    ) -> Cleared:
         """Ask a robot, and return the proof that a piece of a conducted run may begin on it. Wait
-        for its answer. Raise NoAnswer with the reason if no piece may."""
+        for its answer. `lead`: as for `why_not_allowed`. Raise NoAnswer with the reason if no piece
+        may, NotAllowed if `lead` may begin none there."""
         assert run.led is not None
         name = robot.registration.name
+        if lead is None:
+            raise NotAllowed(_NOBODY)
+        if why := self.why_not_allowed(name, lead):
+            raise NotAllowed(why)
         await robot.indexed()
         try:
             answer = await _asked(robot)
@@ -96,13 +133,13 @@ class LedLook:
             raise NoAnswer(f"run {taken.number} is {taken.state} there")
         self._require_known(name, run.run)
         try:
-            items = await self.items(robot, answer, answer.incarnation)
+            items = await self.items(robot, answer, lead, answer.incarnation)
         except Refused as unreadable:
             raise NoAnswer(unreadable.detail) from unreadable
         overridden = run.override.codes if run.override is not None else ()
         for item in items:
             if is_blocking(item, overridden):
-                raise NoAnswer(item.text)
+                raise (NotAllowed if item.code in _RIGHTS else NoAnswer)(item.text)
         return Cleared(robot, answer.incarnation, at)
 
     def _require_known(self, name: str, run: str) -> None:
@@ -121,15 +158,17 @@ class LedLook:
             if why := piece.lost or piece.unconfirmed:
                 raise NoAnswer(f"nobody knows whether {node} has ended there: {why}")
 
-    async def before_going_on(self, robots: Robots, names: Iterable[str], run: Requested) -> None:
+    async def before_going_on(
+        self, robots: Robots, names: Iterable[str], run: Requested, lead: Identity
+    ) -> None:
         """Check the robots with these names at the same time, before a held run goes on, and wait
-        for their answers. `run`: its first event. Raise Conflict with the reasons of all robots on
+        for their answers. `run`: its first event; `lead`: the person who lets it go on. Raise Conflict with the reasons of all robots on
         which no piece may begin."""
         found: dict[str, str] = {}
 
         async def look(name: str) -> None:
             try:
-                await self.before_piece(robots.reachable(name), run)
+                await self.before_piece(robots.reachable(name), run, lead)
             except NoAnswer as why:
                 found[name] = str(why)
             except Refused as why:

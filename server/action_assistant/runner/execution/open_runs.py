@@ -8,7 +8,7 @@ import anyio
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.logs import begin
 from action_assistant.runner.execution.run_loop import OpenRun, PieceHooks
-from action_assistant.runner.links.port import ForeignCommand, Link, Order
+from action_assistant.runner.links.port import ForeignCommand, Leaves, Link, Order, unwatched
 from action_assistant.runner.links.unreachable import UnreachableLink
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author, MovesAgain
@@ -52,12 +52,13 @@ class OpenRuns:
         seq: int,
         piece: PieceHooks | None = None,
         pressed: Callable[[Author], None] | None = None,
+        may_leave: Leaves = unwatched,
     ) -> OpenRun:
         """Open a stored run on a link, announce it to watchers and return it. `seq`: the number of
         the run's last stored event; `owns_link`: the link is closed with the run; `link`: None if
         the robot is not registered any more: such a run gets a link that never answers. `piece`:
         ties a piece to its conducted run; `pressed`: called first when a person stops a conducted
-        run."""
+        run; `may_leave`: called right before its start leaves, and raises NotSent if it may not."""
         opened = OpenRun(
             run,
             link=link
@@ -72,6 +73,7 @@ class OpenRuns:
             loading_times=self._loading_times,
             piece=piece,
             pressed=pressed,
+            may_leave=may_leave,
         )
         self.by_id[run.id] = opened
         self._changed(opened)

@@ -26,6 +26,7 @@ from action_assistant.runner.links.port import (
     EngineRefused,
     Feedback,
     ForeignCommand,
+    Leaves,
     Link,
     NoAnswer,
     NotSent,
@@ -33,6 +34,7 @@ from action_assistant.runner.links.port import (
     Report,
     Transitions,
     graph_outline,
+    unwatched,
 )
 from action_assistant.runner.robots.robot_events import alarm_of
 from action_assistant.runner.runs.events import (
@@ -106,9 +108,11 @@ class OpenRun:
         loading_times: LoadingTimes | None = None,
         piece: PieceHooks | None = None,
         pressed: Callable[[Author], None] | None = None,
+        may_leave: Leaves = unwatched,
     ) -> None:
         self.run = run
         self._piece = piece
+        self._may_leave = may_leave
         self._pressed = pressed
         self.revision = 0
         self.published = anyio.Event()
@@ -468,6 +472,7 @@ class OpenRun:
             """Let the message leave now, unless a Stop has been pressed by now."""
             if self.run.desired == "stopped":
                 raise _HeldBack
+            self._may_leave()
             if self._piece is not None:
                 self._piece.may_leave()
             leaving.set()

@@ -6,6 +6,7 @@ It lives on one event loop. Open runs are in memory; the journal has all runs.
 import logging
 from collections.abc import AsyncIterator, Callable, Mapping
 from contextlib import asynccontextmanager
+from functools import partial
 from typing import Any, Final
 
 import anyio
@@ -27,7 +28,12 @@ from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import SIMULATOR, ForeignCommand, Registration
 from action_assistant.runner.links.simulator import Simulator, in_this_process
 from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.registration import Robot, registration_of
+from action_assistant.runner.robots.registration import (
+    HolderShown,
+    Robot,
+    registration_of,
+    with_rights,
+)
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
@@ -47,10 +53,13 @@ from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import StopOrder
 from action_assistant.runner.start.led_items import IndexingWords
 from action_assistant.runner.start.preflight import Preflight
+from action_assistant.runner.start.rights_registry import IdentityNow, RightsRegistry, unchanged
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.umrf.files.codec import Unreadable
 from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.caller import BackgroundTasks, origin_of
+from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.keys import Person
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -80,6 +89,7 @@ class ExecutionService:
         simulator: Simulator,
         past: Past | None,
         sources: StartSources,
+        identity_now: IdentityNow,
     ) -> None:
         self.robots = robots
         self.history = RunHistory(runtime.journal, past)
@@ -93,8 +103,12 @@ class ExecutionService:
         self._runs = OpenRuns(robots, self.history, runtime)
         self.open: Final = self._runs.by_id
         self._late_activity = LateActivity(self._runs, self.history, robots, runtime)
+        self.rights: Final = RightsRegistry(robots, runtime, self._rights_changed, identity_now)
         look = LedLook(
-            self._runs, self.foreign_stops, IndexingWords(runtime.journal, runtime.clock_us)
+            self._runs,
+            self.foreign_stops,
+            IndexingWords(runtime.journal, runtime.clock_us),
+            self.rights,
         )
         self._checks = StartChecks(
             self._runs,
@@ -104,12 +118,13 @@ class ExecutionService:
             runtime,
             approvals=self.approvals,
             look=look,
+            rights=self.rights,
             simulator=simulator,
             sources=sources,
         )
         self._conductors = Conductors(robots, look, self._runs, self.history, simulator, runtime)
         self._starts = StartPipeline(
-            self._runs, self._checks, self._stops, self._conductors, runtime
+            self._runs, self._checks, self._stops, self._conductors, self.rights, runtime
         )
 
     @classmethod
@@ -124,13 +139,22 @@ class ExecutionService:
         simulator: Simulator = in_this_process,
         past: Past | None = None,
         sources: StartSources = NO_SOURCES,
+        identity_now: IdentityNow = unchanged,
     ) -> "AsyncIterator[ExecutionService]":
         """Return a context with the service, which has taken over the runs that an earlier process
         left open. `past` reads runs that are over; `simulator` makes links to simulated engines;
-        `sources` are the behaviours, expected courses and index folders that starts need."""
+        `sources` are the behaviours, expected courses and index folders that starts need;
+        `identity_now` says whether a person was ended, and which role and groups they have now."""
         async with anyio.create_task_group() as tasks:
             runtime = Runtime(journal, clock_us, BackgroundTasks(tasks), run_in_worker)
-            control = cls(robots, runtime, simulator=simulator, past=past, sources=sources)
+            control = cls(
+                robots,
+                runtime,
+                simulator=simulator,
+                past=past,
+                sources=sources,
+                identity_now=identity_now,
+            )
             await control._take_up()
             try:
                 yield control
@@ -149,24 +173,38 @@ class ExecutionService:
         for watcher in self._robot_watchers:
             watcher()
 
+    def _rights_changed(self, robot: str) -> None:
+        self._conductors.rights_changed(robot)
+        self._robots_changed()
+
     # --- start --------------------------------------------------------------------------------
 
-    async def start(self, request: StartRequest, author: Author) -> Started:
+    async def start(
+        self, request: StartRequest, author: Author, identity: Identity | None = None
+    ) -> Started:
         """Carry out a start, at most once per request id. Return after the one start message has
-        been sent. Raise a subclass of Refused if the start is refused; nothing was sent then."""
-        return await self._starts.start(request, author)
+        been sent. `identity`: that of the author; None for an operator without groups. Raise a subclass of
+        Refused if the start is refused; nothing was sent then."""
+        starter = identity or _operator(author)
+        self.rights.act(starter)
+        return await self._starts.start(request, author, starter)
 
-    async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
+    async def start_group(
+        self, group: GroupRequest, author: Author, identity: Identity | None = None
+    ) -> Grouped:
         """Start one version on several robots, and return the runs and the robots that nothing was
-        sent to. All starts are checked and accepted before the first message is sent. Raise a
-        subclass of Refused if one start is refused; nothing was sent to any robot then."""
-        return await self._starts.start_group(group, author)
+        sent to. All starts are checked and accepted before the first message is sent. `identity`: as
+        for `start`. Raise a subclass of Refused if one start is refused; nothing was sent to any robot then."""
+        starter = identity or _operator(author)
+        self.rights.act(starter)
+        return await self._starts.start_group(group, author, starter)
 
-    async def look(self, group: GroupRequest, starter: str = "") -> list[Preflight]:
-        """Return the pre-flight (the checks before a start) for each engine that `group` names.
-        `starter`: the id of the person who would start. Nothing is started: engines are only asked
-        for their graphs."""
-        return await self._checks.look(group, starter)
+    async def look(
+        self, group: GroupRequest, starter: str = "", identity: Identity | None = None
+    ) -> list[Preflight]:
+        """Return the pre-flight of a start on each engine; `starter` is the id of the person who
+        would start, `identity` as for `start`. Only a get is sent."""
+        return await self._checks.look(group, identity or _operator(Author(starter, "")))
 
     def under_way(self, request_id: str) -> bool:
         """Return whether the start, or the start of a group, with this request id is being carried
@@ -236,15 +274,29 @@ class ExecutionService:
         Unavailable if the message could not be sent."""
         return await interventions.pause(_no_piece(await self._movable(run)), author)
 
-    async def resume(self, run: str, author: Author) -> Run:
+    async def resume(self, run: str, author: Author, identity: Identity | None = None) -> Run:
         """Resume a paused run. Raise NotFound if there is no such run, Conflict if it is not
-        paused, Unavailable if the message could not be sent."""
-        return await interventions.resume(_no_piece(await self._movable(run)), author)
-
-    async def modify(self, run: str, body: bytes, author: Author) -> Run:
-        """Give a run another version of its graph; `body` is an encoded ModifyRequest. Raise
-        NotFound if there is no such run, and what `interventions.modify` raises."""
+        paused, Unavailable if the message could not be sent, Forbidden or Conflict if the author may
+        not start on its robot."""
         opened = _no_piece(await self._movable(run))
+        self._require_rights(opened.run, author, identity)
+        return await interventions.resume(opened, author)
+
+    def _require_rights(self, run: Run, author: Author, identity: Identity | None) -> None:
+        """Raise Forbidden or Conflict unless the author may start on each robot of a run."""
+        by = identity or _operator(author)
+        self.rights.act(by)
+        self.rights.require(run.robots, by)
+
+    async def modify(
+        self, run: str, body: bytes, author: Author, identity: Identity | None = None
+    ) -> Run:
+        """Give a run another version of its graph; `body` is an encoded ModifyRequest. Raise
+        NotFound if there is no such run, what `interventions.modify` raises, and Forbidden or Conflict
+        if the author may not start on its robot."""
+        opened = _no_piece(await self._movable(run))
+        require = partial(self._require_rights, opened.run, author, identity)
+        require()
         engine = self.robots.link(opened.run.engine)
         return await interventions.modify(
             opened,
@@ -253,18 +305,22 @@ class ExecutionService:
             engine=engine,
             approvals=self.approvals,
             run_in_worker=self._runtime.run_in_worker,
+            require=require,
         )
 
-    async def go_on(self, run: str, asked: GoOnRequest, author: Author) -> Run:
+    async def go_on(
+        self, run: str, asked: GoOnRequest, author: Author, identity: Identity | None = None
+    ) -> Run:
         """Let a held conducted run go on, which may start actions on its robots; return the run.
         `asked`: since when the person saw it held. A repeat of a request that was carried out
         changes nothing, and returns the run as it is now. Raise NotFound if there is no such run,
         Conflict if it is over, being stopped, not held since that time, or one of its robots does
-        not answer or may begin nothing."""
+        not answer or may begin nothing; Forbidden or Conflict if the author may not start on each of
+        them."""
         press = go_on_press(author, microseconds(asked.since))
         async with self._conductors.once(run, asked.request_id):
             found = await self._repeated(run, asked.request_id, press)
-            return found or await self._go_on(run, asked, author)
+            return found or await self._go_on(run, asked, author, identity)
 
     async def _repeated(self, run: str, request_id: str, press: Press) -> Run | None:
         """Return the run as it is now if a press with this request id has counted in it; None if none
@@ -282,7 +338,9 @@ class ExecutionService:
             )
         return found
 
-    async def _go_on(self, run: str, asked: GoOnRequest, author: Author) -> Run:
+    async def _go_on(
+        self, run: str, asked: GoOnRequest, author: Author, identity: Identity | None
+    ) -> Run:
         opened = await self._movable(run)
         held = opened.run.held
         if held is None:
@@ -294,14 +352,37 @@ class ExecutionService:
             )
         if opened.run.desired == "stopped":
             raise Conflict("The run is being stopped.")
-        await self._conductors.go_on(run, author, asked.request_id)
+        self._require_rights(opened.run, author, identity)
+        lead = identity or _operator(author)
+        await self._conductors.go_on(run, author, lead, asked.request_id)
         return opened.run
 
-    async def give_outcome(self, run: str, asked: WordRequest, author: Author) -> Run:
+    async def hand_over(
+        self, run: str, to: str, author: Author, identity: Identity | None = None
+    ) -> Run:
+        """Hand a conducted run over to a person who has a page open, with all batons of its robots. It
+        goes on, unless it is held. Raise NotFound if there is no such run, Conflict or Forbidden if the
+        author does not hold these batons or the other person may not start on one of its robots,
+        Unavailable if it could not be stored: then it is held."""
+        opened = await self._movable(run)
+        if opened.run.led is None:
+            raise Conflict("Only a run that is led has further starts to hand over.")
+        by, receiver = identity or _operator(author), self.rights.require_present(to)
+        robots = opened.run.robots
+        events = self.rights.handing(robots, run, receiver, by, author)
+        self.rights.require(set(robots) - set(events), receiver)
+        passing = partial(self.rights.carry_out_handing, events, receiver, author)
+        await self._conductors.hand_over(run, author, receiver, passing)
+        return opened.run
+
+    async def give_outcome(
+        self, run: str, asked: WordRequest, author: Author, identity: Identity | None = None
+    ) -> Run:
         """Take the outcome of an action in a conducted run from a person, where the robot does not
         show it, and store it; return the run. A repeat of a request that was carried out changes
         nothing. Raise NotFound if there is no such run, Conflict if no outcome is asked for,
-        OutcomeUnknown if it is not stored within 5 s."""
+        OutcomeUnknown if it is not stored within 5 s, Forbidden or Conflict if the author may not start
+        on each robot of the run: the next action may begin."""
         outcome = _OUTCOMES[asked.outcome]
         press = outcome_press(author, asked.action, outcome, asked.piece, asked.reason)
         word = Word(
@@ -317,6 +398,7 @@ class ExecutionService:
             if found is not None:
                 return found
             opened = await self._movable(run)
+            self._require_rights(opened.run, author, identity)
             await self._conductors.give_word(run, asked.action, word)
             return opened.run
 
@@ -380,13 +462,30 @@ class ExecutionService:
 
     def robot_views(self) -> list[Robot]:
         """Return all engines as people see them, the simulator first."""
-        return list(self.robots.all(self.foreign_stops.trouble))
+        return [self._with_rights(each) for each in self.robots.all(self.foreign_stops.trouble)]
 
     def robot_view(self, name: str) -> Robot:
         """Return one engine as people see it. Raise NotFound if no robot has this name."""
         if name == SIMULATOR:
             return next(self.robots.all())
-        return self.robots.robot(name, self.foreign_stops.trouble)
+        return self._with_rights(self.robots.robot(name, self.foreign_stops.trouble))
+
+    def _with_rights(self, plain: Robot) -> Robot:
+        """Return a robot with its rights and the holder of its baton."""
+        if plain.simulated:
+            return plain
+        held = self.rights.holder(plain.name)
+        shown = None
+        if held is not None:
+            falls_at = self.rights.falls_at(held.person.id)
+            left_us = 0 if falls_at is None else round((falls_at - anyio.current_time()) * 1e6)
+            shown = HolderShown(
+                person=held.person,
+                since=time(held.since),
+                here=falls_at is None,
+                falls_at=None if falls_at is None else time(self._runtime.clock_us() + left_us),
+            )
+        return with_rights(plain, self.rights.of(plain.name), shown)
 
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Register a robot, or change its registration, and return it. Raise BadInput if the
@@ -394,7 +493,8 @@ class ExecutionService:
         Unavailable if the journal cannot store it."""
         async with self._starts.turns([asked.name]):
             self._check_unused(asked.name)
-            return await self.robots.register(asked, author)
+            await self.robots.register(asked, author)
+            return self.robot_view(asked.name)
 
     async def remove(self, robot: str, author: Author) -> None:
         """Remove a robot from the registry. Raise NotFound if the robot is not registered, Conflict
@@ -450,6 +550,7 @@ class ExecutionService:
             commanded=self._hear_of,
             shows=self._show,
         )
+        self.rights.take_up(await self._runtime.journal.query(queries.all_rights()))
         for row in await self._runtime.journal.query(queries.all_robots()):
             self.robots.add(registration_of(row))
         for row in await self._runtime.journal.query(queries.open_runs()):
@@ -488,6 +589,11 @@ class ExecutionService:
 
 def _ignore_stop(_author: Author, _robot: str, _run: str) -> None:
     """Ignore a Stop that found nothing to stop."""
+
+
+def _operator(author: Author) -> Identity:
+    """Return an operator without groups, for commands that come from no route."""
+    return Identity(Person(author.id, author.name, "operator"))
 
 
 def _wholes_of(run: Run) -> set[str]:

@@ -39,10 +39,12 @@ from action_assistant.runner.start.admission import (
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.led_items import INDEXING, led_item, led_items
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
+from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.check import forbids_start
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.umrf.kept_values import has_keeper
+from action_assistant.web.auth.identity import Identity
 
 #: Facts of the simulator when it plays no robot: there a paused run can be stopped.
 _SIMULATOR_FACTS: Final = msgspec.structs.replace(SIMULATED, pauses_safely=True)
@@ -120,6 +122,7 @@ class StartChecks:
         *,
         approvals: Approvals,
         look: LedLook,
+        rights: RightsRegistry,
         simulator: Simulator,
         sources: StartSources,
     ) -> None:
@@ -129,15 +132,16 @@ class StartChecks:
         self._foreign_stops = foreign_stops
         self._approvals = approvals
         self._look_led = look
+        self._rights = rights
         self._clock_us = runtime.clock_us
         self._run_in_worker = runtime.run_in_worker
         self._simulator = simulator
         self._sources = sources
         self._prefixes = Workspace.of(os.environ).prefixes
 
-    async def accept(self, request: StartRequest, starter: str) -> AcceptedStart:
+    async def accept(self, request: StartRequest, starter: Identity) -> AcceptedStart:
         """Take a request through all checks that may refuse it, and wait for the answer of the
-        robot. `starter`: the id of the person who starts. Raise a subclass of Refused if one check
+        robot. `starter`: the person who starts. Raise a subclass of Refused if one check
         does."""
         if self.leads(request.engine, request.robots):
             return await self._accept_conducted(request, starter)
@@ -157,7 +161,7 @@ class StartChecks:
         return engine == CONDUCTED and (bool(robots) or CONDUCTED not in self._robots.names)
 
     async def accept_all(
-        self, requests: Sequence[StartRequest], starter: str
+        self, requests: Sequence[StartRequest], starter: Identity
     ) -> list[AcceptedStart]:
         """Accept the starts on several engines, all at the same time, and wait for their answers.
         `starter`: the id of the person. Raise Conflict, with the reasons of all engines, if at
@@ -169,7 +173,7 @@ class StartChecks:
         robot: KnownEngine,
         request: StartRequest,
         ready: Prepared,
-        starter: str,
+        starter: Identity,
         *,
         is_led: bool = False,
     ) -> AcceptedStart:
@@ -184,11 +188,11 @@ class StartChecks:
             raise Unavailable(silence.text, where={"path": "/engine", "item": "answers"}) from (
                 nothing
             )
-        return await self._decide(request, ready, robot, view, is_led=is_led)
+        return await self._decide(request, ready, robot, view, starter, is_led=is_led)
 
-    async def _accept_conducted(self, request: StartRequest, starter: str) -> AcceptedStart:
+    async def _accept_conducted(self, request: StartRequest, starter: Identity) -> AcceptedStart:
         """Take the start of a conducted run through all checks, with all its robots at the same
-        time. `starter`: the id of the person. Raise Conflict, with the reasons of all robots, if a
+        time. `starter`: the person. Raise Conflict, with the reasons of all robots, if a
         check refuses it."""
         _require_plain(request)
         ready = await self._run_in_worker(prepared_pieces, request, CONDUCTED_FACTS, random_id())
@@ -245,12 +249,12 @@ class StartChecks:
         )
 
     async def _check(
-        self, request: StartRequest, ready: Prepared, robot: KnownEngine, starter: str
+        self, request: StartRequest, ready: Prepared, robot: KnownEngine, starter: Identity
     ) -> None:
-        """Make the checks that need no answer of the engine: the yes of a second person, whether a
-        run keeps the robot, and whether anything is being stopped there. `starter`: the id of the
-        person. Raise Conflict if one fails."""
-        await self._approvals.require(robot.registration, ready.tree_digest, starter)
+        """Make the checks that need no answer of the engine: the rights of the robot, the yes of a second person, whether a
+        run keeps the robot, and whether anything is being stopped there. `starter`: the person. Raise Conflict or Forbidden if one fails."""
+        self._rights.require([request.engine], starter)
+        await self._approvals.require(robot.registration, ready.tree_digest, starter.person.id)
         overridden = request.override.codes if request.override else ()
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
         if self._foreign_stops.is_stopping(request.engine):
@@ -291,6 +295,7 @@ class StartChecks:
         ready: Prepared,
         robot: KnownEngine,
         view: EngineView,
+        starter: Identity,
         *,
         is_led: bool,
     ) -> AcceptedStart:
@@ -299,7 +304,7 @@ class StartChecks:
         run."""
         items = [
             *await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes),
-            *(await self._look_led.items(robot, view.answer) if is_led else ()),
+            *(await self._look_led.items(robot, view.answer, starter) if is_led else ()),
         ]
         free = self._free_item(request.engine, ready.name)  # again: time has passed
         accepted = AcceptedStart(
@@ -376,9 +381,9 @@ class StartChecks:
 
     # --- pre-flight ---------------------------------------------------------------------------
 
-    async def look(self, group: GroupRequest, starter: str) -> list[Preflight]:
-        """Return the pre-flight of a start on each engine that `group` names. `starter`: the id of
-        the person who would start. A refusal becomes an item of the pre-flight. Nothing is stored,
+    async def look(self, group: GroupRequest, starter: Identity) -> list[Preflight]:
+        """Return the pre-flight of a start on each engine that `group` names. `starter`: the
+        person who would start. A refusal becomes an item of the pre-flight. Nothing is stored,
         and engines are only asked for their graphs; the call waits for their answers."""
         if any(self.leads(engine, group.robots) for engine in group.engines):
             return await self._look_conducted(group.for_engine(CONDUCTED), starter)
@@ -397,9 +402,9 @@ class StartChecks:
                 tasks.start_soon(look, engine)
         return [preflight.with_items(found[engine], courses) for engine in group.engines]
 
-    async def _look_conducted(self, request: StartRequest, starter: str) -> list[Preflight]:
+    async def _look_conducted(self, request: StartRequest, starter: Identity) -> list[Preflight]:
         """Return the pre-flight of a conducted run: first that of the whole graph, then that of
-        each robot. `starter`: the id of the person who would start."""
+        each robot. `starter`: the person who would start."""
         try:
             ready = await self._run_in_worker(
                 partial(prepared_pieces, approved=False), request, CONDUCTED_FACTS, ""
@@ -421,14 +426,14 @@ class StartChecks:
             own = ready.by_robot[name]
             listed = [
                 self._free_item(name, own.name),
-                *await self._engine_items(robot, own, is_led=True),
+                *await self._engine_items(robot, own, starter, is_led=True),
             ]
             listed += await self._approval_items(robot, own, starter)
             found.append(preflight.with_verdict(name, listed, whole.digest, whole.tree_digest))
         return found
 
-    async def _look(self, request: StartRequest, starter: str) -> Preflight:
-        """Return the pre-flight of one engine. `starter`: the id of the person who would start. A
+    async def _look(self, request: StartRequest, starter: Identity) -> Preflight:
+        """Return the pre-flight of one engine. `starter`: the person who would start. A
         refusal by one check becomes an item, and the next check is made all the same."""
         items: list[Item] = []
         robot: KnownEngine | None = None
@@ -450,13 +455,19 @@ class StartChecks:
             items.append(preflight.refusal_item("graph", refused))
         if robot is not None:
             items.append(self._free_item(request.engine, ready.name if ready is not None else ""))
-            items += await self._engine_items(robot, ready)
+            items += self._rights.items(request.engine, starter)
+            items += await self._engine_items(robot, ready, starter)
             items += await self._approval_items(robot, ready, starter)
         digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
         return preflight.with_verdict(request.engine, items, *digests)
 
     async def _engine_items(
-        self, robot: KnownEngine, ready: Prepared | None, *, is_led: bool = False
+        self,
+        robot: KnownEngine,
+        ready: Prepared | None,
+        starter: Identity,
+        *,
+        is_led: bool = False,
     ) -> list[Item]:
         try:
             view = await self._ask(robot)
@@ -465,14 +476,15 @@ class StartChecks:
         if ready is None:
             return [preflight.answer_item(view)]
         items = await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes)
-        return [*items, *(await self._look_led.items(robot, view.answer) if is_led else ())]
+        led = await self._look_led.items(robot, view.answer, starter) if is_led else ()
+        return [*items, *led]
 
     async def _approval_items(
-        self, robot: KnownEngine, ready: Prepared | None, starter: str
+        self, robot: KnownEngine, ready: Prepared | None, starter: Identity
     ) -> list[Item]:
         if ready is None:
             return []
-        item = await self._approvals.item(robot.registration, ready.tree_digest, starter)
+        item = await self._approvals.item(robot.registration, ready.tree_digest, starter.person.id)
         return [] if item is None else [item]
 
     async def _course_items(self, group: GroupRequest) -> Sequence[Item]:

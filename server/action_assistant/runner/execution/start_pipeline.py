@@ -4,7 +4,7 @@ Each stage takes the values of the stages before it and returns the next one:
 
     claim            StartRequest            the run that this request has become, if any
     read             StartRequest            Prepared: the graph as it will be sent
-    check            Prepared                approval, free robot; refuses
+    check            Prepared                rights, approval, free robot; refuses
     ask the engine   KnownEngine             EngineView: the answer to a get that was sent now
     decide           Prepared, EngineView    AcceptedStart; refuses
     store            AcceptedStart           Run: `run.requested.v1` is in the journal
@@ -16,6 +16,7 @@ nothing behind, and a start that cannot be stored is not sent.
 
 from collections.abc import AsyncIterator, Iterable, Sequence
 from contextlib import AsyncExitStack, asynccontextmanager
+from functools import partial
 
 import anyio
 import msgspec
@@ -32,6 +33,8 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import GroupRequest, StartRequest
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder
+from action_assistant.runner.start.rights_registry import RightsRegistry
+from action_assistant.web.auth.identity import Identity
 
 
 class Started(msgspec.Struct, frozen=True):
@@ -62,9 +65,11 @@ class StartPipeline:
         checks: StartChecks,
         stops: StopOrder,
         conductors: Conductors,
+        rights: RightsRegistry,
         runtime: Runtime,
     ) -> None:
         self._runs = runs
+        self._rights = rights
         self._conductors = conductors
         self._checks = checks
         self._stops = stops
@@ -72,21 +77,20 @@ class StartPipeline:
         self._claims = IdempotentStarts(runtime.journal, runtime.tasks, runtime.clock_us)
         self._turns: dict[str, anyio.Lock] = {}
 
-    async def start(self, request: StartRequest, author: Author) -> Started:
-        """Carry out a start in the name of `author`, at most once per request id. Return after the
-        one start message has been sent. Raise a subclass of Refused if the start is refused;
-        nothing was sent then."""
+    async def start(self, request: StartRequest, author: Author, starter: Identity) -> Started:
+        """Carry out a start of `starter`, at most once per request id. Return after the one start
+        message has left. Raise a subclass of Refused if the start is refused; nothing was sent then."""
         stops = self._stops.count
         async with self._claims.once(request.request_id):
             known = await self._known(request)
             if known is not None:
                 return Started(known, fresh=False)
             async with self.turns(engines_of(request)):
-                accepted = await self._checks.accept(request, author.id)
-                run = await self._store_and_hand_over(accepted, author, stops)
+                accepted = await self._checks.accept(request, starter)
+                run = await self._store_and_hand_over(accepted, author, starter, stops)
             return Started(run, fresh=True)
 
-    async def start_group(self, group: GroupRequest, author: Author) -> Grouped:
+    async def start_group(self, group: GroupRequest, author: Author, starter: Identity) -> Grouped:
         """Start one version on several robots in the name of `author`. All starts are accepted
         before the first message is sent. Raise BadInput if the group has no request id or names the
         simulator, another subclass of Refused if one start is refused; nothing was sent to any
@@ -109,8 +113,8 @@ class StartPipeline:
                 failed = dict.fromkeys(missing, "It was not started with the others.")
                 return Grouped(known[0].group or "", known, failed, fresh=False)
             async with self.turns(group.engines):
-                accepted = await self._checks.accept_all(requests, author.id)
-                return await self._hand_over_group(accepted, author, stops)
+                accepted = await self._checks.accept_all(requests, starter)
+                return await self._hand_over_group(accepted, author, starter, stops)
 
     # --- claim --------------------------------------------------------------------------------
 
@@ -138,7 +142,12 @@ class StartPipeline:
     # --- store, hand over -----------------------------------------------------------------------
 
     async def _store_and_hand_over(
-        self, accepted: AcceptedStart, author: Author, stops: int, group: str | None = None
+        self,
+        accepted: AcceptedStart,
+        author: Author,
+        starter: Identity,
+        stops: int,
+        group: str | None = None,
     ) -> Run:
         """Store a start, let its run send the message, wait until it was sent, and return the run.
         `stops`: how many Stops had been pressed when the start was requested; a later one takes
@@ -147,12 +156,16 @@ class StartPipeline:
         stored."""
         number, at = self._runs.next_number(), self._clock_us()
         requested, order = _to_store(accepted, author, at=at, number=number, group=group)
+        robots = engines_of(accepted.request)
+        batons = self._rights.with_baton(robots)
+        requested = msgspec.structs.replace(requested, batons=batons)
         await self._checks.give_words(accepted, author)
         self._checks.require_free(accepted)
+        self._rights.require(robots, starter)
         with anyio.CancelScope(shield=True):
             run = await self._claims.store(requested)
             occupied = self._checks.why_occupied(accepted)
-            opened = self._open(accepted, requested, run)
+            opened = self._open(accepted, requested, run, starter)
             if occupied:
                 opened.end("refused", occupied)
             if pressed := self._stops.since(stops, *engines_of(accepted.request), group or ""):
@@ -161,13 +174,23 @@ class StartPipeline:
         await opened.published.wait()
         return opened.run
 
-    def _open(self, accepted: AcceptedStart, requested: Requested, run: Run) -> OpenRun:
+    def _open(
+        self, accepted: AcceptedStart, requested: Requested, run: Run, starter: Identity
+    ) -> OpenRun:
+        robots = engines_of(accepted.request)
+        may_leave = partial(self._rights.require_still, robots, starter)
         if accepted.led is None or accepted.is_simulated:
-            return self._runs.open(run, accepted.link, owns_link=accepted.is_simulated, seq=1)
-        return self._conductors.open(requested, run, accepted.led.pieces.texts, accepted.led.engine)
+            is_simulated = accepted.is_simulated
+            return self._runs.open(
+                run, accepted.link, owns_link=is_simulated, seq=1, may_leave=may_leave
+            )
+        led = accepted.led
+        return self._conductors.open(
+            requested, run, led.pieces.texts, led.engine, lead=starter, may_leave=may_leave
+        )
 
     async def _hand_over_group(
-        self, starts: Sequence[AcceptedStart], author: Author, stops: int
+        self, starts: Sequence[AcceptedStart], author: Author, starter: Identity, stops: int
     ) -> Grouped:
         """Store and send accepted starts one after the other; the failure of one does not affect
         the others. `stops`: as in `_store_and_hand_over`."""
@@ -176,7 +199,7 @@ class StartPipeline:
         failed: dict[str, str] = {}
         for each in starts:
             try:
-                runs.append(await self._store_and_hand_over(each, author, stops, group))
+                runs.append(await self._store_and_hand_over(each, author, starter, stops, group))
             except Refused as why:
                 failed[each.request.engine] = why.detail
         return Grouped(group, runs, failed, fresh=True)

@@ -18,8 +18,11 @@ from action_assistant.runner.links.port import (
     Registration,
 )
 from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.rights import RobotRights
 from action_assistant.runner.runs.views import time
+from action_assistant.safe_text import hold_names
 from action_assistant.umrf.facts import BadProfile, facts_of
+from action_assistant.web.auth.keys import PersonRef
 
 #: The stream of all registrations.
 STREAM: Final = "robots"
@@ -68,12 +71,43 @@ class HeldGraph(msgspec.Struct, frozen=True, kw_only=True):
     stopping: str | None = None
 
 
+class OperatorShown(msgspec.Struct, frozen=True, kw_only=True):
+    """A person or a group, by id, who may start on a robot. `until`: when that ends; null for never."""
+
+    id: str
+    name: str
+    until: datetime | None = None
+
+
+class HolderShown(msgspec.Struct, frozen=True, kw_only=True):
+    """The holder of a baton. `here`: they have a page open; `falls_at`: when the baton falls if they
+    open none, null while they are here."""
+
+    person: PersonRef
+    since: datetime
+    here: bool
+    falls_at: datetime | None
+
+
+class LockShown(msgspec.Struct, frozen=True, kw_only=True):
+    """A person who has put a robot out of service, since when, and why."""
+
+    by: PersonRef
+    at: datetime
+    reason: str
+
+    def __post_init__(self) -> None:
+        hold_names(self, "reason")
+
+
 class Robot(msgspec.Struct, frozen=True, kw_only=True):
     """An engine as people see it. `why`: explains any state but `answering`.
 
     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
     besides this runner. `actions`, `graphs`: the size of its index; None before its first answer.
-    `pauses`: pausing is safe on it.
+    `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
+    `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
+    `drill_days`, `watcher`: what an owner asks for before a start.
     """
 
     name: str
@@ -97,6 +131,12 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     holds: tuple[HeldGraph, ...] = ()
     actions: int | None = None
     graphs: int | None = None
+    operators: Literal["all"] | tuple[OperatorShown, ...] = "all"
+    baton: bool = False
+    drill_days: int | None = None
+    watcher: bool = False
+    holder: HolderShown | None = None
+    locks: tuple[LockShown, ...] = ()
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -161,4 +201,31 @@ def with_engine(plain: Robot, engine: KnownEngine, stopping: StopTrouble) -> Rob
         ),
         actions=len(answer.known_actions),
         graphs=len(answer.known_graphs),
+    )
+
+
+def with_rights(plain: Robot, rights: RobotRights, holder: HolderShown | None) -> Robot:
+    """Return a robot with its rights. `holder`: who holds its baton."""
+    rules = rights.rules
+    operators: Literal["all"] | tuple[OperatorShown, ...] = "all"
+    if rules.operators is not None:
+        operators = tuple(
+            OperatorShown(
+                id=each.id,
+                name=each.name,
+                until=None if each.until is None else time(each.until),
+            )
+            for each in rules.operators
+        )
+    locks = tuple(
+        LockShown(by=each.by, at=time(each.at), reason=each.reason) for each in rights.locks
+    )
+    return replace(
+        plain,
+        operators=operators,
+        baton=rules.baton,
+        drill_days=rules.drill_days,
+        watcher=rules.watcher,
+        holder=holder,
+        locks=locks,
     )

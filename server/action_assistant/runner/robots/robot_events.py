@@ -1,5 +1,5 @@
 """The log of a robot: commands of others, changes of its engine's state, Stops of foreign graphs,
-files written for it.
+files written for it, changes of its rights.
 
 One stream per robot, `robot/NAME`. Bodies are msgspec JSON; fields are only ever added, with a
 default. Commands of this runner's own runs stand in the streams of the runs.
@@ -14,6 +14,13 @@ import msgspec
 from action_assistant.errors import NotFound, Unavailable
 from action_assistant.journal.events import Event
 from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
+from action_assistant.runner.robots.rights import (
+    BatonPassed,
+    Locked,
+    RightsEvent,
+    RightsSet,
+    Unlocked,
+)
 from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import StreamAppender
@@ -139,6 +146,7 @@ RobotEvent: TypeAlias = (
     | StopUnproven
     | IndexWriteAsked
     | IndexWritten
+    | RightsEvent
 )
 
 _KINDS: Final[Mapping[str, type[RobotEvent]]] = {
@@ -151,6 +159,10 @@ _KINDS: Final[Mapping[str, type[RobotEvent]]] = {
         StopUnproven,
         IndexWriteAsked,
         IndexWritten,
+        RightsSet,
+        BatonPassed,
+        Locked,
+        Unlocked,
     )
 }
 
@@ -211,6 +223,10 @@ class RobotLog:
     def note(self, robot: str, event: RobotEvent, author: str) -> None:
         """Queue an event for storing. The call never waits."""
         self._appender(robot).add(draft_of(event, author))
+
+    async def flushed(self, robot: str) -> None:
+        """Wait until all events of a robot are stored."""
+        await self._appender(robot).flushed()
 
     async def record(self, robot: str, event: RobotEvent, author: str) -> None:
         """Store an event and wait until it is stored. Raise Unavailable if that takes more than

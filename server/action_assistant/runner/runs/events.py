@@ -117,6 +117,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     tree_digest: str | None = None  # of the graph together with them; None if unknown
     led: Led | None = None  # of a conducted run
     piece: PieceOf | None = None  # of a piece, which is no run of its own for people
+    batons: tuple[str, ...] = ()  # the robots whose baton the author held
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -413,6 +414,16 @@ class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     request_id: str = ""
 
 
+class HandedOver(msgspec.Struct, frozen=True, kw_only=True):
+    """A person handed a conducted run over, with the batons of its robots: it goes on for `to`."""
+
+    kind: ClassVar[str] = "run.handed_over.v1"
+
+    at: int
+    author: Author
+    to: Author
+
+
 class Unknown(msgspec.Struct, frozen=True):
     """An event of a kind that this version does not know. It is kept and skipped."""
 
@@ -444,6 +455,7 @@ RunEvent: TypeAlias = (
     | PieceEnded
     | Held
     | Released
+    | HandedOver
     | Unknown
 )
 
@@ -475,6 +487,7 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
         PieceEnded,
         Held,
         Released,
+        HandedOver,
     )
 }
 

@@ -27,6 +27,7 @@ from action_assistant.runner.runs.events import (
     Answered,
     Ended,
     EngineSaid,
+    HandedOver,
     Held,
     Loading,
     ModifyRefused,
@@ -180,7 +181,9 @@ def follow(run: Run, event: RunEvent) -> Run:
             return replace(run, held=event)
         case Released():
             press = go_on_press(event.author, event.since)
-            return _pressed(replace(run, held=None), event.request_id, press)
+            return _pressed(replace(run, held=None, lead=event.author), event.request_id, press)
+        case HandedOver():
+            return replace(run, lead=event.to)
         case PieceEnded():
             return _piece_ended(run, event)
         case PieceBegan():

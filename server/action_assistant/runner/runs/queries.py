@@ -29,6 +29,7 @@ from action_assistant.schema.runner_tables import (
     FAILED,
     review,
     robot,
+    robot_right,
     run,
     run_label,
     runner_event,
@@ -193,3 +194,8 @@ def all_labels() -> Select[Any]:
 def all_robots() -> Select[Any]:
     """Select all registered robots, sorted by name."""
     return select(robot).where(robot.c.retired_at.is_(None)).order_by(robot.c.name)
+
+
+def all_rights() -> Select[Any]:
+    """Select the rights of all robots that have some, also of those that were forgotten."""
+    return select(robot_right)

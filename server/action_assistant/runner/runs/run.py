@@ -124,6 +124,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     led: Led | None = None  # of a conducted run
     piece: PieceOf | None = None  # of a piece of one
     held: Held | None = None  # why a conducted run begins nothing further
+    lead: Author | None = None  # who let it go on last, or was handed it; None: its author
+    batons: tuple[str, ...] = ()  # the robots whose baton the author held at the start
     #: Of a conducted run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a conducted run

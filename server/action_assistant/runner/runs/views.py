@@ -162,7 +162,8 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     """A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a conducted run, the
     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
-    further."""
+    further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
+    held at the start."""
 
     id: str
     number: int
@@ -192,6 +193,8 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     recorded: bool
     robots: dict[str, str] | None = None
     held: HeldShown | None = None
+    lead: Author | msgspec.UnsetType = msgspec.UNSET
+    batons: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         hold_names(self, "unconfirmed", "detail")
@@ -370,6 +373,7 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
         ],
         recorded=True,
         robots=more.get("robots"),
+        batons=tuple(more["batons"]) if "batons" in more else msgspec.UNSET,
     )
 
 
@@ -433,6 +437,8 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "recorded": recorded,
         "robots": None if run.led is None else run.led.robots,
         "held": _held(run),
+        "lead": run.lead or msgspec.UNSET,
+        "batons": run.batons or msgspec.UNSET,
     }
 
 

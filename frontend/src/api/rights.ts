@@ -1,0 +1,71 @@
+/** Rights of robots: who may start there, who holds the baton, and who has put one out of service. */
+import { useQuery } from "@tanstack/react-query";
+import { runnerAt } from "./client";
+import { useLive } from "./page-link";
+import { usePerson } from "./people";
+import type { Robot } from "./robots";
+import type { Run } from "./runs";
+import type { RunnerApi } from "./schema/runner";
+
+/** What the signed-in person may do on a robot. `why`: why they may not start there, "" if they may. */
+export type RobotRight = RunnerApi["RightShown"];
+export type RightsWanted = Required<RunnerApi["RightsWanted"]>;
+export type AllowedOperator = RunnerApi["OperatorShown"];
+
+/** Asks what the signed-in person may do on all robots; asked again when the rights of one change. */
+export function useRights() {
+  const { runner, now } = useLive();
+  const { person, visit } = usePerson();
+  const known = now.engines.map(({ name, operators, baton, holder, locks }) => [
+    name,
+    operators,
+    baton,
+    holder,
+    locks,
+  ]);
+  return useQuery({
+    queryKey: ["robots", "rights", person.id, person.role, visit, JSON.stringify(known)],
+    queryFn: ({ signal }) => runnerAt(runner).get("/api/rights", { signal }),
+    enabled: runner !== undefined && now.engines.some((robot) => !robot.simulated),
+    refetchInterval: 10_000,
+    placeholderData: (before) => before,
+  });
+}
+
+/** The person's rights on one robot; undefined while they are not known. */
+export function useRight(robot: string): RobotRight | undefined {
+  return useRights().data?.robots.find((each) => each.robot === robot);
+}
+
+export function takeBaton(runner: string, name: string, reason = ""): Promise<Robot> {
+  return runnerAt(runner).post("/api/robots/{name}/baton/take", {
+    path: { name },
+    body: { reason },
+  });
+}
+
+export function handBaton(runner: string, name: string, to: string): Promise<Robot> {
+  return runnerAt(runner).post("/api/robots/{name}/baton/hand", { path: { name }, body: { to } });
+}
+
+export function dropBaton(runner: string, name: string): Promise<Robot> {
+  return runnerAt(runner).post("/api/robots/{name}/baton/drop", { path: { name } });
+}
+
+/** Hands a led run over with all batons of its robots, so that it goes on. */
+export function handOverRun(runner: string, run: string, to: string): Promise<Run> {
+  return runnerAt(runner).post("/api/runs/{run}/hand_over", { path: { run }, body: { to } });
+}
+
+export function lockRobot(runner: string, name: string, reason: string): Promise<Robot> {
+  return runnerAt(runner).post("/api/robots/{name}/lock", { path: { name }, body: { reason } });
+}
+
+/** Takes off one's own lock, or as an owner that of the person `of`. */
+export function unlockRobot(runner: string, name: string, of: string): Promise<Robot> {
+  return runnerAt(runner).post("/api/robots/{name}/unlock", { path: { name }, body: { of } });
+}
+
+export function setRights(runner: string, name: string, rights: RightsWanted): Promise<Robot> {
+  return runnerAt(runner).put("/api/robots/{name}/rights", { path: { name }, body: rights });
+}

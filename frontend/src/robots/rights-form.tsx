@@ -1,0 +1,234 @@
+/** An owner says who may start on a robot, and whether it has a baton. */
+import {
+  ActionIcon,
+  Button,
+  Group,
+  Modal,
+  SegmentedControl,
+  Select,
+  Stack,
+  Switch,
+  Text,
+  TextInput,
+} from "@mantine/core";
+import { IconX } from "@tabler/icons-react";
+import { useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
+import { errorText } from "../api/http";
+import { useLive } from "../api/page-link";
+import { NAMELESS, useKnownPeople } from "../api/people";
+import { type AllowedOperator, lockRobot, setRights } from "../api/rights";
+import type { Robot } from "../api/robots";
+import { usePendingText } from "../ui/drafts";
+import { isolated } from "../words/isolated";
+import style from "./rights-form.module.css";
+
+const NO_IDS: readonly string[] = [];
+const NOBODY: readonly AllowedOperator[] = [];
+
+/** Return the last day of a right as a date field has it; "" for one that does not end. */
+export function lastDay(until: string | null): string {
+  if (until === null) return "";
+  const end = new Date(Date.parse(until) - 1);
+  const two = (n: number) => String(n).padStart(2, "0");
+  return `${end.getFullYear()}-${two(end.getMonth() + 1)}-${two(end.getDate())}`;
+}
+
+/** Return the moment at which a right ends whose last day is this one; null for none. */
+export function endOfDay(day: string): string | null {
+  const [year, month, date] = day.split("-").map(Number);
+  if (year === undefined || month === undefined || date === undefined) return null;
+  return new Date(year, month - 1, date + 1).toISOString();
+}
+
+function Operators(props: {
+  chosen: readonly AllowedOperator[];
+  onChange: (chosen: AllowedOperator[]) => void;
+}) {
+  const { chosen, onChange } = props;
+  const people = useKnownPeople(NO_IDS);
+  const left = people.filter(({ id }) => !chosen.some((each) => each.id === id));
+  const put = (changed: AllowedOperator) =>
+    onChange(chosen.map((each) => (each.id === changed.id ? changed : each)));
+  return (
+    <>
+      <ul className={style.list} aria-label="Who may start there">
+        {chosen.map((each) => (
+          <li key={each.id} className={style.line}>
+            <span className={style.name}>{isolated(each.name || NAMELESS)}</span>
+            <TextInput
+              size="xs"
+              type="date"
+              aria-label={`Last day of ${isolated(each.name || NAMELESS)}`}
+              value={lastDay(each.until)}
+              onChange={(event) => put({ ...each, until: endOfDay(event.currentTarget.value) })}
+            />
+            <ActionIcon
+              aria-label={`Remove ${isolated(each.name || NAMELESS)}`}
+              onClick={() => onChange(chosen.filter(({ id }) => id !== each.id))}
+            >
+              <IconX size={15} aria-hidden />
+            </ActionIcon>
+          </li>
+        ))}
+      </ul>
+      <Select
+        label="Add a person"
+        placeholder={left.length === 0 ? "Nobody else has been here" : "Choose"}
+        data={left.map(({ id, name }) => ({ value: id, label: isolated(name || id) }))}
+        value={null}
+        searchable
+        onChange={(id) => {
+          const found = left.find((each) => each.id === id);
+          if (found) onChange([...chosen, { id: found.id, name: found.name, until: null }]);
+        }}
+      />
+    </>
+  );
+}
+
+export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => void }) {
+  const { runner } = useLive();
+  const client = useQueryClient();
+  const [all, setAll] = useState(robot.operators === "all");
+  const [chosen, setChosen] = useState<readonly AllowedOperator[]>(
+    robot.operators === "all" ? NOBODY : robot.operators,
+  );
+  const [baton, setBaton] = useState(robot.baton);
+  usePendingText(
+    chosen === robot.operators || chosen === NOBODY ? "" : JSON.stringify(chosen),
+    null,
+  );
+  const [error, setError] = useState<unknown>(null);
+  const [busy, setBusy] = useState(false);
+  const save = async () => {
+    setBusy(true);
+    try {
+      const operators = all ? ("all" as const) : [...chosen];
+      const { drill_days, watcher } = robot;
+      await setRights(runner ?? "", robot.name, { operators, baton, drill_days, watcher });
+      await client.invalidateQueries({ queryKey: ["robots"] });
+      onClose();
+    } catch (problem) {
+      setError(problem);
+      setBusy(false);
+    }
+  };
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      title={`Who may start on ${isolated(robot.name)}`}
+      closeButtonProps={{ "aria-label": "Close" }}
+    >
+      <form
+        onSubmit={(event) => {
+          event.preventDefault();
+          void save();
+        }}
+      >
+        <Stack gap="md">
+          <SegmentedControl
+            fullWidth
+            value={all ? "all" : "some"}
+            onChange={(value) => setAll(value === "all")}
+            data={[
+              { value: "all", label: "Every operator" },
+              { value: "some", label: "Only these" },
+            ]}
+          />
+          {!all && <Operators chosen={chosen} onChange={setChosen} />}
+          {!all && (
+            <Text size="sm" c="dimmed">
+              This counts for owners too. A last day, such as that of a briefing, ends the right.
+              Everybody can always press Stop.
+            </Text>
+          )}
+          <Switch
+            label="It has a baton"
+            description="Only the person who holds it starts there, goes on and resumes. If the baton changes hands, led runs wait for its new holder."
+            checked={baton}
+            onChange={(event) => setBaton(event.currentTarget.checked)}
+          />
+          {error !== null && (
+            <Text c="var(--error)" role="alert">
+              {errorText(error)}
+            </Text>
+          )}
+          <Group justify="flex-end">
+            <Button onClick={onClose}>Cancel</Button>
+            <Button type="submit" variant="filled" loading={busy}>
+              Save
+            </Button>
+          </Group>
+        </Stack>
+      </form>
+    </Modal>
+  );
+}
+
+/** Asks why a robot is put out of service. */
+export function LockForm({ robot, onClose }: { robot: Robot; onClose: () => void }) {
+  const { runner } = useLive();
+  const [reason, setReason] = useState("");
+  usePendingText(reason, null);
+  const [error, setError] = useState<unknown>(null);
+  const [busy, setBusy] = useState(false);
+  const lock = async () => {
+    setBusy(true);
+    try {
+      await lockRobot(runner ?? "", robot.name, reason.trim());
+      onClose();
+    } catch (problem) {
+      setError(problem);
+      setBusy(false);
+    }
+  };
+  return (
+    <Modal
+      opened
+      onClose={onClose}
+      title={`Put ${isolated(robot.name)} out of service`}
+      closeButtonProps={{ "aria-label": "Close" }}
+    >
+      <form
+        onSubmit={(event) => {
+          event.preventDefault();
+          void lock();
+        }}
+      >
+        <Stack gap="md">
+          <Text size="sm">
+            Nothing starts or goes on there until you or an owner take the lock off.{" "}
+            <b>What runs there now is not stopped by this: press Stop for that.</b>
+          </Text>
+          <TextInput
+            label="Why"
+            placeholder="It leaks oil"
+            value={reason}
+            maxLength={500}
+            data-autofocus
+            onChange={(event) => setReason(event.currentTarget.value)}
+          />
+          {error !== null && (
+            <Text c="var(--error)" role="alert">
+              {errorText(error)}
+            </Text>
+          )}
+          <Group justify="flex-end">
+            <Button onClick={onClose}>Cancel</Button>
+            <Button
+              type="submit"
+              variant="filled"
+              color="red"
+              loading={busy}
+              disabled={reason.trim().length < 3}
+            >
+              Put out of service
+            </Button>
+          </Group>
+        </Stack>
+      </form>
+    </Modal>
+  );
+}

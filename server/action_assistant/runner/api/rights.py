@@ -1,0 +1,241 @@
+"""The routes of the rights of robots: who may start there, batons, robots out of service."""
+
+from datetime import UTC, datetime
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+from litestar import Request, get, post, put
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.errors import BadInput
+from action_assistant.runner.api.caller import author_of
+from action_assistant.runner.api.services import RunnerServices
+from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.robots.rights import Operator, Rules
+from action_assistant.runner.runs import views
+from action_assistant.safe_text import hold_names
+from action_assistant.web.auth.access import Needs, identity_of
+from action_assistant.web.auth.keys import PersonRef
+
+_MOST: Final = 200  # people and groups of one robot
+_Asking = Request[Any, Any, Any]
+_Reason = Annotated[str, msgspec.Meta(max_length=500)]
+_PersonId = Annotated[str, msgspec.Meta(max_length=40)]
+
+
+class OperatorWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A person or a group, by id, who may start on a robot. `name`: for sentences; `until`: when that
+    ends, null for never."""
+
+    id: Annotated[str, msgspec.Meta(min_length=1, max_length=40)]
+    name: Annotated[str, msgspec.Meta(max_length=100)] = ""
+    until: datetime | None = None
+
+
+class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
+    `baton`: only the holder of its baton may; `drill_days`: the age in days of the last Stop drill from
+    which nothing starts, null for any; `watcher`: each start names who watches the robot."""
+
+    operators: (
+        Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
+    ) = "all"
+    baton: bool = False
+    drill_days: Annotated[int, msgspec.Meta(ge=1, le=3650)] | None = None
+    watcher: bool = False
+
+
+class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Takes a baton. `reason`: why it is taken over from its holder."""
+
+    reason: _Reason = ""
+
+
+class BatonHand(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Hands a baton, or a run with all batons of its robots, to a person who has a page open."""
+
+    to: _PersonId
+
+
+class LockWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Puts a robot out of service."""
+
+    reason: _Reason
+
+
+class UnlockWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Takes one's own lock off a robot, or as an owner that of the person `of`."""
+
+    of: _PersonId = ""
+
+
+class RightShown(msgspec.Struct, frozen=True, kw_only=True):
+    """The rights of the asker on a robot. `why`: why they may not start there, "" if they may; `holds`:
+    they hold its baton; `may_take`: they may take its baton, with a reason if somebody holds it."""
+
+    robot: str
+    why: str
+    holds: bool
+    may_take: bool
+
+    def __post_init__(self) -> None:
+        hold_names(self, "why")
+
+
+class RightsShown(msgspec.Struct, frozen=True, kw_only=True):
+    """The rights of the asker on all robots. `people`: those who have a page open and may start on
+    robots, to whom a baton can be handed."""
+
+    robots: list[RightShown]
+    people: list[PersonRef]
+
+
+def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
+    """Return the routes of the rights of robots."""
+    return [*_rules(services), *_baton(services), *_service(services)]
+
+
+def _rules(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @put(
+        "/api/robots/{name:str}/rights",
+        summary="Set who may start on a robot, and whether it has a baton",
+        operation_id="setRobotRights",
+        guards=[Needs("share")],
+    )
+    async def set_rights(name: str, data: RightsWanted, request: _Asking) -> Robot:
+        await services.control.rights.set_rules(name, _rules_of(data), author_of(request))
+        return services.control.robot_view(name)
+
+    @get(
+        "/api/rights",
+        summary="Where the asker may start, and why not elsewhere",
+        operation_id="getRights",
+        guards=[Needs("see")],
+    )
+    async def rights(request: _Asking) -> RightsShown:
+        control, me = services.control, identity_of(request)
+        people = [
+            PersonRef(each.person.id, each.person.name) for each in control.rights.people_here()
+        ]
+        found = []
+        for name in control.robots.names:
+            refused = control.rights.refusals(name, me)
+            held = control.rights.holder(name)
+            holds = held is not None and held.person.id == me.person.id
+            has_right = all(each.code != "right" for each in refused)
+            found.append(
+                RightShown(
+                    robot=name,
+                    why=" ".join(each.text for each in refused),
+                    holds=holds,
+                    may_take=control.rights.of(name).rules.baton and has_right and not holds,
+                )
+            )
+        return RightsShown(robots=found, people=people)
+
+    return [set_rights, rights]
+
+
+def _baton(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/robots/{name:str}/baton/take",
+        status_code=200,
+        summary="Take the baton of a robot, with a reason from its holder",
+        operation_id="takeBaton",
+        guards=[Needs("operate")],
+    )
+    async def take(name: str, data: BatonTake, request: _Asking) -> Robot:
+        rights, me = services.control.rights, identity_of(request)
+        await rights.take(name, me, author_of(request), data.reason)
+        return services.control.robot_view(name)
+
+    @post(
+        "/api/robots/{name:str}/baton/hand",
+        status_code=200,
+        summary="Hand the baton of a robot to a person who has a page open",
+        operation_id="handBaton",
+        guards=[Needs("operate")],
+    )
+    async def hand(name: str, data: BatonHand, request: _Asking) -> Robot:
+        rights, me = services.control.rights, identity_of(request)
+        await rights.hand(name, data.to, me, author_of(request))
+        return services.control.robot_view(name)
+
+    @post(
+        "/api/robots/{name:str}/baton/drop",
+        status_code=200,
+        summary="Drop the baton of a robot",
+        operation_id="dropBaton",
+        guards=[Needs("operate")],
+    )
+    async def drop(name: str, request: _Asking) -> Robot:
+        await services.control.rights.drop(name, identity_of(request), author_of(request))
+        return services.control.robot_view(name)
+
+    @post(
+        "/api/runs/{run:str}/hand_over",
+        status_code=200,
+        summary="Hand a led run over to another person, with all batons of its robots: it goes on",
+        operation_id="handOverRun",
+        guards=[Needs("operate")],
+    )
+    async def hand_over(run: str, data: BatonHand, request: _Asking) -> views.RunShown:
+        me = identity_of(request)
+        return views.run_view(
+            await services.control.hand_over(run, data.to, author_of(request), me)
+        )
+
+    return [take, hand, drop, hand_over]
+
+
+def _service(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/robots/{name:str}/lock",
+        status_code=200,
+        summary="Put a robot out of service: nothing starts or goes on there, what runs is not stopped",
+        operation_id="lockRobot",
+        guards=[Needs("operate")],
+    )
+    async def lock(name: str, data: LockWanted, request: _Asking) -> Robot:
+        rights, me = services.control.rights, identity_of(request)
+        await rights.lock(name, me, author_of(request), data.reason)
+        return services.control.robot_view(name)
+
+    @post(
+        "/api/robots/{name:str}/unlock",
+        status_code=200,
+        summary="Take one's own lock off a robot; owners those of others",
+        operation_id="unlockRobot",
+        guards=[Needs("operate")],
+    )
+    async def unlock(name: str, data: UnlockWanted, request: _Asking) -> Robot:
+        rights, me = services.control.rights, identity_of(request)
+        await rights.unlock(name, me, author_of(request), data.of)
+        return services.control.robot_view(name)
+
+    return [lock, unlock]
+
+
+def _rules_of(wanted: RightsWanted) -> Rules:
+    """Return the rules that an owner wants. Raise BadInput if somebody stands there twice."""
+    operators: tuple[Operator, ...] | None = None
+    if wanted.operators != "all":
+        ids = [each.id for each in wanted.operators]
+        if len(set(ids)) < len(ids):
+            raise BadInput("Somebody is named twice.", where={"path": "/operators"})
+        operators = tuple(map(_operator, wanted.operators))
+    return Rules(
+        operators=operators,
+        baton=wanted.baton,
+        drill_days=wanted.drill_days,
+        watcher=wanted.watcher,
+    )
+
+
+def _operator(wanted: OperatorWanted) -> Operator:
+    until = wanted.until
+    if until is not None and until.tzinfo is None:
+        until = until.replace(tzinfo=UTC)
+    return Operator(
+        wanted.id, wanted.name, None if until is None else round(until.timestamp() * 1e6)
+    )

@@ -1,0 +1,76 @@
+"""`robots rights`, `baton`, `lock` and `unlock`: the rights of a robot from the command line."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from action_assistant.cli import main
+from support.product import TOKEN, Product, running
+
+
+@pytest.fixture(scope="module")
+def product(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Product]:
+    """One server for the module."""
+    with running(tmp_path_factory.mktemp("rights") / "data") as found:
+        yield found
+
+
+@pytest.fixture(autouse=True)
+def there(product: Product, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command line finds this server."""
+    monkeypatch.setenv("ACTION_ASSISTANT_URL", product.url)
+    monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", TOKEN)
+
+
+def test_rights_a_baton_and_locks_are_set_and_shown(capfd: pytest.CaptureFixture[str]) -> None:
+    def said(*words: str, code: int = 0) -> str:
+        assert main(["robots", *words]) == code
+        told = capfd.readouterr()
+        return told.err if code else told.out
+
+    said("add", "David", "--domain", "183")
+    assert "every operator may start there" in said("rights", "David")
+    assert "has no baton" in said("baton", "David", "show")
+    assert "an owner can switch it on" in said("baton", "David", "take", code=1)
+    assert "nobody holds the baton of David" in said("rights", "David", "--baton", "on")
+    assert "holds the baton of David, and has no page open" in said("baton", "David", "take")
+    assert "baton: " in said("list")
+    assert "No persons called 'Ben' can get it" in said(
+        "baton", "David", "hand", "--to", "Ben", code=1
+    )
+    assert "nobody holds the baton" in said("baton", "David", "drop")
+    shown = said("rights", "David", "--operator", "abc=2027-01-31", "--operator", "def")
+    assert "only abc (abc) until 2027-02-01 00:00, def (def) may start there" in shown
+    assert "only abc or def may. Ask" in said("baton", "David", "take", code=1)
+    assert "is no date" in said("rights", "David", "--operator", "abc=soon", code=1)
+    assert "not both" in said("rights", "David", "--all", "--operator", "abc", code=1)
+    assert "every operator may" in said("rights", "David", "--all", "--baton", "off")
+    assert "Say why it is out of service" in said("lock", "David", "--reason", " ", code=1)
+    assert "was not stopped" in said("lock", "David", "--reason", "It leaks oil.")
+    assert "OUT OF SERVICE" in said("list")
+    assert said("unlock", "David") == "David is in service\n"
+    assert "in service already" in said("unlock", "David", code=1)
+
+
+def test_only_an_owner_switches_off_that_a_second_person_is_asked(product: Product) -> None:
+    from action_assistant.web.auth.keys import Keys
+
+    session = Keys(TOKEN).new_session("Oli", role="operator")
+    headers = {
+        "cookie": f"aa_{product.port}={Keys(TOKEN).sealed(session)}",
+        "origin": product.url,
+        "authorization": "",
+    }
+    with product.runner() as runner:
+        careful = {"name": "Carol", "domain": 184, "profile": {"second_person": True}}
+        assert runner.post("/api/robots", json=careful, headers=headers).status_code == 201
+        plain = careful | {"profile": {}}
+        for refused in (
+            runner.post("/api/robots", json=plain, headers=headers),
+            runner.patch("/api/robots/Carol", json={"profile": {}}, headers=headers),
+            runner.delete("/api/robots/Carol", headers=headers),
+            runner.put("/api/robots/Carol/rights", json={"baton": True}, headers=headers),
+        ):
+            assert refused.status_code == 403, refused.text
+        assert runner.patch("/api/robots/Carol", json={"domain": 185}, headers=headers).is_success
+        assert runner.patch("/api/robots/Carol", json={"profile": {}}).is_success
