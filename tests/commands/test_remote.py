@@ -194,6 +194,20 @@ def test_a_run_is_stopped_and_that_is_proven(product: Product, files: dict[str, 
         assert runner.get(f"/api/runs/{run}").json()["state"] == "stopped"
 
 
+def test_a_run_is_stopped_while_no_editor_answers(
+    product: Product, files: dict[str, str]
+) -> None:
+    graph = imported(product, files["graph"])
+    run = product.cli("run", graph, "--script", files["endless"], "--no-wait").stdout.strip()
+    editor = product.process("editor")
+    editor.suspend()
+    try:
+        answer = product.cli("stop", run)
+    finally:
+        editor.resume()
+    assert (answer.returncode, answer.stdout) == (0, "stopped\n"), answer.stderr
+
+
 def rested(state: str, by: str | None = None, how: str = "", detail: str = "") -> dict[str, Any]:
     """Return a run that is over, as the runner shows it. `by`: who saw it at rest."""
     seen = {"by": {"id": "b", "name": by} if by else None, "at": "", "how": how} if how else None

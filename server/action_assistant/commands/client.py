@@ -29,6 +29,7 @@ if TYPE_CHECKING:  # slow to load, and most commands do not need it
 T = TypeVar("T")
 
 _TOKEN: Final = "ACTION_ASSISTANT_TOKEN"
+_EDITOR_S: Final = 3.0  # for which a Stop waits for the editor, which only says where the runner is
 #: The form of a graph's id.
 _MADE_ID: Final = re.compile(r"[A-Za-z0-9]{12}")
 
@@ -131,26 +132,50 @@ def sentence(answer: "httpx.Response") -> str:
 
 
 @contextmanager
-def running(options: argparse.Namespace) -> Iterator[Server]:
-    """Yield a client, with the token, of the server that the options name. Raise CannotStart if it
-    is not reached or not proven, RequestRefused if it refuses the token."""
+def running(options: argparse.Namespace, *, without_editor: bool = False) -> Iterator[Server]:
+    """Yield a client, with the token, of the server that the options name. `without_editor`: where
+    the editor does not answer within 3 s, the runner is looked for at the port after it. Raise
+    CannotStart if the server is not reached or not proven, RequestRefused if it refuses the token."""
     import httpx
 
     with httpx.Client(**reach(options)) as client:
-        yield Server(client, _runner_url(client))
+        yield Server(client, _runner_url(client, options, without_editor=without_editor))
 
 
-def _runner_url(client: "httpx.Client") -> str:
+def _runner_url(
+    client: "httpx.Client", options: argparse.Namespace, *, without_editor: bool = False
+) -> str:
     """Return the URL of the runner. With a token that has expired the editor does not say it, and the
     one that was known at the login counts: such a token may still stop."""
+    patience = {"timeout": _EDITOR_S} if without_editor else {}
     try:
-        url: str = request(client, "GET", "/api/config").json()["runner_url"]
+        url: str = request(client, "GET", "/api/config", **patience).json()["runner_url"]
     except RequestRefused as refusal:
         stored = _stored(str(client.base_url))
         if refusal.status != 401 or stored is None or not stored.runner_url:
             raise
         return stored.runner_url
+    except CannotStart:
+        beside = _runner_beside(client.base_url, options) if without_editor else None
+        if beside is None:
+            raise
+        return beside
     return url
+
+
+def _runner_beside(editor: "httpx.URL", options: argparse.Namespace) -> str | None:
+    """Return the URL of the runner beside an editor that does not answer: the one that was known at
+    the login, else the port after the editor's. Return None for an editor without a port in its
+    URL, as behind a proxy, where nobody has signed in."""
+    stored = _stored(str(editor))
+    if stored is not None and stored.runner_url:
+        return stored.runner_url
+    if editor.port is None:
+        return None
+    url = editor.copy_with(port=editor.port + 1)
+    if not _named(options):  # no editor was there to tell whether it speaks TLS
+        url = url.copy_with(scheme=_scheme(editor.port + 1, _trust(options)))
+    return str(url).rstrip("/")
 
 
 def reach(options: argparse.Namespace) -> dict[str, Any]:
@@ -164,8 +189,7 @@ def reach(options: argparse.Namespace) -> dict[str, Any]:
     from action_assistant.commands.token_proof import AfterProof
 
     data = options.data.resolve()
-    trust = Certificate(data).trusting_too()
-    named = options.url or os.environ.get("ACTION_ASSISTANT_URL")
+    named, trust = _named(options), _trust(options)
     url = named or _here(trust)
     stored = _given(url)
     keys = _keys(data, url, stored)
@@ -210,17 +234,31 @@ def _keys(data: Path, url: str, stored: StoredToken | None) -> Keys | None:
         raise CannotStart(f"{error} Or sign in: `action-assistant login {url}`.") from error
 
 
+def _named(options: argparse.Namespace) -> str | None:
+    return options.url or os.environ.get("ACTION_ASSISTANT_URL")
+
+
+def _trust(options: argparse.Namespace) -> ssl.SSLContext:
+    return Certificate(options.data.resolve()).trusting_too()
+
+
 def _here(trust: ssl.SSLContext) -> str:
     """Return the URL of the server on this computer, http or https, which is tried. `trust`: the
     certificates to accept."""
     port = settings.port()
+    return f"{_scheme(port, trust)}://127.0.0.1:{port}"
+
+
+def _scheme(port: int, trust: ssl.SSLContext) -> str:
+    """Return "https" if TLS is spoken at a port of this computer with one of the certificates that
+    `trust` accepts, else "http"."""
     with (
         contextlib.suppress(OSError),
         socket.create_connection(("127.0.0.1", port), 2) as plain,
         trust.wrap_socket(plain, server_hostname="127.0.0.1"),
     ):
-        return f"https://127.0.0.1:{port}"
-    return f"http://127.0.0.1:{port}"
+        return "https"
+    return "http"
 
 
 def decoded(answer: "httpx.Response", kind: type[T]) -> T:

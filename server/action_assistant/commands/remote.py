@@ -234,7 +234,7 @@ def _stop(options: argparse.Namespace) -> int:
     unconfirmed, for `options.wait` seconds at most; print each doubt that is left. Return 0 if
     nothing is in doubt, else 1. Raise RequestRefused if the Stop is refused, CannotStart if the
     server does not answer."""
-    with running(options) as server:
+    with running(options, without_editor=True) as server:
         path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
         asked = insisting(server, "POST", path)
         with _following():
