@@ -1,6 +1,6 @@
 /** A graph of two robots, led step by step: started from the page, handed from one to the other, stopped. */
 
-import { expect, type Page, test } from "@playwright/test";
+import { type Browser, expect, type Page, test } from "@playwright/test";
 import { add, card, connect, enter, fitView, holdEnter, saved, setRobot } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { type Person, Product } from "./product";
@@ -194,7 +194,22 @@ test("two people draw what Scout does when Carrier has arrived; one robot is los
   await expect(moves(page)).toBeHidden();
 });
 
-test("an outcome that nothing shows is given by word, and shown as said", async () => {
+/** On a phone both questions of the run are there at once, and all in them is as high as a fingertip. */
+async function onPhone(browser: Browser): Promise<void> {
+  const options = { viewport: { width: 390, height: 844 }, hasTouch: true, isMobile: true };
+  const kai = await product.person(browser, "Kai", options);
+  await kai.page.goto(`${product.url}/graphs/${graph}`);
+  for (const name of [/^Outcome of Look/, "The run waits for a person"]) {
+    const asked = kai.page.getByRole("region", { name });
+    await expect(asked.getByRole("button")).toBeInViewport();
+    for (const each of await asked.locator("button, [type=text], label").all())
+      expect((await each.boundingBox())?.height).toBeGreaterThanOrEqual(44);
+  }
+  expect(kai.failures).toEqual([]);
+  await kai.context.close();
+}
+
+test("an outcome that nothing shows is given by word, and shown as said", async ({ browser }) => {
   const { page } = ada;
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
@@ -208,6 +223,7 @@ test("an outcome that nothing shows is given by word, and shown as said", async 
   await david.kill();
   david.start(product.data, { "*": { after_s: 60, stop_s: 0.05 } });
   const question = page.getByRole("region", { name: /^Outcome of Look/ });
+  await onPhone(browser);
   await question.getByText("True", { exact: true }).click();
   await question.getByRole("textbox").fill("The picture is on my desk");
   await holdEnter(page, question.getByRole("button", { name: /^Say that/ }));

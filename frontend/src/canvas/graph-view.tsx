@@ -2,7 +2,9 @@
 import { Background, BackgroundVariant, ReactFlow, type Viewport } from "@xyflow/react";
 import { type ReactNode, useEffect, useMemo, useState } from "react";
 import type { Graph, Key } from "../graph/model";
+import { robotNames } from "../graph/robots";
 import type { Progress } from "../status/progress";
+import { NAME_RANK, useNameColors } from "../ui/name-colors";
 import { LineContext, LineStore } from "./arrows/line-store";
 import { type CanvasNode, edgesOf, nodesOf, sceneOf, surroundingsOf } from "./elements";
 import { useLaidOut } from "./geometry/layout";
@@ -34,6 +36,7 @@ const LARGE = 150; // cards; beyond this number, cards out of sight are not rend
 
 export function GraphView(props: Props) {
   const { graph, progress, selected = NONE, label, onSelect, led = false, onPanned } = props;
+  useNameColors(NAME_RANK.actors, robotNames(graph.actions));
   const [measured, setMeasured] = useState<ReadonlyMap<Key, object>>(new Map());
   const laidOut = useLaidOut(graph);
   const places = useMemo(

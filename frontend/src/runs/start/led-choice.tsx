@@ -198,7 +198,7 @@ export function LedChoice({ actors, cast, lost, onCast, onLost }: LedChoiceProps
         <legend>When a robot does not answer, or its action cannot begin</legend>
         <div className={style.lost}>
           {LOST.map(([value, words]) => (
-            <label key={value}>
+            <label key={value} className="finger">
               <input
                 type="radio"
                 name="lost"
