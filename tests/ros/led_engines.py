@@ -43,6 +43,17 @@ ACCEPTED = Override(("two-at-once", "stop-across", "H12", "H14"), "They are far 
 LATE_S = 0.25  # from a start message to the begin of the code, on a busy computer
 
 
+#: Starts the engine's program so that it hears other hosts: it names this host alone by itself.
+ON_SUBNET = """
+import os, runpy, sys
+execve = os.execve
+more = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET", "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4"}
+os.execve = lambda program, words, environ: execve(program, words, environ | more)
+sys.argv = sys.argv[1:]
+runpy.run_path(sys.argv[0], run_name="__main__")
+"""
+
+
 class Line(NamedTuple):
     """An entry that the code of an action wrote: at `second` UTC it did `what` (begin, end, stop …), in
     the process `pid`."""
@@ -55,7 +66,7 @@ class Line(NamedTuple):
 
 class Engines:
     """Real engines, one for each robot, on domains from `domain` on. `rate`: their options about
-    indexing."""
+    indexing; `enters`: the command that runs them in another network."""
 
     def __init__(
         self,
@@ -64,8 +75,10 @@ class Engines:
         count: int = 2,
         *,
         rate: tuple[str, ...] = ("--indexing-rate", "0"),
+        enters: tuple[str, ...] = (),
     ) -> None:
         self.folder = folder
+        self.enters = enters
         self.rate = rate
         self.domain = domain
         self.names = {name: domain + n for n, name in enumerate([*PLAYERS.values()][:count])}
@@ -85,7 +98,8 @@ class Engines:
 
     def start(self, name: str) -> None:
         """Start the engine of a robot."""
-        command = [sys.executable, str(PROGRAM), name, str(self.names[name])]
+        inside = ["-c", ON_SUBNET] if self.enters else []
+        command = [*self.enters, sys.executable, *inside, str(PROGRAM), name, str(self.names[name])]
         command += [*self.rate, "--truth", str(self.folder / f"truth-{name}")]
         with (self.folder / f"engine-{name}.log").open("a") as log:
             self.processes[name] = subprocess.Popen(command, stdout=log, stderr=log)

@@ -1,7 +1,9 @@
-"""Three emulated robots are led over a network that delays and loses messages, with gaps of seconds.
+"""Three robots, emulated or real, are led over a network that delays and loses messages, with gaps of
+seconds.
 
 `TEST_LONG` runs it, as root with /dev/net/tun; `TEST_ROUGH_S` is for how long (default 60),
 `TEST_ROUGH` the delay in ms, the share of lost frames and the longest gap in seconds (default 20 0.05 4).
+Real engines need ENGINE_LAB and UMRF_SHARED; the code of their actions writes down what it does.
 """
 
 import os
@@ -21,13 +23,15 @@ pytest.importorskip(
 
 from action_assistant.errors import Refused
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.runs.events import PieceBegan, PieceEnded, Published
+from action_assistant.runner.runs.events import Ended, PieceBegan, PieceEnded, Published
 from action_assistant.runner.runs.views import time as as_text
 from action_assistant.runner.start.admission import GoOnRequest
-from ros.led_engines import ACCEPTED, PLAYERS, as_led, watch
+from ros.led_engines import ACCEPTED, PLAYERS, Engines, Line, as_led, watch
 from ros.led_runner import is_over, led_runner
 from ros.robots import RobotProcess
+from ros.test_engine_led_faults import Told
 from runner.harness import ANN, BEN, MemoryJournal
+from support.real_engine import needs_engine
 
 SECONDS = float(os.environ.get("TEST_ROUGH_S", "60"))
 ROUGH = os.environ.get("TEST_ROUGH", "20 0.05 4").split()
@@ -38,15 +42,47 @@ SCRIPT = {
     "OxWork_2": [{"after_s": 0.15, "result": "on_false"}],
 }
 
+
+def belied(told: Told, lines: list[Line], count: Counter[str]) -> list[str]:
+    """Return what the code of the actions belies: more begins than pieces that left, and anything that
+    it did after its piece, and the whole run, was called over. `lines`: what it did since the start."""
+    found: list[str] = []
+    left = Counter(told.pieces[piece][1] for _, piece, _ in told.published())
+    begun = Counter(line.action for line in lines if line.what == "begin")
+    count["begun by the code"] += begun.total()
+    found += [
+        f"{node} has begun {begun[node]} times and left {left[node]} times"
+        for node in begun
+        if begun[node] > left[node]
+    ]
+    over = next(each.at for each in told.run if isinstance(each, Ended))
+    found += [f"{line} after the end of the run" for line in lines if line.second * 1e6 > over]
+    for at, piece, state in told.ends():
+        node = told.pieces[piece][1]
+        later = [each for each, other, _ in told.published() if told.pieces[other][1] == node]
+        until = min((each for each in later if each > at), default=over)
+        found += [
+            f"{line} after its piece was {state}"
+            for line in lines
+            if line.action == node and at < line.second * 1e6 < until
+        ]
+    count["ends compared with the code"] += len(told.ends())
+    return found
+
+
 pytestmark = [pytest.mark.long, pytest.mark.timeout(0)]
 
 
-def test_led_runs_over_a_rough_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("kind", ["emulated", pytest.param("real", marks=needs_engine)])
+def test_led_runs_over_a_rough_network(
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, request: pytest.FixtureRequest
+) -> None:
     if not ROBOTS:
         if os.geteuid() != 0 or not Path("/dev/net/tun").exists():
             pytest.skip("it needs root and /dev/net/tun")
         program = Path(__file__).with_name("rough_network.py")
-        inside = [sys.executable, "-m", "pytest", "-q", "-s", "-m", "long", __file__]
+        test = f"{__file__}::{request.node.name}"
+        inside = [sys.executable, "-m", "pytest", "-q", "-s", "-m", "long", test]
         done = subprocess.run([sys.executable, str(program), *ROUGH, *inside], check=False)
         assert done.returncode == 0
         return
@@ -55,9 +91,12 @@ def test_led_runs_over_a_rough_network(tmp_path: Path, monkeypatch: pytest.Monke
     count: Counter[str] = Counter()
     failed: list[str] = []
     proven: list[float] = []
-    names = {name: 30 + n for n, name in enumerate(PLAYERS.values())}
+    enters = ("nsenter", "--target", ROBOTS, "--net")
+    engines = Engines(tmp_path, 30, len(PLAYERS), enters=enters)
+    names = engines.names
 
     async def lead(control: ExecutionService, journal: MemoryJournal, until: float) -> None:
+        before = len(engines.lines())
         run = (
             await control.start(as_led(watch("watch"), lost="wait", override=ACCEPTED), ANN)
         ).run.id
@@ -93,6 +132,9 @@ def test_led_runs_over_a_rough_network(tmp_path: Path, monkeypatch: pytest.Monke
                 if each.outcome != ("on_false" if each.node == "OxWork_2" else "on_true"):
                     failed.append(f"{each.node} ended {each.outcome}")
         count[f"ended {journal.history(run).state}"] += 1
+        if kind == "real":
+            await anyio.sleep(2)
+            failed.extend(belied(Told(journal, run), engines.lines()[before:], count))
 
     async def main() -> None:
         async with led_runner(names) as (control, journal):
@@ -107,8 +149,11 @@ def test_led_runs_over_a_rough_network(tmp_path: Path, monkeypatch: pytest.Monke
 
     last: list[str] = []
     with ExitStack() as opened:
+        opened.callback(engines.end)
         for name, domain in names.items():
-            enters = ("nsenter", "--target", ROBOTS, "--net")
+            if kind == "real":
+                engines.start(name)
+                continue
             process = RobotProcess(
                 domain, tmp_path, SCRIPT, "--quirk", "loss=0", name=name, wrapper=enters
             )
