@@ -194,9 +194,7 @@ def test_a_run_is_stopped_and_that_is_proven(product: Product, files: dict[str, 
         assert runner.get(f"/api/runs/{run}").json()["state"] == "stopped"
 
 
-def test_a_run_is_stopped_while_no_editor_answers(
-    product: Product, files: dict[str, str]
-) -> None:
+def test_a_run_is_stopped_while_no_editor_answers(product: Product, files: dict[str, str]) -> None:
     graph = imported(product, files["graph"])
     run = product.cli("run", graph, "--script", files["endless"], "--no-wait").stdout.strip()
     editor = product.process("editor")
