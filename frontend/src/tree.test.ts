@@ -85,7 +85,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "editor",
     "home",
   ]),
-  account: ["words", "ui", "api"],
+  account: ["clock", "words", "ui", "api"],
   administration: ["clock", "words", "ui", "api"],
   programs: ["words", "ui", "api"],
   app: [

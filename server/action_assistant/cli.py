@@ -97,7 +97,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "link": CommandEntry(
         "people", "print the link that signs the owner in, of a server that runs", described=True
     ),
-    "people": CommandEntry("people", "links that let people in: list, invite, revoke"),
+    "people": CommandEntry(
+        "people", "persons and links that let people in: list, link, end, invite, revoke"
+    ),
     "login": CommandEntry(
         "logins",
         "sign in to a server elsewhere: a person confirms a code on its page",

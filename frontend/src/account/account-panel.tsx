@@ -10,6 +10,7 @@ import {
 } from "@mantine/core";
 import {
   IconDeviceDesktop,
+  IconDevices,
   IconFileSearch,
   IconHelp,
   IconLogout,
@@ -59,6 +60,7 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
   const { person, rename } = usePerson();
   const { runner } = useLive();
   const mayLook = useMay("restore");
+  const mayShare = useMay("share");
   const [name, setName] = useState(rememberedName() || person.name);
   const [problem, setProblem] = useState("");
   const save = async () => {
@@ -86,20 +88,28 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
       }}
     >
       <Stack gap="sm">
-        <Group gap="sm" align="end" wrap="nowrap">
-          <TextInput
-            label="Your name"
-            value={name}
-            maxLength={60}
-            error={problem || undefined}
-            onChange={(event) => setName(event.currentTarget.value)}
-            data-autofocus
-            flex={1}
-          />
-          <Button type="submit" disabled={name.trim() === "" || name === person.name}>
-            Save
-          </Button>
-        </Group>
+        {person.personal ? (
+          <Text>
+            <b>
+              <bdi>{person.name}</bdi>
+            </b>
+          </Text>
+        ) : (
+          <Group gap="sm" align="end" wrap="nowrap">
+            <TextInput
+              label="Your name"
+              value={name}
+              maxLength={60}
+              error={problem || undefined}
+              onChange={(event) => setName(event.currentTarget.value)}
+              data-autofocus
+              flex={1}
+            />
+            <Button type="submit" disabled={name.trim() === "" || name === person.name}>
+              Save
+            </Button>
+          </Group>
+        )}
         {person.role !== "owner" && (
           <Text size="sm" c="dimmed">
             You are here as {person.role}: you may {ROLE_WORDS[person.role]}.
@@ -124,6 +134,15 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
           onClick={onClose}
         >
           Programs
+        </Button>
+        <Button
+          component={Link}
+          to="/people"
+          variant="default"
+          leftSection={<IconDevices size={15} aria-hidden />}
+          onClick={onClose}
+        >
+          {mayShare ? "People and devices" : "Your devices"}
         </Button>
         {mayLook && (
           <Button

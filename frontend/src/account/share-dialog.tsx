@@ -9,6 +9,7 @@ import {
   IconQrcode,
 } from "@tabler/icons-react";
 import { useState } from "react";
+import { Link } from "wouter";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
 import { pageUrl } from "../api/page-url";
@@ -109,7 +110,8 @@ function NewLink() {
         onChange={setRole}
       />
       <Text size="sm" c="dimmed">
-        Everybody who has the link may {ROLE_WORDS[role]}.
+        Everybody who has the link may {ROLE_WORDS[role]}. A link for one person is made on{" "}
+        <Link to="/people">People and devices</Link>.
       </Text>
       <Group wrap="nowrap" align="end" gap="sm">
         <TextInput

@@ -29,12 +29,14 @@ import style from "./sign-in-gate.module.css";
 
 const SignIn = boundedPart(() => import("./sign-in").then((part) => part.SignIn));
 const Invitation = boundedPart(() => import("./sign-in").then((part) => part.Invitation));
+const DeviceSignIn = boundedPart(() => import("./sign-in").then((part) => part.DeviceSignIn));
 const SignInBar = boundedPart(() => import("./sign-in").then((part) => part.SignInBar));
 
 type Gate =
   | { at: "knocking" }
   | { at: "outside"; why: string }
   | { at: "invited"; key: Credential; invited: InvitationPreview }
+  | { at: "device"; code: Credential }
   /** `offline`: no server has said who this is; it is who was here last. */
   | { at: "inside"; person: Person; visit: number; offline?: true };
 
@@ -42,6 +44,7 @@ async function knock(): Promise<Gate> {
   const key = takeCredential();
   const before = rememberedPerson();
   try {
+    if (key?.kind === "device") return { at: "device", code: key };
     if (key?.kind === "invitation") return await knockInvited(key);
     const person = key === null ? await known(before) : await openSession(key);
     return { at: "inside", person, visit: 0 };
@@ -71,9 +74,11 @@ const PATIENCE = 5_000; // ms until a device shows what it keeps
  */
 const known = (before: Person | null) => currentPerson(before === null ? undefined : PATIENCE);
 
-/** Let a person in who has given a name in this browser before; ask others for a name first. */
+/** Let a person in who has given a name in this browser before; ask others for a name first. A personal
+ * link is used only when its person says so, since it works once. */
 async function knockInvited(key: Credential): Promise<Gate> {
   const invited = await readInvitation(key.text);
+  if (invited.name != null) return { at: "invited", key, invited };
   const known = rememberedName() !== "" || (await currentPerson().catch(() => null))?.name;
   if (!known) return { at: "invited", key, invited };
   return { at: "inside", person: await openSession(key), visit: 0 };
@@ -84,7 +89,7 @@ function isWithdrawn(error: unknown): boolean {
 }
 
 const WITHDRAWN =
-  "Your link was revoked. Ask for another one. Changes that were not sent stay on this device.";
+  "Your link was revoked, or an owner ended your access. Ask for another link. Changes that were not sent stay on this device.";
 
 const visitOf = (gate: Gate): number => (gate.at === "inside" ? gate.visit : 0);
 
@@ -195,6 +200,9 @@ export function SignInGate({ children }: { children: ReactNode }) {
   if (gate.at === "knocking") return <div aria-busy="true" />;
   if (gate.at === "invited") {
     return <Invitation key={gate.key.text} link={gate.key} invited={gate.invited} onOpen={letIn} />;
+  }
+  if (gate.at === "device") {
+    return <DeviceSignIn key={gate.code.text} code={gate.code} onOpen={letIn} />;
   }
   if (hold === null) {
     return <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />;

@@ -10,6 +10,7 @@ import {
   type Person,
   ROLE_WORDS,
   rememberName,
+  signInByCode,
 } from "../api/session";
 import { Logo } from "../ui/top-bar";
 import { isolated } from "../words/isolated";
@@ -21,13 +22,34 @@ interface Props {
   onOpen: (person: Person) => void;
 }
 
-/** Return the credential in a pasted text; a text without a fragment is taken for the token. */
+/** Return the credential in a pasted text. A text without a fragment is a code of 8 characters, or else
+ * the token. */
 export function pastedCredential(pasted: string): Credential {
-  return credentialIn(pasted) ?? { kind: "token", text: pasted.trim() };
+  const text = pasted.trim();
+  const kind = /^[A-Za-z0-9]{4}[- ]?[A-Za-z0-9]{4}$/.test(text) ? "device" : "token";
+  return credentialIn(pasted) ?? { kind, text };
+}
+
+/** Return a sign-in by a credential, and what to show while another device has to confirm it. */
+function useEnter() {
+  const [number, setNumber] = useState("");
+  const enter = (key: Credential) => {
+    if (key.kind !== "device") return openSession(key);
+    return signInByCode(key.text, (waiting) => setNumber(waiting.number)).finally(() =>
+      setNumber(""),
+    );
+  };
+  const waiting = number !== "" && (
+    <Text mt="sm" role="status">
+      Confirm this device on the other one. Both show <b>{number}</b>.
+    </Text>
+  );
+  return { enter, waiting };
 }
 
 export function SignIn({ why, onOpen }: Props) {
-  const entry = useSignInField((pasted) => openSession(pastedCredential(pasted)), onOpen, why);
+  const { enter, waiting } = useEnter();
+  const entry = useSignInField((pasted) => enter(pastedCredential(pasted)), onOpen, why);
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
@@ -37,7 +59,8 @@ export function SignIn({ why, onOpen }: Props) {
         </Title>
         <Text c="dimmed" mt="xs">
           Open the link that the server printed when it started, or the one that you were given. It
-          signs this browser in. You can paste it here as well.
+          signs this browser in. You can paste it here as well, or type the code that another device
+          of yours shows.
         </Text>
         <form {...entry.form}>
           <PasswordInput
@@ -52,11 +75,48 @@ export function SignIn({ why, onOpen }: Props) {
           <Button {...entry.button} variant="filled" fullWidth mt="md">
             Sign in
           </Button>
+          {waiting}
         </form>
         <Text size="xs" c="dimmed" mt="lg">
           Is this your server, and you lost the link? Paste its token instead: the content of the
           file <code>token</code> in the server’s data folder.
         </Text>
+      </Paper>
+    </main>
+  );
+}
+
+/** The page behind the QR code that another device of the person shows. */
+export function DeviceSignIn({ code, onOpen }: { code: Credential; onOpen: Props["onOpen"] }) {
+  const { enter, waiting } = useEnter();
+  const [problem, setProblem] = useState("");
+  const [busy, setBusy] = useState(false);
+  const go = () => {
+    setBusy(true);
+    enter(code).then(onOpen, (error) => {
+      setProblem(errorText(error));
+      setBusy(false);
+    });
+  };
+  return (
+    <main className={style.page}>
+      <Paper className={style.card} withBorder radius="lg">
+        <Logo />
+        <Title order={1} size="h3" mt="md">
+          Sign in on this device
+        </Title>
+        <Text c="dimmed" mt="xs">
+          Then confirm it on the device that shows the code.
+        </Text>
+        {problem !== "" && (
+          <Text className="ink-error" mt="sm" role="alert">
+            {problem}
+          </Text>
+        )}
+        <Button variant="filled" fullWidth mt="md" loading={busy} onClick={go}>
+          Sign in
+        </Button>
+        {waiting}
       </Paper>
     </main>
   );
@@ -69,34 +129,50 @@ interface InvitationProps {
 }
 
 export function Invitation({ link, invited, onOpen }: InvitationProps) {
-  const entry = useSignInField(async (name) => {
-    const person = await openSession(link, name);
-    rememberName(person.name);
-    return person;
-  }, onOpen);
+  const { name } = invited;
+  const entry = useSignInField(
+    async (typed) => {
+      const person = await openSession(link, name == null ? typed : "");
+      if (name == null) rememberName(person.name);
+      return person;
+    },
+    onOpen,
+    "",
+    name ?? "",
+  );
+  const who = name == null ? "you" : isolated(name);
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
         <Logo />
         <Title order={1} size="h3" mt="md">
-          {invited.by === "" ? "You are invited" : `${isolated(invited.by)} invites you`} as{" "}
-          {invited.role}
+          {invited.by === ""
+            ? `${name == null ? "You are" : `${who} is`} invited`
+            : `${isolated(invited.by)} invites ${who}`}{" "}
+          as {invited.role}
         </Title>
         <Text c="dimmed" mt="xs">
           To TeMoto Action Assistant, where robot tasks are drawn and run. You may{" "}
           {ROLE_WORDS[invited.role]}.
         </Text>
         <form {...entry.form}>
-          <TextInput
-            mt="lg"
-            label="What should others see you as?"
-            maxLength={60}
-            autoFocus
-            autoComplete="name"
-            {...entry.field}
-          />
+          {name == null ? (
+            <TextInput
+              mt="lg"
+              label="What should others see you as?"
+              maxLength={60}
+              autoFocus
+              autoComplete="name"
+              {...entry.field}
+            />
+          ) : (
+            <Text mt="md" className={entry.field.error ? "ink-error" : ""}>
+              {entry.field.error ??
+                "This link works once, in one browser. Open it where you work; add other devices from there."}
+            </Text>
+          )}
           <Button {...entry.button} variant="filled" fullWidth mt="md">
-            Come in
+            {name == null ? "Come in" : `Come in as ${isolated(name)}`}
           </Button>
         </form>
       </Paper>
@@ -105,7 +181,8 @@ export function Invitation({ link, invited, onOpen }: InvitationProps) {
 }
 
 export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
-  const entry = useSignInField((pasted) => openSession(pastedCredential(pasted)), onOpen);
+  const { enter, waiting } = useEnter();
+  const entry = useSignInField((pasted) => enter(pastedCredential(pasted)), onOpen);
   return (
     <form className={style.bar} aria-label="Sign in again" {...entry.form}>
       <p role="status">
@@ -121,6 +198,7 @@ export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
       <Button {...entry.button} variant="filled">
         Sign in
       </Button>
+      {waiting}
     </form>
   );
 }
@@ -130,8 +208,9 @@ export function useSignInField(
   enter: (typed: string) => Promise<Person>,
   onOpen: (person: Person) => void,
   why = "",
+  filled = "",
 ) {
-  const [typed, setTyped] = useState("");
+  const [typed, setTyped] = useState(filled);
   const [problem, setProblem] = useState(why);
   const [busy, setBusy] = useState(false);
   const submit = async () => {

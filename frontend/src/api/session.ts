@@ -3,21 +3,26 @@ import { editor, runnerAt } from "./client";
 import { errorText, Refusal } from "./http";
 import type { EditorApi } from "./schema/editor";
 
-export type Person = EditorApi["Person"];
+/** `personal`: an owner has given the name, since the person came by a personal link. */
+export type Person = EditorApi["Person"] & { readonly personal?: boolean };
 
 const NAME_KEY = "aa.name";
 
-/** Credential for signing in: the server's token, or an invitation (`ID.SECRET`). */
-export type Credential =
-  | { readonly kind: "token"; readonly text: string }
-  | { readonly kind: "invitation"; readonly text: string };
+/** Credential for signing in: the server's token, an invitation (`ID.SECRET`), or the code that another
+ * device of the person shows. */
+export interface Credential {
+  readonly kind: "token" | "invitation" | "device";
+  readonly text: string;
+}
+
+const KINDS = { t: "token", i: "invitation", d: "device" } as const;
 
 /** The key in a link or a fragment; null when it has none. */
 export function credentialIn(link: string): Credential | null {
-  const found = /[#&](t|i)=([^&\s]+)/.exec(link);
+  const found = /[#&]([tid])=([^&\s]+)/.exec(link);
   if (!found?.[1] || !found[2]) return null;
   const text = decodeURIComponent(found[2]);
-  return { kind: found[1] === "t" ? "token" : "invitation", text };
+  return { kind: KINDS[found[1] as keyof typeof KINDS], text };
 }
 
 /** The key in the address, which is erased from it at once. */
@@ -77,12 +82,32 @@ export function readInvitation(invitation: string): Promise<InvitationPreview> {
 /** Trades a key for a session. Throws `Refusal` when it does not fit. */
 export async function openSession(key: Credential, name = rememberedName()): Promise<Person> {
   const body = { [key.kind]: key.text, ...(name !== "" && { name }) };
-  return (await editor.post("/api/session", { body })).person;
+  return personIn(await editor.post("/api/session", { body }));
+}
+
+const personIn = ({ person, personal }: EditorApi["SignedIn"]): Person => ({ ...person, personal });
+
+const DEVICE_LOOK = 1_000; // ms between two questions whether this device is confirmed
+
+/** Signs this device in by the code that another one shows. Calls `onWaiting` with the number that both
+ * show, and waits until the person has confirmed it there. Throws `Refusal` if they do not. */
+export async function signInByCode(
+  code: string,
+  onWaiting: (waiting: EditorApi["WaitingDevice"]) => void,
+): Promise<Person> {
+  const waiting = await editor.post("/api/session/device", { body: { code } });
+  onWaiting(waiting);
+  for (;;) {
+    const body = { claim: waiting.claim };
+    const { signed_in } = await editor.post("/api/session/device/answer", { body });
+    if (signed_in) return personIn(signed_in);
+    await new Promise((resolve) => setTimeout(resolve, DEVICE_LOOK));
+  }
 }
 
 /** Return the person of the cookie. Throws a `Refusal` with status 401 without one. */
 export async function currentPerson(timeoutMs = 20_000): Promise<Person> {
-  return (await editor.get("/api/session", { timeoutMs })).person;
+  return personIn(await editor.get("/api/session", { timeoutMs }));
 }
 
 const FAREWELL_KEY = "aa.farewell";
@@ -129,7 +154,7 @@ export function takeFarewell(): string {
 export async function renamePerson(name: string): Promise<Person> {
   const answer = await editor.post("/api/session", { body: { name } });
   rememberName(name);
-  return answer.person;
+  return personIn(answer);
 }
 
 export type Role = EditorApi["Person"]["role"];

@@ -25,6 +25,7 @@ import {
   CompareScreen,
   GraphScreen,
   HomeScreen,
+  PeopleScreen,
   ProgramsScreen,
   RobotsScreen,
   RunScreen,
@@ -97,6 +98,11 @@ function Screens() {
       <Route path="/admin">
         <Screen crumbs={[graphs, { label: "Administration" }]}>
           <AdministrationScreen />
+        </Screen>
+      </Route>
+      <Route path="/people">
+        <Screen crumbs={[graphs, { label: "People" }]}>
+          <PeopleScreen />
         </Screen>
       </Route>
       <Route path="/audit">

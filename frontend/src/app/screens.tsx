@@ -16,6 +16,7 @@ const RobotsPage = lazyPart(() => import("../robots/robots-page").then((part) =>
 const AdministrationPage = lazyPart(() =>
   import("../administration/administration-page").then((part) => part.AdministrationPage),
 );
+const PeoplePage = lazyPart(() => import("../account/people-page").then((part) => part.PeoplePage));
 const AuditPage = lazyPart(() =>
   import("../administration/audit-page").then((part) => part.AuditPage),
 );
@@ -39,6 +40,7 @@ const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "pr
   ["/admin", AdministrationPage],
   ["/audit", AuditPage],
   ["/programs", ProgramsPage],
+  ["/people", PeoplePage],
   ["/", HomeScreen],
 ];
 
@@ -94,6 +96,16 @@ export function AdministrationScreen() {
     <PageFrame>
       <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "Administration" }]} />
       <AdministrationPage />
+    </PageFrame>
+  );
+}
+
+export function PeopleScreen() {
+  useTitle("People");
+  return (
+    <PageFrame>
+      <PageBar crumbs={[{ label: "Graphs", to: "/" }, { label: "People" }]} />
+      <PeoplePage />
     </PageFrame>
   );
 }

@@ -1,8 +1,8 @@
-"""`people`: who may come in by which link, and the end of a link; `link`: the owner's own."""
+"""`people`: persons, their links, and links of groups; `link`: the owner's own."""
 
 import argparse
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Final, get_args
 
 import msgspec
 
@@ -18,14 +18,18 @@ from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.private_files import own_folder
 from action_assistant.safe_text import one_line
 from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.people_files import PersonFile
 from action_assistant.web.auth.revocations import Revocations
+from action_assistant.web.auth.roles import Role
 
 if TYPE_CHECKING:  # slow to load, and most calls do not need it
+    from action_assistant.editor.api.members import Members
     from action_assistant.editor.people.invitations import Invitation
+    from action_assistant.editor.people.members import Member
 
 
 def _add_people(people: argparse.ArgumentParser) -> None:
-    people.description = "Links that let people in without the token, each with a role."
+    people.description = "Persons with a role, and links that let people in without the token."
     people.epilog = "example: action-assistant people invite editor --label Mari"
     words = people.add_subparsers(dest="word", required=True, metavar="WORD")
 
@@ -38,6 +42,8 @@ def _add_people(people: argparse.ArgumentParser) -> None:
     invite.add_argument("--label", default="", help="whom it is for")
     invite.set_defaults(handler=_invite)
 
+    _add_persons(words)
+
     revoke = command(
         words,
         "revoke",
@@ -46,6 +52,31 @@ def _add_people(people: argparse.ArgumentParser) -> None:
     )
     revoke.add_argument("id", metavar="ID", help="as `people list` shows it")
     revoke.set_defaults(handler=_revoke)
+
+
+def _add_persons(words: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    link = command(
+        words,
+        "link",
+        "make a link for one person, who is added if they are new; it works once, also while no "
+        "server answers",
+        "Mari --role owner",
+    )
+    link.add_argument("name", metavar="NAME")
+    link.add_argument("--role", choices=get_args(Role), help="of a new person; default: operator")
+    link.add_argument(
+        "--hours", type=float, default=72.0, help="until it expires; default: %(default)s"
+    )
+    link.set_defaults(handler=_link_person)
+
+    end = command(
+        words,
+        "end",
+        "end a person: all devices, links and tokens, also while no server answers",
+        "Mari",
+    )
+    end.add_argument("person", metavar="NAME_OR_ID")
+    end.set_defaults(handler=_end_person)
 
 
 def _add_link(link: argparse.ArgumentParser) -> None:
@@ -65,8 +96,127 @@ def _list(options: argparse.Namespace) -> int:
         from action_assistant.editor.api.invitations import Sharing
 
         sharing = decoded(answer, Sharing)
+        for person in _members(server).people:
+            _show_person(person, sharing.origins)
         for each in sharing.invitations:
             _show(sharing.origins, each)
+    return 0
+
+
+def _members(server: Server) -> "Members":
+    from action_assistant.editor.api.members import Members
+
+    return decoded(server.editor("GET", "/api/members"), Members)
+
+
+def _show_person(person: "Member", origins: Sequence[str]) -> None:
+    over = "  (ended)" if person.ended_at is not None else ""
+    print(one_line(f"{person.id}  {person.role}  {person.name}{over}"))
+    for link in person.links:
+        if link.used_at is not None:
+            place = f" at {link.address}" if link.address else ""
+            used = msgspec.to_builtins(link.used_at)
+            print(one_line(f"    came in by a link with {link.browser}{place}, {used}"))
+        elif link.path is not None:
+            _show_path(link.path, origins)
+
+
+def _show_path(path: str, origins: Sequence[str]) -> None:
+    for origin in origins[:1] or [""]:
+        print(f"    {origin}{path}")
+
+
+def _link_person(options: argparse.Namespace) -> int:
+    """Make a link for one person by the server, or in the data folder where no server answers."""
+    try:
+        with running(options) as server:
+            return _link_at(server, options)
+    except CannotStart:
+        data = options.data.resolve()
+        if options.url or not data.is_dir():
+            raise
+        from action_assistant.editor.people.members import make_offline
+
+        keys = Keys.known(data)
+        try:
+            path = make_offline(own_folder(data), keys, options.name, options.role, options.hours)
+        except OSError as error:
+            raise CannotStart(f"Cannot write to {data}: {error.strerror}.") from error
+        print("No server answers. When it runs, this path behind its address lets one browser in:")
+        _show_path(path, ())
+        return 0
+
+
+def _link_at(server: Server, options: argparse.Namespace) -> int:
+    from action_assistant.editor.people.members import Member
+
+    members = _members(server)
+    known = [each for each in members.people if _is_meant(each, options.name)]
+    if not known:
+        wanted = {
+            "name": options.name,
+            "role": options.role or "operator",
+            "hours": options.hours,
+        }
+        answer = server.editor("POST", "/api/members", json=wanted)
+    else:
+        path = f"/api/members/{known[0].id}"
+        if options.role is not None and options.role != known[0].role:
+            server.editor("PATCH", path, json={"role": options.role})
+        answer = server.editor("POST", f"{path}/link", json={"hours": options.hours})
+    person = decoded(answer, Member)
+    _tell_runner(server, person)
+    print(one_line(f"{person.id}  {person.role}  {person.name}"))
+    for link in person.links:
+        if link.path is not None:
+            _show_path(link.path, members.origins or (server.url,))
+    return 0
+
+
+def _tell_runner(server: Server, person: "Member") -> None:
+    """Store a person at a runner that may have a data folder of its own."""
+    until = None if person.until is None else person.until.timestamp()
+    file = PersonFile(person.id, person.name, person.role, person.groups, until)
+    try:
+        server.runner("PUT", f"/api/members/{person.id}", json=msgspec.to_builtins(file))
+    except (RequestRefused, CannotStart) as error:
+        raise RequestRefused(
+            f"Done, but a runner with a data folder of its own has not been told: {error}"
+        ) from error
+
+
+def _is_meant(person: "Member", text: str) -> bool:
+    same = person.name.casefold() == text.casefold()
+    return person.ended_at is None and (person.id == text or same)
+
+
+def _end_person(options: argparse.Namespace) -> int:
+    """End a person on both processes, or in the data folder where no server answers."""
+    try:
+        with running(options) as server:
+            meant = [each for each in _members(server).people if _is_meant(each, options.person)]
+            if len(meant) != 1:
+                raise RequestRefused(f"No person is called {options.person!r}.")
+            person = meant[0].id
+            server.editor("POST", f"/api/members/{person}/end")
+            server.runner("POST", "/api/revocations", json={"person": person})
+    except CannotStart as silent:
+        data = options.data.resolve()
+        if options.url or not data.is_dir():
+            raise
+        from action_assistant.editor.people.members import known_offline
+
+        persons = known_offline(data, options.person)
+        if not persons:
+            raise CannotStart(
+                f"{silent} No person in {data} is called {options.person!r}."
+            ) from silent
+        try:
+            for each in persons:
+                Revocations(own_folder(data)).end_person(each.id)
+        except Refused as error:
+            raise CannotStart(f"{silent} {error}") from error
+    print(one_line(f"{options.person} is out on all devices, for good."))
     return 0
 
 

@@ -525,20 +525,27 @@ class Members:
         return replace(link, made_by=self._people.person(link.made_by.id), path=path)
 
 
-def make_offline(data: Path, keys: Keys, name: str, role: Role, hours: float) -> str:
-    """Make a personal link in a data folder without a server, and return its path. The person is
-    the one of this name whose file is there, or a new one. Raise OSError if it cannot be written."""
-    files = PeopleFiles(data)
-    known = [
-        found
-        for path in (data / people_files.FOLDER).glob("*.json")
-        if (found := files.get(path.stem))
+def known_offline(data: Path, text: str) -> list[PersonFile]:
+    """Return the persons in a data folder with this name or id who were not ended."""
+    files, revoked = PeopleFiles(data), Revocations(data)
+    paths = (data / people_files.FOLDER).glob("*.json")
+    found = [each for path in paths if (each := files.get(path.stem)) is not None]
+    return [
+        each
+        for each in found
+        if text.casefold() in {each.name.casefold(), each.id.casefold()}
+        and not revoked.person_ended(each.id)
     ]
-    same = [each for each in known if each.name.casefold() == name.casefold()]
-    revoked = Revocations(data)
-    same = [each for each in same if not revoked.person_ended(each.id)]
-    person = replace(same[0], role=role) if same else PersonFile(random_id(), name, role)
-    link = OfflineLink(random_id(), person, time.time() + hours * 3600)
+
+
+def make_offline(data: Path, keys: Keys, name: str, role: Role | None, hours: float) -> str:
+    """Make a personal link in a data folder without a server, and return its path. The person is
+    the one of this name who is there, or a new one. Raise OSError if it cannot be written."""
+    name = " ".join(name.split())[:NAME_LIMIT] or "Owner"
+    same = known_offline(data, name)
+    person = same[0] if same else PersonFile(random_id(), name, "operator")
+    person = person if role is None else replace(person, role=role)
+    link = OfflineLink(random_id(), person, time.time() + min(hours, MOST_HOURS) * 3600)
     folder = data / people_files.FOLDER / _LINKS
     make_folder(folder)
     replace_file(folder / f"{link.id}.json", msgspec.json.encode(link))

@@ -82,7 +82,9 @@ class DeviceCodes:
     def __init__(self, clock: Callable[[], float] = time.monotonic, *, limits: bool = True) -> None:
         self._clock = clock
         self._pending: dict[str, _Pending] = {}
-        self._guesses = TokenBucket(_GUESSES_AT_ONCE, _GUESSES_PER_MINUTE / 60) if limits else None
+        self._guesses = (
+            TokenBucket(_GUESSES_AT_ONCE, _GUESSES_PER_MINUTE / 60, clock) if limits else None
+        )
 
     def open(self, session: Session) -> DeviceCode:
         """Make a code for a session; its earlier code is valid no more. Raise TooMany."""

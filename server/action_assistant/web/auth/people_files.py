@@ -52,7 +52,7 @@ class PeopleFiles:
         a file cannot be read, the person is what it said last: an old cookie may say more."""
         if person in self._unwritten:
             return self._unwritten[person]
-        if _ID.fullmatch(person) is None:
+        if _ID.fullmatch(person) is None or person == _GROUPS:
             return None
         path = self._path(person)
         known = self._read.get(person)
