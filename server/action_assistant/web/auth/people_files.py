@@ -3,9 +3,10 @@
 `people/ID.json` in the data folder holds the present name, role and groups of one person, and
 `people/groups.json` the names of groups. The editor writes both after its log. They are read
 without a database or the other process. A person without a file has what their cookie says, so that
-a full disk signs nobody out. What could not be written holds in this process until it ends.
+a full disk signs nobody out. What could not be written holds in this process, which tries again.
 """
 
+import contextlib
 import logging
 import re
 import threading
@@ -15,6 +16,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.errors import Unavailable
+from action_assistant.kit.retrying_thread import RetryingThread
 from action_assistant.private_files import make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.roles import Role
@@ -46,6 +48,7 @@ class PeopleFiles:
         self._read: dict[str, tuple[_State, PersonFile | None]] = {}
         self._unwritten: dict[str, PersonFile] = {}
         self._writing = threading.Lock()
+        self._later: Final = RetryingThread(self._write_now, "persons")
 
     def get(self, person: str) -> PersonFile | None:
         """Return what is known of a person; None if there was never a file that could be read. While
@@ -68,12 +71,16 @@ class PeopleFiles:
 
     def write(self, person: PersonFile) -> None:
         """Store a person durably. Raise Unavailable if that fails; it then holds in this process
-        until the process ends. Raise ValueError for a malformed id."""
+        only, until a later attempt succeeds. Raise ValueError for a malformed id."""
         if _ID.fullmatch(person.id) is None or person.id == _GROUPS:
             raise ValueError(f"{person.id!r} is no id of a person")
         with self._writing:
             self._unwritten[person.id] = person
-            self._replace(person.id, msgspec.json.encode(person))
+            try:
+                self._replace(person.id, msgspec.json.encode(person))
+            except Unavailable:
+                self._later.start()
+                raise
             del self._unwritten[person.id]
 
     def write_groups(self, names: dict[str, str]) -> None:
@@ -87,6 +94,14 @@ class PeopleFiles:
             return msgspec.json.decode(self._path(_GROUPS).read_bytes(), type=dict[str, str])
         except (OSError, msgspec.DecodeError):
             return {}
+
+    def _write_now(self) -> bool:
+        """Return whether all persons are written after another attempt."""
+        with self._writing, contextlib.suppress(Unavailable):
+            for person in tuple(self._unwritten.values()):
+                self._replace(person.id, msgspec.json.encode(person))
+                del self._unwritten[person.id]
+        return not self._unwritten
 
     def _path(self, name: str) -> Path:
         return self._folder / f"{name}.json"

@@ -8,6 +8,7 @@ disk.
 """
 
 import asyncio
+import contextlib
 import logging
 import os
 import re
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Final
 
 from action_assistant.errors import Unavailable
+from action_assistant.kit.retrying_thread import RetryingThread
 from action_assistant.web.auth.identity import Credential, Standing, Token
 from action_assistant.web.auth.keys import Session
 
@@ -43,6 +45,7 @@ class Revocations:
     def __init__(self, data: Path) -> None:
         self._folder = data / FOLDER
         self._unwritten: set[str] = set()
+        self._later: Final = RetryingThread(self._write_now, "marks")
         self._listed_at = 0  # when the folder had changed last, as it was listed
         try:
             self._folder.mkdir(
@@ -92,8 +95,8 @@ class Revocations:
 
     def add(self, invitation: str) -> None:
         """Revoke an invitation, at once and durably. Raise ValueError if the id is malformed; raise
-        Unavailable if the folder cannot be written, so that it holds only until this process
-        ends."""
+        Unavailable if the folder cannot be written, so that it holds only here, until a later
+        attempt succeeds."""
         if _ID.fullmatch(invitation) is None:
             raise ValueError(f"{invitation!r} is no id of an invitation")
         self._mark(invitation)
@@ -129,11 +132,18 @@ class Revocations:
             finally:
                 os.close(folder)
         except OSError as error:
+            self._later.start()
             raise Unavailable(
                 f"It holds here and now, but could not be written to {self._folder}: "
-                f"{error.strerror}. It is forgotten when this process ends."
+                f"{error.strerror}. It is tried again, and forgotten when this process ends."
             ) from error
         self._unwritten.discard(mark)
+
+    def _write_now(self) -> bool:
+        """Return whether all marks are written after another attempt."""
+        with contextlib.suppress(Unavailable):
+            self.write_again()
+        return not self._unwritten
 
     def _is_marked(self, mark: str) -> bool:
         if mark in self._marks:

@@ -246,6 +246,7 @@ class Sessions:
         person = await self._reception().come_in(link, browser, client_address(request.scope))
         now = session_of(request)
         if now is not None:
+            note_sign_out(self._audit, request)
             with contextlib.suppress(Unavailable):  # it holds here
                 await to_thread.run_sync(self._revoked.end, now.id)
         return self._keys.new_session(
