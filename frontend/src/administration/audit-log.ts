@@ -80,9 +80,10 @@ function fetchPage(
   name: LogName,
   runner: string | undefined,
   query: URLSearchParams,
+  timeoutMs: number,
   signal?: AbortSignal,
 ): Promise<AuditPage> {
-  const request = { query, signal, timeoutMs: 60_000 };
+  const request = { query, signal, timeoutMs };
   if (name === "editor") return editor.get("/api/audit", request);
   return runnerAt(runner).get("/api/audit", request) as Promise<AuditPage>;
 }
@@ -105,12 +106,14 @@ export function mergedRows(logs: readonly ReadLog[]): readonly AuditRow[] {
 }
 
 const PAGE = 100;
+const PAGE_MS = 10_000; // after which the part of a process is said to be missing
+const FILE_MS = 60_000;
 
 export function useAuditLog(name: LogName, runner: string | undefined, filter: AuditFilter) {
   const query = useInfiniteQuery({
     queryKey: ["audit", name, runner, filter],
     queryFn: ({ pageParam, signal }) =>
-      fetchPage(name, runner, asked(filter, PAGE, pageParam), signal),
+      fetchPage(name, runner, asked(filter, PAGE, pageParam), PAGE_MS, signal),
     initialPageParam: null as number | null,
     getNextPageParam: (page) => page.before,
     enabled: name === "editor" || runner !== undefined,
@@ -145,20 +148,19 @@ export async function fetchEverything(
 ): Promise<AuditFile> {
   const logs: AuditRow[][] = [];
   const lacks: string[] = [];
-  for (const name of ["editor", "runner"] as const) {
+  for (const log of ["editor", "runner"] as const) {
     const rows: AuditRow[] = [];
     try {
       let before: number | null = null;
       do {
-        const page: AuditPage = await fetchPage(name, runner, asked(filter, 1000, before));
+        const page: AuditPage = await fetchPage(log, runner, asked(filter, 1000, before), FILE_MS);
         rows.push(...page.rows);
         before = page.before;
         onRows(logs.flat().length + rows.length);
       } while (before !== null && rows.length < MOST_ROWS);
-      if (before !== null)
-        lacks.push(`Only the newest ${MOST_ROWS} rows of the ${name} are in it.`);
+      if (before !== null) lacks.push(`Only the newest ${MOST_ROWS} rows of the ${log} are in it.`);
     } catch (error) {
-      lacks.push(`The part of the ${name} is missing: ${errorText(error)}`);
+      lacks.push(`The part of the ${log} is missing: ${errorText(error)}`);
     }
     logs.push(rows);
   }

@@ -9,7 +9,6 @@ import { useGraphs } from "../api/graphs";
 import { useLive } from "../api/page-link";
 import { currentName, useKnownPeople, useMay, usePerson } from "../api/people";
 import { Empty } from "../ui/empty";
-import { LongList } from "../ui/long-list";
 import { clock, day, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
 import {
@@ -78,8 +77,8 @@ function Inside() {
         onChange={(next) => go(`/audit?${auditQueryOf(next)}`, { replace: true })}
       />
       <Download filter={filter} runner={runner} />
-      <Away name="editor" problem={logs.editor.log.problem} />
-      <Away name="runner" problem={logs.runner.log.problem} />
+      <Away log="editor" problem={logs.editor.log.problem} />
+      <Away log="runner" problem={logs.runner.log.problem} />
       <section className="page-card min-w-0" aria-label="Audit" aria-busy={waits}>
         {rows.length === 0 && !waits && older.length === 0 ? (
           <Empty icon={<IconFileSearch size={22} />} title="Nothing is found">
@@ -87,11 +86,9 @@ function Inside() {
           </Empty>
         ) : (
           <ol className={style.rows}>
-            <LongList rowHeight={3}>
-              {rows.map((row) => (
-                <Row key={row.id} row={row} who={nameOf(row)} now={now} />
-              ))}
-            </LongList>
+            {rows.map((row) => (
+              <Row key={row.id} row={row} who={nameOf(row)} now={now} />
+            ))}
           </ol>
         )}
         <Older waits={waits} backTo={older.map(({ log }) => log.backTo)} onLook={lookBack} />
@@ -125,11 +122,11 @@ function Older(props: { waits: boolean; backTo: readonly number[]; onLook: () =>
   );
 }
 
-function Away({ name, problem }: { name: LogName; problem: string | null }) {
+function Away({ log, problem }: { log: LogName; problem: string | null }) {
   if (problem === null) return null;
   return (
     <p className={style.away} role="status">
-      The part of the {name} is missing here: {problem}
+      The part of the {log} is missing here: {problem}
     </p>
   );
 }

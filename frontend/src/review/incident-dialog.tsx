@@ -1,10 +1,11 @@
 /** Keeps a run as an incident: it is never archived, and one file of all that is known is downloaded. */
-import { Button, Modal, Stack, Text, Textarea } from "@mantine/core";
+import { Button, Modal, Stack, Text, TextInput } from "@mantine/core";
 import { useState } from "react";
 import { editor } from "../api/client";
 import { errorText, fetchAnswer } from "../api/http";
 import type { Run } from "../api/runs";
 import type { EditorApi } from "../api/schema/editor";
+import { serverNow } from "../clock/server-clock";
 import { instant } from "../ui/times";
 
 interface Props {
@@ -37,12 +38,10 @@ export function IncidentDialog({ runner, run, onClose }: Props) {
           its parts with the check of their chain, the graph as it was sent, what was recorded of
           the robots, who did what at that time, and the versions of the software.
         </Text>
-        <Textarea
+        <TextInput
           label="Why it is kept"
           value={reason}
           maxLength={1000}
-          autosize
-          minRows={2}
           onChange={(event) => setReason(event.currentTarget.value)}
           data-autofocus
         />
@@ -72,7 +71,7 @@ async function keepIncident(runner: string, run: Run, reason: string): Promise<B
 
 async function editorAudit(run: Run): Promise<readonly EditorApi["AuditRow"][]> {
   const since = new Date((instant(run.requested_at) ?? 0) - AROUND_MS).toISOString();
-  const until = new Date((instant(run.ended_at) ?? Date.now()) + AROUND_MS).toISOString();
+  const until = new Date((instant(run.ended_at) ?? serverNow()) + AROUND_MS).toISOString();
   const rows: EditorApi["AuditRow"][] = [];
   let before: number | undefined;
   try {
