@@ -4,6 +4,7 @@ import json
 import string
 import time
 import zlib
+from collections.abc import Callable
 from pathlib import Path
 
 import msgspec
@@ -11,7 +12,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound, Unauthenticated
+from action_assistant.errors import (
+    BadInput,
+    Conflict,
+    Forbidden,
+    NotFound,
+    Unauthenticated,
+    Unavailable,
+)
 from action_assistant.safe_text import redacted
 from action_assistant.web.auth.identity import Identity, Scope, Token
 from action_assistant.web.auth.keys import Keys, Person, Session
@@ -19,6 +27,7 @@ from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role
 from action_assistant.web.auth.token_text import checksum, digest_of, new_text, proof, token_id
 from action_assistant.web.auth.tokens import TokenFiles, TokenRecord, completed
+from web.auth.test_ending import full
 
 KEYS = Keys("k" * 43)
 CHARACTERS = string.ascii_letters + string.digits
@@ -162,6 +171,21 @@ def test_who_was_removed_has_no_tokens_in_the_list(tmp_path: Path) -> None:
     assert tokens.every("somebody else") == []
     Revocations(tmp_path).end_person("mari")
     assert tokens.every() == []
+
+
+def test_a_token_is_revoked_on_a_full_disk(small_disk: Callable[[str], Path]) -> None:
+    disk = small_disk("1m")
+    one, other = files(disk), files(disk)
+    made, kept = (one.make(maker(), name, ["read"]) for name in ("lost", "kept"))
+    with full(disk):
+        with pytest.raises(Unavailable):
+            one.make(maker(), "new", ["read"])
+        one.revoke(made.record.id)
+        for tokens in (one, other):
+            with pytest.raises(Unauthenticated):
+                tokens.opens(made.token)
+            assert tokens.opens(kept.token) is not None
+    assert [each.record.name for each in one.every()] == ["kept"]
 
 
 def test_a_folder_that_is_gone_puts_out_nobody_who_was_in(tmp_path: Path) -> None:
