@@ -73,7 +73,7 @@ interface Named {
 
 /** Return the name of somebody who acted, with that of the program that did it for them. */
 export function actorWords({ program }: Pick<Named, "program">, name: string): string {
-  return program ? `${name} by program ${isolated(program)}` : name;
+  return program ? `${isolated(name)} by program ${isolated(program)}` : name;
 }
 
 /**
