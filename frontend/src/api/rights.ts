@@ -1,8 +1,8 @@
 /** Rights of robots: who may start there, who holds the baton, and who has put one out of service. */
 import { useQuery } from "@tanstack/react-query";
-import { runnerAt } from "./client";
+import { editor, runnerAt } from "./client";
 import { useLive } from "./page-link";
-import { usePerson } from "./people";
+import { useKnownPeople, usePerson } from "./people";
 import type { Robot } from "./robots";
 import type { Run } from "./runs";
 import type { RunnerApi } from "./schema/runner";
@@ -35,6 +35,26 @@ export function useRights() {
 /** The person's rights on one robot; undefined while they are not known. */
 export function useRight(robot: string): RobotRight | undefined {
   return useRights().data?.robots.find((each) => each.robot === robot);
+}
+
+interface Named {
+  readonly id: string;
+  readonly name: string;
+}
+
+const NO_IDS: readonly string[] = [];
+
+/** Queries the groups and people to whom a right can be given: persons of links, and all who acted here. */
+export function useEntitled(): { groups: readonly Named[]; people: readonly Named[] } {
+  const known = useKnownPeople(NO_IDS);
+  const { data } = useQuery({
+    queryKey: ["members", "entitled"],
+    queryFn: ({ signal }) => editor.get("/api/members", { signal }),
+    staleTime: 10_000,
+  });
+  const members = data?.people ?? [];
+  const others = known.filter(({ id }) => !members.some((member) => member.id === id));
+  return { groups: data?.groups ?? [], people: [...members, ...others] };
 }
 
 export function takeBaton(runner: string, name: string, reason = ""): Promise<Robot> {

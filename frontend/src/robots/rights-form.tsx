@@ -16,14 +16,13 @@ import { useQueryClient } from "@tanstack/react-query";
 import { useState } from "react";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
-import { NAMELESS, useKnownPeople } from "../api/people";
-import { type AllowedOperator, lockRobot, setRights } from "../api/rights";
+import { NAMELESS } from "../api/people";
+import { type AllowedOperator, lockRobot, setRights, useEntitled } from "../api/rights";
 import type { Robot } from "../api/robots";
 import { usePendingText } from "../ui/drafts";
 import { isolated } from "../words/isolated";
 import style from "./rights-form.module.css";
 
-const NO_IDS: readonly string[] = [];
 const NOBODY: readonly AllowedOperator[] = [];
 
 /** Return the last day of a right as a date field has it; "" for one that does not end. */
@@ -46,8 +45,11 @@ function Operators(props: {
   onChange: (chosen: AllowedOperator[]) => void;
 }) {
   const { chosen, onChange } = props;
-  const people = useKnownPeople(NO_IDS);
-  const left = people.filter(({ id }) => !chosen.some((each) => each.id === id));
+  const { groups, people } = useEntitled();
+  const isLeft = ({ id }: { id: string }) => !chosen.some((each) => each.id === id);
+  const left = [...groups, ...people].filter(isLeft);
+  const items = (all: typeof left) =>
+    all.filter(isLeft).map(({ id, name }) => ({ value: id, label: isolated(name || id) }));
   const put = (changed: AllowedOperator) =>
     onChange(chosen.map((each) => (each.id === changed.id ? changed : each)));
   return (
@@ -73,9 +75,12 @@ function Operators(props: {
         ))}
       </ul>
       <Select
-        label="Add a person"
+        label="Add a person or a group"
         placeholder={left.length === 0 ? "Nobody else has been here" : "Choose"}
-        data={left.map(({ id, name }) => ({ value: id, label: isolated(name || id) }))}
+        data={[
+          { group: "Groups", items: items([...groups]) },
+          { group: "People", items: items([...people]) },
+        ]}
         value={null}
         searchable
         onChange={(id) => {
