@@ -73,7 +73,7 @@ class _Body(msgspec.Struct, frozen=True):
     folder: str = ""
     version: str = ""
     holder: _PersonBody | None = None
-    to: str = ""
+    to: _PersonBody | None = None
 
 
 #: What the events say, after the name of the person; fields of the body, and `run`, in braces.
@@ -83,7 +83,6 @@ _SAID: Final[Mapping[str, tuple[AuditKind, str]]] = {
     "run.modify_requested.v1": ("starts", "gave {run} another version of its graph"),
     "run.stop_requested.v1": ("stops", "pressed Stop of {run}"),
     "run.released.v1": ("starts", "let the held {run} go on"),
-    "run.handed_over.v1": ("robots", "handed {run} over"),
     "run.marked.v1": ("starts", "marked {run}"),
     "run.incident_kept.v1": ("starts", "keeps {run} as an incident"),
     "expectation.saved.v1": ("starts", "saved the expected course {name}"),
@@ -165,6 +164,9 @@ class RunnerFacts:
                 outcome = _OUTCOMES.get(body.outcome, body.outcome)
                 text = f"said that {body.node} in {{run}} ended {outcome}: {body.reason}"
                 return self._about_run(whole, "starts", text)
+            case "run.handed_over.v1":
+                to = body.to.name if body.to is not None else ""
+                return self._about_run(whole, "robots", f"handed {{run}} over to {to}")
             case "run.held.v1":
                 if body.by is None:
                     return None

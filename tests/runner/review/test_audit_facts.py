@@ -1,0 +1,75 @@
+"""The words of the audit for events of the runner."""
+
+import asyncio
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from action_assistant.journal.databases import ask_once
+from action_assistant.journal.journal import Journal
+from action_assistant.runner.analysis.annotations import IncidentKept, stream_about
+from action_assistant.runner.review import audit_facts
+from action_assistant.runner.robots import rights
+from action_assistant.runner.robots.robot_events import stream_of_robot
+from action_assistant.runner.runs.events import Author, HandedOver, StoredKind, draft_of
+from action_assistant.web.audit.rows import AuditFilter
+from action_assistant.web.auth.caller import Origin, acting_for
+from action_assistant.web.auth.keys import PersonRef
+
+ADA, BEN = Author("ada", "Ada", "browser"), PersonRef("ben", "Ben")
+ROBOT, RUN = stream_of_robot("Carrier"), "run/r1"
+LOCK = rights.Lock(PersonRef("ada", "Ada"), 1, "its brake is loose")
+
+
+@pytest.mark.parametrize(
+    ("stream", "event", "text"),
+    [
+        (
+            ROBOT,
+            rights.RightsSet(at=1, author=ADA, rules=rights.Rules(baton=True)),
+            "set who may start on Carrier",
+        ),
+        (
+            ROBOT,
+            rights.BatonPassed(at=1, how="handed", author=ADA, holder=BEN),
+            "handed the baton of Carrier to Ben",
+        ),
+        (
+            ROBOT,
+            rights.Locked(at=1, author=ADA, reason="its brake is loose", locks=(LOCK,)),
+            "took Carrier out of service: its brake is loose",
+        ),
+        (
+            ROBOT,
+            rights.Unlocked(at=1, author=ADA, of=BEN, locks=()),
+            "put Carrier into service again",
+        ),
+        (
+            RUN,
+            HandedOver(at=1, author=ADA, to=Author("ben", "Ben")),
+            "handed the run r1 over to Ben",
+        ),
+        (
+            stream_about("r1"),
+            IncidentKept(at=1, author=ADA),
+            "keeps the run r1 as an incident",
+        ),
+    ],
+)
+async def test_an_event_is_said_in_words_with_its_person_and_connection(
+    tmp_path: Path, stream: str, event: StoredKind, text: str
+) -> None:
+    url = f"sqlite:///{tmp_path / 'runner.db'}"
+    journal = await Journal.open(url, branch="runner", fold=lambda _: ())
+    with acting_for("ada", Origin("Ada", "s1", address="10.0.0.7")):
+        await journal.append(stream, [draft_of(event, "ada")])
+    await journal.close()
+
+    def ask() -> object:
+        return ask_once(url, lambda connection: audit_facts.page(AuditFilter(), connection))
+
+    page = await asyncio.to_thread(ask)
+    (row,) = msgspec.to_builtins(page)["rows"]
+    assert (row["text"], row["person"]["name"]) == (text, "Ada")
+    assert row["from"] == {"name": "Ada", "session": "s1", "address": "10.0.0.7"}
