@@ -124,6 +124,12 @@ function Waiting({ made, origins, onDone, onOver }: WaitingProps) {
       <output className={style.digits} aria-label="Code">
         {made.code}
       </output>
+      {origins.length === 0 && (
+        <Text size="sm" c="dimmed">
+          Only this computer reaches this server, so the code works in another browser here. For
+          other devices, restart it with <code>action-assistant serve --share</code>.
+        </Text>
+      )}
       <Text size="sm" c="dimmed">
         It works once, within two minutes. Then you confirm the device here.
       </Text>
