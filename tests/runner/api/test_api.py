@@ -388,3 +388,16 @@ def test_health_and_measures(process: RunnerProcess) -> None:
     with process.client() as client:
         assert client.get("/readyz").json()["ready"] is True
         assert "action_assistant_runs_open" in client.get("/metrics").text
+
+
+def test_a_date_that_no_calendar_holds_is_refused_and_robots_stay_listed(
+    process: RunnerProcess,
+) -> None:
+    with process.client() as client:
+        client.post("/api/robots", json={"name": "Dated", "domain": 186})
+        for until in ("0001-01-01T00:00:00+14:00", "9999-12-31T23:59:59-14:00"):
+            wanted = {"operators": [{"id": "ann", "until": until}]}
+            refused = client.put("/api/robots/Dated/rights", json=wanted)
+            assert (refused.status_code, refused.json()["type"]) == (400, "bad-input")
+            assert client.get("/api/robots").status_code == 200
+        assert client.delete("/api/robots/Dated").status_code == 204

@@ -7,7 +7,7 @@ folders of graphs in `folders`.
 
 import re
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
 import msgspec
@@ -15,6 +15,7 @@ from sqlalchemy import Executable, ScalarSelect, delete, insert, select, update
 
 from action_assistant.editor.log import people_events
 from action_assistant.journal.events import Draft, Event
+from action_assistant.kit.moments import moment
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.caller import stamped
 from action_assistant.web.auth.roles import Role
@@ -22,15 +23,10 @@ from action_assistant.web.auth.roles import Role
 UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
 DEFERRED: Final = "graph.deferred.v1"  # one that waits for others, which come later in the log
 
-#: The second day of the year 1, and the last one of 9999, in microseconds since 1970.
-_FIRST_US: Final = -62_135_510_400_000_000
-_LAST_US: Final = 253_402_214_400_000_000
-
 
 def when(at: int) -> datetime:
-    """Return the datetime, in UTC, of a time in microseconds since 1970. A time before the year 1 or
-    after 9999 becomes the first or last day: a stored event is readable, whatever it says."""
-    return datetime.fromtimestamp(min(max(at, _FIRST_US), _LAST_US) / 1_000_000, UTC)
+    """Return the datetime, in UTC, of a time in microseconds since 1970; see `kit/moments.py`."""
+    return moment(at)
 
 
 T = TypeVar("T")

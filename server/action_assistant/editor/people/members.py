@@ -37,6 +37,7 @@ from action_assistant.errors import (
 )
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
+from action_assistant.kit.moments import sent_us
 from action_assistant.private_files import make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
@@ -56,7 +57,6 @@ MOST_HOURS: Final = 30 * 24.0
 _LINKS: Final = "links"
 _MOST: Final = 1000  # persons that are not ended
 _MOST_GROUPS: Final = 100
-_NEVER: Final = datetime(3000, 1, 1, tzinfo=UTC).timestamp()
 
 
 class PersonalLink(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -594,10 +594,8 @@ def _state(member: Member) -> e.MemberState:
 
 
 def _later(until: datetime | None) -> datetime | None:
-    if until is not None and until.tzinfo is None:
-        raise BadInput("A time names its time zone.", where={"path": "/until"})
-    if until is not None and not 0 <= until.timestamp() < _NEVER:
-        raise BadInput("A time lies between the years 1970 and 3000.", where={"path": "/until"})
+    if until is not None:
+        sent_us(until, "/until")
     return until
 
 

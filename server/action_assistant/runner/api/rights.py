@@ -8,6 +8,7 @@ from litestar import Request, get, post, put
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput
+from action_assistant.kit.moments import sent_us
 from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.robots.registration import Robot
@@ -236,6 +237,4 @@ def _operator(wanted: OperatorWanted) -> Operator:
     until = wanted.until
     if until is not None and until.tzinfo is None:
         until = until.replace(tzinfo=UTC)
-    return Operator(
-        wanted.id, wanted.name, None if until is None else round(until.timestamp() * 1e6)
-    )
+    return Operator(wanted.id, wanted.name, None if until is None else sent_us(until, "/operators"))

@@ -5,13 +5,13 @@ the value after it; the newest events of a robot are its rights (docs/decisions/
 """
 
 from collections.abc import Iterable, Iterator
-from datetime import datetime
 from typing import ClassVar, Final, Literal, TypeAlias
 
 import msgspec
 from msgspec.structs import replace
 
 from action_assistant.errors import Conflict, Forbidden
+from action_assistant.kit.moments import moment
 from action_assistant.runner.runs.events import Author
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
@@ -318,4 +318,4 @@ def _either(names: Iterable[str]) -> str:
 
 def _day(us: int) -> str:
     """Return the day of a moment on the runner's computer."""
-    return datetime.fromtimestamp(us / 1e6).astimezone().date().isoformat()
+    return moment(us).astimezone().date().isoformat()

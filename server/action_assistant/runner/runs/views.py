@@ -8,6 +8,7 @@ import msgspec
 from msgspec.structs import replace
 from sqlalchemy import Row
 
+from action_assistant.kit.moments import moment
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import DurationBounds, of_run
 from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override, PieceRest
@@ -264,8 +265,8 @@ class StartShown(msgspec.Struct, frozen=True, kw_only=True):
 
 
 def time(us: int) -> datetime:
-    """Convert microseconds UTC to an aware datetime in UTC."""
-    return _EPOCH + timedelta(microseconds=us)
+    """Convert microseconds UTC to an aware datetime in UTC; see `kit/moments.py`."""
+    return moment(us)
 
 
 def microseconds(moment: datetime) -> int:
