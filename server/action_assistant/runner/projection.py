@@ -64,7 +64,7 @@ def _run_changes(id_: str, event: RunEvent) -> Sequence[Executable]:
     change = update(run).where(run.c.id == id_)
     match event:
         case Requested(piece=PieceOf()):
-            return ()  # a part of its conducted run, which has a row
+            return ()  # a part of its led run, which has a row
         case Requested() as asked:
             robots = asked.led.robots.values() if asked.led is not None else ()
             words = holds(asked.run, asked.graph_name, asked.engine, asked.author.name, *robots)

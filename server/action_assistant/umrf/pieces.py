@@ -1,7 +1,7 @@
 """Cuts a graph into pieces of one action each, and reads the outcome of a piece from its states. An
 action that stands for a graph is such a piece, too (`led_subgraphs`).
 
-A conducted run sends each robot one piece at a time (docs/umrf-and-the-engine.md 5). The exit of a
+A led run sends each robot one piece at a time (docs/umrf-and-the-engine.md 5). The exit of a
 piece runs only for `on_true`, so the states of the graph and of its action tell the outcome, which
 an engine otherwise never reports. Pure.
 """

@@ -219,13 +219,13 @@ async def told_and_finished(data: Path) -> tuple[dict[str, list[Event]], dict[st
         await journal.close()
 
 
-# --- conducted runs -----------------------------------------------------------------------------
+# --- led runs -----------------------------------------------------------------------------
 
 PIECES = [f"r4.{number}" for number in range(1, 12)]
 
 
 async def led(tmp_path: Path) -> tuple[Path, dict[str, list[Event]]]:
-    """Return a data folder with an old conducted run of eleven pieces, and its events by run."""
+    """Return a data folder with an old led run of eleven pieces, and its events by run."""
     data = tmp_path / "led"
     data.mkdir()
     journal = await opened(data)

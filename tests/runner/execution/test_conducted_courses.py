@@ -1,4 +1,4 @@
-"""A conducted run takes the course of its whole graph: random graphs, on robots that lose messages."""
+"""A led run takes the course of its whole graph: random graphs, on robots that lose messages."""
 
 import json
 import random

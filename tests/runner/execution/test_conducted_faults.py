@@ -1,4 +1,4 @@
-"""Random histories of a conducted run with faults of all kinds: no piece is sent twice, none after the
+"""Random histories of a led run with faults of all kinds: no piece is sent twice, none after the
 gate has closed, no outcome is made up, and nothing is called stopped that moves."""
 
 import json
@@ -63,7 +63,7 @@ STEPS = [
 
 
 class Story:
-    """One conducted run, what happens to it, and what must hold all the while."""
+    """One led run, what happens to it, and what must hold all the while."""
 
     def __init__(self, seed: int, *, values: bool = False, stalls: bool = False) -> None:
         self.chance = random.Random(seed)

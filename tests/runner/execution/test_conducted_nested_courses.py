@@ -1,4 +1,4 @@
-"""A conducted run takes the course of its whole graph, also where actions stand for graphs."""
+"""A led run takes the course of its whole graph, also where actions stand for graphs."""
 
 import random
 from collections import defaultdict

@@ -49,7 +49,7 @@ def going_on(graph: Graph) -> Graph:
 
 
 def sent(graph: Graph, *inside: Graph, **more: Any) -> Any:
-    """A start of a conducted run of a graph with these graphs inside."""
+    """A start of a led run of a graph with these graphs inside."""
     subgraphs = tuple(
         SentSubgraph(
             name=each.name, digest=digest(each), umrf=msgspec.Raw(codec.write(each).encode())

@@ -1,4 +1,4 @@
-"""Values that one step of a conducted run hands to another, also on another robot."""
+"""Values that one step of a led run hands to another, also on another robot."""
 
 import json
 import random

@@ -83,7 +83,7 @@ class Lab:
 
 
 def led(graph: Graph, **more: Any) -> Any:
-    """A start of a conducted run in which Scout is David and Carrier is Carol."""
+    """A start of a led run in which Scout is David and Carrier is Carol."""
     robots = {"Scout": "David", "Carrier": "Carol"}
     return order(graph, engine="conducted", robots=robots, **more)
 

@@ -1,4 +1,4 @@
-"""Conducted runs of whose events some are missing or cannot be read after a restart: no piece is left alone."""
+"""Led runs of whose events some are missing or cannot be read after a restart: no piece is left alone."""
 
 from collections.abc import Sequence
 from typing import Any

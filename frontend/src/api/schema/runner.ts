@@ -30,7 +30,7 @@ export interface RunnerApi {
      * ActionShown
      * @description One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
      *     may have been missed. `visits` are the newest ones; `older`: how many are not listed. `robot`:
-     *     the engine that plays it in a conducted run; `piece`: the id of the run of its newest piece;
+     *     the engine that plays it in a led run; `piece`: the id of the run of its newest piece;
      *     `asks`: it has ended without an outcome, which a person has to give.
      */
     ActionShown: {
@@ -648,7 +648,7 @@ export interface RunnerApi {
     };
     /**
      * HeldShown
-     * @description The hold of a conducted run, which begins nothing further: by whom (null: by the runner), why, and
+     * @description The hold of a led run, which begins nothing further: by whom (null: by the runner), why, and
      *     since when.
      */
     HeldShown: {
@@ -1183,7 +1183,7 @@ export interface RunnerApi {
     };
     /**
      * RawMessages
-     * @description The raw messages from the hours of a run, of all robots of a conducted one, oldest first.
+     * @description The raw messages from the hours of a run, of all robots of a led one, oldest first.
      *     `robot`: the engine of the run; `text`: a note for people about missing ones, "" if all are on
      *     this computer.
      */
@@ -1503,7 +1503,7 @@ export interface RunnerApi {
     };
     /**
      * RobotRestShown
-     * @description The state of the proof that one robot of a conducted run is at rest. `state`: nothing of the
+     * @description The state of the proof that one robot of a led run is at rest. `state`: nothing of the
      *     run was ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is
      *     proven ("stopping"), it does not answer ("silent"), no answer can prove rest any more
      *     ("unproven"), an answer has proven it ("proven"), a person or the runner has seen it ("seen"),
@@ -1607,7 +1607,7 @@ export interface RunnerApi {
      * RunShown
      * @description A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
      *     robot whose engine the simulator plays; `behaviours`: whether its actions have Python
-     *     behaviours; `rests`: of a conducted run, how far each robot is proven to be at rest.
+     *     behaviours; `rests`: of a led run, how far each robot is proven to be at rest.
      */
     RunShown: {
         id: string;
@@ -1656,7 +1656,7 @@ export interface RunnerApi {
     /**
      * RunSummary
      * @description A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
-     *     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a conducted run, the
+     *     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
      *     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
      *     further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
      *     held at the start.
@@ -2057,7 +2057,7 @@ export interface RunnerApi {
      *     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
      *     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
      *     none were seen; `outputs`: likewise those that it gave, where an answer could show them. In a
-     *     conducted run, `robot`: the engine that played it; `said`: the person who stated the result,
+     *     led run, `robot`: the engine that played it; `said`: the person who stated the result,
      *     where no answer has shown it.
      */
     VisitShown: {
@@ -2097,7 +2097,7 @@ export interface RunnerApi {
     };
     /**
      * WordRequest
-     * @description The outcome of an action in a conducted run by the word of a person, with the reason. `action`:
+     * @description The outcome of an action in a led run by the word of a person, with the reason. `action`:
      *     its full name; `piece`: the run of its piece that the person has seen, so that the word counts for
      *     no later visit; `request_id`: as in `GoOnRequest`.
      */

@@ -219,7 +219,7 @@ async def _look_at_runs(journal: Journal, folder: Path, found: Findings, tell: T
         tell(f"run {number} of {len(rows)} is read")
         try:
             read, _ = await history.replayed(row.id)
-            for piece in await store.pieces(row.id):  # of a conducted run
+            for piece in await store.pieces(row.id):  # of a led run
                 await history.replayed(piece)
         except (Refused, ValueError) as error:
             found.wrong.append(f"run {row.number} cannot be read: {error}")

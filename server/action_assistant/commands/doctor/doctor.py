@@ -247,7 +247,7 @@ def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
 
 
 def robots_have_names(place: Installation) -> Iterator[Diagnostic]:
-    """Yield a warning for a robot that was registered under the name that now stands for conducted
+    """Yield a warning for a robot that was registered under the name that now stands for led
     runs."""
     if any(each.name == CONDUCTED for each in _registered(place.data)):
         yield found(

@@ -75,7 +75,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
 
     @get(
         "/api/values-package.zip",
-        summary="The package that keeps values, with which conducted runs can hand them from robot to "
+        summary="The package that keeps values, with which led runs can hand them from robot to "
         "robot, as a ZIP file",
         operation_id="downloadValuesPackage",
         guards=[Needs("see")],

@@ -97,7 +97,7 @@ def archive(sight: GraphAtSeq, kind: DocumentKind, packages: Sequence[str]) -> b
 
 
 def keeper_archive() -> bytes:
-    """Return a ZIP file with the package that keeps values for conducted runs."""
+    """Return a ZIP file with the package that keeps values for led runs."""
     return _packed((keeper(),))
 
 

@@ -93,7 +93,7 @@ class SummedUp(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class ArchivedPiece(msgspec.Struct, frozen=True, kw_only=True):
-    """The archive of a piece of a conducted run. `run`: the id of the piece; `file`: its path in the
+    """The archive of a piece of a led run. `run`: the id of the piece; `file`: its path in the
     folder of archives; `by`: the number of the removal event."""
 
     run: str
@@ -105,7 +105,7 @@ class ArchivedPiece(msgspec.Struct, frozen=True, kw_only=True):
 class RunArchived(msgspec.Struct, frozen=True):
     """The events of a run were moved from the journal to an archive. `file`: its path in the folder
     of archives; `by`: the number of the removal event; `row`: the run's row at that time; `pieces`:
-    the archives of its pieces, if it was conducted."""
+    the archives of its pieces, if it is a led run."""
 
     kind: ClassVar[str] = "run.archived.v1"
 

@@ -79,7 +79,7 @@ def intervals(run: Run) -> bytes:
     """Return CSV with a line per visit of an action, sorted by its begin. A cell is empty if its
     value is unknown. If only bounds of a duration can be given, `seconds` is empty, and
     `seconds_least` and `seconds_most` have the bounds. `missed`: how many visits of the action have
-    no line, "none" or "N or more". A conducted run has two columns more: `robot`, the engine that
+    no line, "none" or "N or more". A led run has two columns more: `robot`, the engine that
     played the visit, and `said_by`, the person who stated its result."""
     text = io.StringIO()
     sheet = csv.writer(text)
@@ -124,7 +124,7 @@ def mcap(events: Iterable[Event], pieces: Iterable[Iterable[Event]] = ()) -> byt
     """Return an MCAP file (for robotics viewers) with JSON messages: `/run` (state),
     `/actions/NAME` (state and result, at the time they were shown), `/visits/NAME` (an ended visit,
     at the time its end was seen; with `at_least`, visits may have been missed and `visit` is a
-    lower bound), `/log`. `pieces`: the events of each piece of a conducted run, whose robots showed
+    lower bound), `/log`. `pieces`: the events of each piece of a led run, whose robots showed
     them under the names of their own graphs."""
     out = io.BytesIO()
     writer = Writer(out, compression=CompressionType.NONE)
@@ -170,7 +170,7 @@ class _Track:
         self._said(before, after)
 
     def see_piece(self, event: Event, decoded: Any, before: Run | None, after: Run) -> None:
-        """Write what one event of a piece showed of its robot; all else is in the conducted run's
+        """Write what one event of a piece showed of its robot; all else is in the led run's
         own events. `decoded`: the decoded body of the event; `before`, `after`: the piece before
         and after it."""
         if isinstance(decoded, Observed):

@@ -231,7 +231,7 @@ def _incident(services: RunnerServices) -> ControllerRouterHandler:
 
 async def _lines(queries: WorkerQueries, run: str, seq: int, page: bytes) -> AsyncIterator[bytes]:
     """Yield the stored events of a run as lines of JSON in pages, then those of its pieces, if it
-    was conducted. `page`: its first page, which ends with event number `seq`."""
+    is led. `page`: its first page, which ends with event number `seq`."""
     for each in (run, *await queries.value(StoredRuns.pieces, run)):
         if each != run:
             seq, page = await queries.value(StoredRuns.lines, each, 0)

@@ -143,7 +143,7 @@ class ArchiveStore:
         return msgspec.structs.replace(place, archived_as=pieces[id_]) if id_ in pieces else None
 
     async def pieces(self, run_id: str) -> list[str]:
-        """Return the ids of the pieces of a conducted run, also of an archived one, in the order in
+        """Return the ids of the pieces of a led run, also of an archived one, in the order in
         which they were sent. Raise Unavailable if the journal cannot be read."""
         rows = await self._journal.query(queries.streams_of_pieces(run_id))
         here = (row.stream.removeprefix(_PREFIX) for row in rows)

@@ -41,7 +41,7 @@ class RawHour(msgspec.Struct, frozen=True):
 
 
 class RawMessages(msgspec.Struct, frozen=True):
-    """The raw messages from the hours of a run, of all robots of a conducted one, oldest first.
+    """The raw messages from the hours of a run, of all robots of a led one, oldest first.
     `robot`: the engine of the run; `text`: a note for people about missing ones, "" if all are on
     this computer."""
 

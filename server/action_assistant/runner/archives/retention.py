@@ -116,7 +116,7 @@ class Retention:
             return SweepResult(runs=done, raw=found.raw, more=more, problems=problems)
 
     async def _archive_run(self, row: Row[Any]) -> None:
-        """Archive the ended run of this table row, with its pieces if it was conducted. Raise
+        """Archive the ended run of this table row, with its pieces if it is a led run. Raise
         Conflict if a piece moves again, or Refused or OSError if archiving fails; its events then
         stay in the journal."""
         pieces = [

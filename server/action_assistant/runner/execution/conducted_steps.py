@@ -1,4 +1,4 @@
-"""The steps of a conducted run, and the gate before them."""
+"""The steps of a led run, and the gate before them."""
 
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
@@ -44,7 +44,7 @@ CONDUCTED_FACTS: Final = msgspec.structs.replace(
 _VISIT_BITS: Final = 20
 #: Who stops an action in the name of the graph: an arrow of it, or its end.
 GRAPH: Final = Author("graph", "the graph itself", "program")
-#: Who stops a conducted run whose robot is lost, as the starter has chosen.
+#: Who stops a led run whose robot is lost, as the starter has chosen.
 RUNNER: Final = Author("runner", "the runner", "program")
 
 
@@ -87,7 +87,7 @@ class Word(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
-    """A conducted run that an earlier process left unfinished. `order`: its start; `course`: the
+    """A led run that an earlier process left unfinished. `order`: its start; `course`: the
     outcomes so far; `sent`: the highest number of a piece; `pieces`: by number of a call without an
     outcome, its piece and the seq of the last event of that; `again`: pieces that moved again after
     their outcome, each with its seq; `states`: of the actions that robots carry out; `unproven`:
@@ -201,7 +201,7 @@ class Step:
 
 
 class Gate:
-    """Decides whether a further piece of a conducted run may be sent to a robot. `held`: the event
+    """Decides whether a further piece of a led run may be sent to a robot. `held`: the event
     that says why none may for now, None if it is open; `is_final`: none ever will;
     `is_waiting`: none may for a moment, in which a change is stored."""
 
@@ -286,7 +286,7 @@ class StallWatch:
 
 
 def seen_of(step: Step, action: ActionRun, state: str, at: int) -> PieceSeen:
-    """Return the event that shows an action of a conducted run in a state. `step`: the call that
+    """Return the event that shows an action of a led run in a state. `step`: the call that
     the action belongs to; `action`: its visits and messages; `at`: µs UTC."""
     visit = action.visits[-1] if action.visits else None
     return PieceSeen(
@@ -336,7 +336,7 @@ def rest_of(piece: Run, at: int, *, asks: bool = False) -> PieceRest:
 
 def seen_inside(step: Step, whole: str, at: int) -> list[PieceSeen]:
     """Return an event for each action inside the sub-graph of a step that has changed since the
-    last call, and remember that it was returned. `whole`: the name of the graph of the conducted
+    last call, and remember that it was returned. `whole`: the name of the graph of the led
     run, used in the names of these actions as in a run on one robot; `at`: µs UTC. One call may
     visit an inner action several times: the number of its visit is in the low bits of the number of
     the call."""
@@ -375,7 +375,7 @@ def outcome_shown(run: Run, text: PieceText) -> Precondition | None:
 
 
 def order_of(first: Requested) -> Order:
-    """Return the order that starts the whole graph of a conducted run. `first`: the first event of
+    """Return the order that starts the whole graph of a led run. `first`: the first event of
     that run."""
     graph = GraphOutline(first.graph_name, first.actions)
     inside = tuple(each.umrf for each in first.subgraphs)

@@ -100,7 +100,7 @@ _FOREIGN: Final = frozenset(
 
 
 class Conductor:
-    """Leads a conducted run. To that run it is the link to one engine.
+    """Leads a led run. To that run it is the link to one engine.
     `first`: the first event of the run; `texts`: the pieces by full name of their action; `engine`
     plays the whole graph, and `make_engine` makes another one if it fails; `left`: how far an
     earlier process led the run; `lead`: for whom it is led, None until somebody lets it go on after a
@@ -213,7 +213,7 @@ class Conductor:
                 piece.stop(author, "")
 
     async def _refuse(self, *_: object, **__: object) -> NoReturn:
-        raise NotSent("a conducted run is held, not paused, and its graph cannot be changed")
+        raise NotSent("a led run is held, not paused, and its graph cannot be changed")
 
     pause = resume = modify = _refuse
 

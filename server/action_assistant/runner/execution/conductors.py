@@ -1,4 +1,4 @@
-"""Opens conducted runs: new ones, and those that an earlier process left."""
+"""Opens led runs: new ones, and those that an earlier process left."""
 
 import logging
 from collections.abc import Awaitable, Callable, Iterable, Mapping
@@ -53,7 +53,7 @@ _STORED_S: Final = 5  # for which a person waits until the journal has an outcom
 
 
 class Conductors:
-    """Opens conducted runs, whose actions several robots carry out, and finds the conductor of each
+    """Opens led runs, whose actions several robots carry out, and finds the conductor of each
     open one."""
 
     def __init__(
@@ -87,7 +87,7 @@ class Conductors:
         lead: Identity | None = None,
         may_leave: Leaves = unwatched,
     ) -> OpenRun:
-        """Open a stored conducted run, and return it. `first`: its first event; `seq`: the number
+        """Open a stored led run, and return it. `first`: its first event; `seq`: the number
         of its last stored event; `texts`: its pieces by full name of their action; `engine` plays
         the whole graph; `left`: how far an earlier process led it, None for a new run;
         `lead`: for whom it is led; `may_leave`: as for `OpenRuns.open`."""
@@ -230,7 +230,7 @@ def _leading(opened: OpenRun) -> Leading:
 
 
 async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpen:
-    """Return how far an earlier process led a conducted run, from its stored events. `first`: the
+    """Return how far an earlier process led a led run, from its stored events. `first`: the
     first of them; `now`: the run as all of them show it. Raise Unavailable if the journal cannot be
     read."""
     ends: list[tuple[int, Returned | Literal["stop"]]] = []

@@ -1,4 +1,4 @@
-"""The gate of a conducted run, with the person for whom the run is led: it closes when that person may begin
+"""The gate of a led run, with the person for whom the run is led: it closes when that person may begin
 nothing on one of its robots any more, and a person who may lets the run go on.
 """
 
@@ -15,7 +15,7 @@ from action_assistant.web.auth.identity import Identity
 
 
 class LedGate(Gate):
-    """Holds a conducted run and lets it go on. `first`: the first event of the run; `person`: for whom
+    """Holds a led run and lets it go on. `first`: the first event of the run; `person`: for whom
     it is led, None until somebody lets it go on after a restart; `tell` shows and records an event."""
 
     def __init__(

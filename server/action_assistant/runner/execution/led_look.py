@@ -58,7 +58,7 @@ class Cleared(msgspec.Struct, frozen=True):
 
 
 class LedLook:
-    """Checks a robot before a start, or a piece, of a conducted run begins there."""
+    """Checks a robot before a start, or a piece, of a led run begins there."""
 
     def __init__(
         self,
@@ -104,7 +104,7 @@ class LedLook:
     async def before_piece(
         self, robot: KnownEngine, run: Requested, lead: Identity | None
     ) -> Cleared:
-        """Ask a robot, and return the proof that a piece of a conducted run may begin on it. Wait
+        """Ask a robot, and return the proof that a piece of a led run may begin on it. Wait
         for its answer. `lead`: as for `why_not_allowed`. Raise NoAnswer with the reason if no piece
         may, NotAllowed if `lead` may begin none there."""
         assert run.led is not None
@@ -145,7 +145,7 @@ class LedLook:
     def _require_known(self, name: str, run: str) -> None:
         """Raise NoAnswer with the reason if the robot `name` has a piece of this run that is
         unknown, lost, unconfirmed or moving again: it gets no further one. `run`: the id of the
-        conducted run."""
+        led run."""
         for opened in self._runs.on(name).values():
             piece = opened.run
             if piece.piece is None or piece.piece.run != run:

@@ -57,7 +57,7 @@ class OpenRuns:
         """Open a stored run on a link, announce it to watchers and return it. `seq`: the number of
         the run's last stored event; `owns_link`: the link is closed with the run; `link`: None if
         the robot is not registered any more: such a run gets a link that never answers. `piece`:
-        ties a piece to its conducted run; `pressed`: called first when a person stops a conducted
+        ties a piece to its led run; `pressed`: called first when a person stops a led
         run; `may_leave`: called right before its start leaves, and raises NotSent if it may not."""
         opened = OpenRun(
             run,
@@ -149,7 +149,7 @@ class OpenRuns:
     def occupying(self, engine: str, graph_name: str = "", *, apart_from: str = "") -> Run | None:
         """Return the run that keeps an engine occupied; None if the engine is free. Of several
         runs, a moving one comes before one that may only be loading, then one of the graph
-        `graph_name` before others. `apart_from`: the id of a conducted run that does not count, nor
+        `graph_name` before others. `apart_from`: the id of a led run that does not count, nor
         do its pieces."""
         runs = [
             each.run

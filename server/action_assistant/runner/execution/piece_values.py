@@ -1,4 +1,4 @@
-"""The values that pieces of a conducted run give each other.
+"""The values that pieces of a led run give each other.
 
 The engine of the whole graph holds them: it says with which inputs an action begins, and is told the
 outputs that an answer of the robot showed (`umrf.kept_values`).

@@ -82,7 +82,7 @@ class _HeldBack(NotSent):
 
 
 class PieceHooks(msgspec.Struct, frozen=True, kw_only=True):
-    """The tie of a piece to its conducted run. `changed` is called after each change of the piece;
+    """The tie of a piece to its led run. `changed` is called after each change of the piece;
     `may_leave` right before its start message leaves, and raises NotSent if it may not leave any
     more."""
 

@@ -246,7 +246,7 @@ class ExecutionService:
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
         """Begin to stop a run, or all runs of a group, and return the ids of the runs that are
-        being stopped; none if all is over already. A Stop of a piece stops its whole conducted run;
+        being stopped; none if all is over already. A Stop of a piece stops its whole led run;
         once that is over, a Stop of either reaches the pieces that move again. The call does not
         wait for an effect, only to read a run that is not open. Raise NotFound if there is no such
         run or group."""
@@ -311,7 +311,7 @@ class ExecutionService:
     async def go_on(
         self, run: str, asked: GoOnRequest, author: Author, identity: Identity | None = None
     ) -> Run:
-        """Let a held conducted run go on, which may start actions on its robots; return the run.
+        """Let a held led run go on, which may start actions on its robots; return the run.
         `asked`: since when the person saw it held. A repeat of a request that was carried out
         changes nothing, and returns the run as it is now. Raise NotFound if there is no such run,
         Conflict if it is over, being stopped, not held since that time, or one of its robots does
@@ -360,7 +360,7 @@ class ExecutionService:
     async def hand_over(
         self, run: str, to: str, author: Author, identity: Identity | None = None
     ) -> Run:
-        """Hand a conducted run over to a person who has a page open, with all batons of its robots. It
+        """Hand a led run over to a person who has a page open, with all batons of its robots. It
         goes on, unless it is held. Raise NotFound if there is no such run, Conflict or Forbidden if the
         author does not hold these batons or the other person may not start on one of its robots,
         Unavailable if it could not be stored: then it is held."""
@@ -378,7 +378,7 @@ class ExecutionService:
     async def give_outcome(
         self, run: str, asked: WordRequest, author: Author, identity: Identity | None = None
     ) -> Run:
-        """Take the outcome of an action in a conducted run from a person, where the robot does not
+        """Take the outcome of an action in a led run from a person, where the robot does not
         show it, and store it; return the run. A repeat of a request that was carried out changes
         nothing. Raise NotFound if there is no such run, Conflict if no outcome is asked for,
         OutcomeUnknown if it is not stored within 5 s, Forbidden or Conflict if the author may not start
@@ -597,12 +597,12 @@ def _operator(author: Author) -> Identity:
 
 
 def _wholes_of(run: Run) -> set[str]:
-    """Return the ids of what a run is a part of: a group, and a conducted run whose piece it is."""
+    """Return the ids of what a run is a part of: a group, and a led run whose piece it is."""
     return {run.group or "", run.piece.run if run.piece is not None else ""} - {""}
 
 
 def _no_piece(opened: OpenRun) -> OpenRun:
-    """Return the run unless it is a piece of a conducted run, to which only the conductor gives
+    """Return the run unless it is a piece of a led run, to which only the conductor gives
     orders; raise Conflict then."""
     piece = opened.run.piece
     if piece is not None:

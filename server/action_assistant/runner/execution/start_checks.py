@@ -71,7 +71,7 @@ NO_SOURCES: Final = StartSources()
 class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     """A start that nothing prevents. It is sent over `link`, which the run owns if simulated, to
     the engine process with the id `incarnation`. `despite`: problems that a person overrides;
-    `led`: the further part of a conducted run, else None; `keeps`: the engine has the helper
+    `led`: the further part of a led run, else None; `keeps`: the engine has the helper
     package, so that values can be read from it."""
 
     request: StartRequest
@@ -90,7 +90,7 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LedStart(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of an accepted start that only a conducted run has. `lives`: the id of each robot's
+    """The part of an accepted start that only a led run has. `lives`: the id of each robot's
     engine process when it was checked; `by_word`: those of them of which only the starter vouches
     that they index their files once; `keeping`: the robots that have the helper package; `engine`:
     plays the whole graph."""
@@ -146,7 +146,7 @@ class StartChecks:
         if self.leads(request.engine, request.robots):
             return await self._accept_conducted(request, starter)
         if request.robots:
-            raise BadInput("Only a conducted run has several robots.", where={"path": "/robots"})
+            raise BadInput("Only a led run has several robots.", where={"path": "/robots"})
         if request.engine == SIMULATOR:
             return await self._accept_simulation(request)
         robot = self._robots.reachable(request.engine)
@@ -155,7 +155,7 @@ class StartChecks:
         return await self._accept_on(robot, request, ready, starter)
 
     def leads(self, engine: str, robots: Mapping[str, str]) -> bool:
-        """Return whether a start on `engine` is that of a conducted run. `robots`: the robots that
+        """Return whether a start on `engine` is that of a led run. `robots`: the robots that
         the start names, by actor; if it names none, a robot with the name `conducted` may be meant,
         registered before that name was reserved."""
         return engine == CONDUCTED and (bool(robots) or CONDUCTED not in self._robots.names)
@@ -178,7 +178,7 @@ class StartChecks:
         is_led: bool = False,
     ) -> AcceptedStart:
         """Take a prepared start through the checks that concern its robot, and wait for its answer.
-        `starter`: the id of the person; `is_led`: it is the part of a conducted run on this robot.
+        `starter`: the id of the person; `is_led`: it is the part of a led run on this robot.
         Raise Unavailable if the robot does not answer, Conflict if a check fails."""
         await self._check(request, ready, robot, starter)
         try:
@@ -191,7 +191,7 @@ class StartChecks:
         return await self._decide(request, ready, robot, view, starter, is_led=is_led)
 
     async def _accept_conducted(self, request: StartRequest, starter: Identity) -> AcceptedStart:
-        """Take the start of a conducted run through all checks, with all its robots at the same
+        """Take the start of a led run through all checks, with all its robots at the same
         time. `starter`: the person. Raise Conflict, with the reasons of all robots, if a
         check refuses it."""
         _require_plain(request)
@@ -300,7 +300,7 @@ class StartChecks:
         is_led: bool,
     ) -> AcceptedStart:
         """Accept a start unless an item of its pre-flight blocks it and was not overridden; raise
-        Conflict then. `view`: the answer of the engine; `is_led`: it is the part of a conducted
+        Conflict then. `view`: the answer of the engine; `is_led`: it is the part of a led
         run."""
         items = [
             *await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes),
@@ -321,7 +321,7 @@ class StartChecks:
         return accepted
 
     async def give_words(self, accepted: AcceptedStart, author: Author) -> None:
-        """Store what the starter of an accepted conducted run vouches for: that engines index their
+        """Store what the starter of an accepted led run vouches for: that engines index their
         files only once. Does nothing for other starts. Raise Unavailable if the journal cannot
         store it."""
         override = accepted.request.override
@@ -403,7 +403,7 @@ class StartChecks:
         return [preflight.with_items(found[engine], courses) for engine in group.engines]
 
     async def _look_conducted(self, request: StartRequest, starter: Identity) -> list[Preflight]:
-        """Return the pre-flight of a conducted run: first that of the whole graph, then that of
+        """Return the pre-flight of a led run: first that of the whole graph, then that of
         each robot. `starter`: the person who would start."""
         try:
             ready = await self._run_in_worker(

@@ -1,4 +1,4 @@
-"""A conducted run that an earlier process left, of whose events some cannot be read.
+"""A led run that an earlier process left, of whose events some cannot be read.
 
 Nobody knows which of its actions are over, so nothing leads it further. Its pieces are runs with events of
 their own: they are followed, shown and stopped, and the run is unknown until that is done.
@@ -40,7 +40,7 @@ UNREAD: Final = "Some of what was recorded of this run cannot be read"
 
 
 class UnreadRun:
-    """The link of a conducted run of which some events cannot be read, so that it can only be
+    """The link of a led run of which some events cannot be read, so that it can only be
     stopped. It answers only once a Stop was pressed and no piece may move. `lacking`: the ids of
     pieces of which nothing can be read, so that their robots are unknown."""
 

@@ -1,6 +1,6 @@
-"""The performer of a conducted run: tells which actions the engine of the whole graph begins and stops.
+"""The performer of a led run: tells which actions the engine of the whole graph begins and stops.
 
-The engine of a conducted run carries out nothing itself. Each call of an action becomes a report,
+The engine of a led run carries out nothing itself. Each call of an action becomes a report,
 and whoever conducts the run reports the end of the call with `returned`.
 """
 
@@ -15,7 +15,7 @@ from action_assistant.umrf.semantics import Call, Returned
 
 
 class LedCourse(msgspec.Struct, frozen=True, kw_only=True):
-    """The course of a conducted run so far, from which a new engine gets to the same states.
+    """The course of a led run so far, from which a new engine gets to the same states.
 
     `began`: when the graph was started, in microseconds UTC. `steps`: in order, the ends of calls
     and the Stop, each with its time in milliseconds after the start.
@@ -26,7 +26,7 @@ class LedCourse(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LedCalls:
-    """Stands in for behaviours in the engine that plays a conducted run: collects the calls that
+    """Stands in for behaviours in the engine that plays a led run: collects the calls that
     robots carry out until the link reports them. `led`: the full names of these actions; the script
     says how the others behave."""
 
@@ -53,10 +53,10 @@ class LedCalls:
         self._news.append(CallStopped(number=number))
 
     def pause(self, number: int) -> None:
-        """Do nothing: a conducted run is not paused, but held, so that nothing further begins."""
+        """Do nothing: a led run is not paused, but held, so that nothing further begins."""
 
     def resume(self, number: int) -> None:
-        """Do nothing: a conducted run is not paused, but held, so that nothing further begins."""
+        """Do nothing: a led run is not paused, but held, so that nothing further begins."""
 
     def give_up(self, number: int) -> str | None:
         """Return None and do nothing: only a proof ends a call that a robot carries out."""

@@ -170,13 +170,13 @@ class ForeignCommand(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CallBegan(msgspec.Struct, frozen=True, kw_only=True):
-    """The engine of a conducted run has begun an action that a robot shall carry out."""
+    """The engine of a led run has begun an action that a robot shall carry out."""
 
     call: Call
 
 
 class CallStopped(msgspec.Struct, frozen=True, kw_only=True):
-    """The engine of a conducted run wants the call with this number to end."""
+    """The engine of a led run wants the call with this number to end."""
 
     number: int
 

@@ -341,7 +341,7 @@ class StoredRuns:
         return events[-1].seq if events else after, b"".join(exports.lines(run_id, events))
 
     async def pieces(self, run_id: str) -> list[str]:
-        """Return the ids of the pieces of a conducted run, in the order in which they were sent.
+        """Return the ids of the pieces of a led run, in the order in which they were sent.
         Raise Unavailable if the journal cannot be read."""
         return await self._journal.pieces(run_id)
 

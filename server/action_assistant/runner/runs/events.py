@@ -63,7 +63,7 @@ class RunSubgraph(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class Led(msgspec.Struct, frozen=True, kw_only=True):
-    """The robots of a conducted run. `robots`: the engine that plays each actor, "" being the actor
+    """The robots of a led run. `robots`: the engine that plays each actor, "" being the actor
     of actions that name none. `players`: the engine of each action, by full name. `lives`: the id
     of each engine's process when it was checked before the start. `lost`: what happens when a robot
     does not answer or its step fails: a Stop of everything, or a wait for a person. `together`: a
@@ -79,7 +79,7 @@ class Led(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PieceOf(msgspec.Struct, frozen=True, kw_only=True):
-    """The place of a piece in its conducted run: the id of that run, the number of the call, and
+    """The place of a piece in its led run: the id of that run, the number of the call, and
     the full name of the action."""
 
     run: str
@@ -115,7 +115,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     behaviours: bool = False  # whether the simulator had Python behaviours
     subgraphs: tuple[RunSubgraph, ...] = ()  # all graphs inside, by value
     tree_digest: str | None = None  # of the graph together with them; None if unknown
-    led: Led | None = None  # of a conducted run
+    led: Led | None = None  # of a led run
     piece: PieceOf | None = None  # of a piece, which is no run of its own for people
     batons: tuple[str, ...] = ()  # the robots whose baton the author held
 
@@ -311,7 +311,7 @@ class MovesAgain(msgspec.Struct, frozen=True):
 
 
 class PieceBegan(msgspec.Struct, frozen=True, kw_only=True):
-    """A piece of a conducted run is about to be sent to a robot. Stored before it is sent; its own
+    """A piece of a led run is about to be sent to a robot. Stored before it is sent; its own
     stream, that of the run `piece`, says whether it left. A call whose piece certainly has not left
     may get another one."""
 
@@ -325,7 +325,7 @@ class PieceBegan(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class PieceSeen(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The robot that plays an action of a conducted run shows it in another state. `visit`: its
+    """The robot that plays an action of a led run shows it in another state. `visit`: its
     visit with the bounds that the observations of the robot allow; None before it was seen running
     or over. `messages`: its newest messages. `node`: its full name; of an action inside of a
     sub-graph, its name in a run on one robot, and `call` is another number for each of its visits."""
@@ -341,7 +341,7 @@ class PieceSeen(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class PieceRest(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """The proof that a piece of a conducted run is at rest (nothing of it moves) has come further,
+    """The proof that a piece of a led run is at rest (nothing of it moves) has come further,
     or got lost. `state`: it goes on ("going"), gets Stops until rest is proven ("stopping"), its
     robot does not answer ("silent"), no answer can prove its rest any more ("unproven"), an answer
     has proven it ("proven"), a person or the runner has seen it ("seen"), or it never began
@@ -368,7 +368,7 @@ class PieceRest(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """A call of a conducted run has its outcome. `how`: by the states of the piece in an answer
+    """A call of a led run has its outcome. `how`: by the states of the piece in an answer
     that was asked for after its end ("shape"), by a person's statement ("word"), or because nothing
     of it was ever sent ("unsent"). `hash`: the SHA-256 of that answer. `outputs`: the values that
     the action gave, as JSON by flat name; `unset`: outputs that it did not set, or that nobody saw
@@ -392,7 +392,7 @@ class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class Held(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """No further piece of a conducted run begins until a person lets it go on. `by`: None where the
+    """No further piece of a led run begins until a person lets it go on. `by`: None where the
     runner itself holds it; `why`: the reason, as a sentence."""
 
     kind: ClassVar[str] = "run.held.v1"
@@ -415,7 +415,7 @@ class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 
 class HandedOver(msgspec.Struct, frozen=True, kw_only=True):
-    """A person handed a conducted run over, with the batons of its robots: it goes on for `to`."""
+    """A person handed a led run over, with the batons of its robots: it goes on for `to`."""
 
     kind: ClassVar[str] = "run.handed_over.v1"
 

@@ -399,7 +399,7 @@ def _end(run: Run, event: Ended) -> Run:
 
 
 def _piece_seen(run: Run, event: PieceSeen) -> Run:
-    """Return the conducted run after a robot has shown another state of an action that it carries
+    """Return the led run after a robot has shown another state of an action that it carries
     out. Each call is one visit, with the bounds that the piece's own run has found."""
     known = run.actions.get(event.node, _UNSEEN)
     action = after_piece(known, event.call, event.state, event.visit, event.at)
@@ -408,7 +408,7 @@ def _piece_seen(run: Run, event: PieceSeen) -> Run:
 
 
 def _piece_ended(run: Run, event: PieceEnded) -> Run:
-    """Return the conducted run after the outcome of a call. In older streams, without `PieceRest`
+    """Return the led run after the outcome of a call. In older streams, without `PieceRest`
     events, an outcome that an answer has shown also proves that the piece is at rest."""
     action = after_outcome(
         run.actions.get(event.node, _UNSEEN),
@@ -455,7 +455,7 @@ def _going(event: PieceBegan) -> PieceRest:
 
 
 def _piece_rest(run: Run, event: PieceRest) -> Run:
-    """Return the conducted run after news about how far a piece is proven to be at rest. Earlier
+    """Return the led run after news about how far a piece is proven to be at rest. Earlier
     pieces of the same robot stay listed only while they may move or wait for an outcome."""
     kept = {
         piece: known

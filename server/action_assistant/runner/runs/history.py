@@ -72,7 +72,7 @@ class RunHistory:
         return replay(events_read), events[-1].seq if events else 0, len(events_read) == len(read)
 
     async def piece_ids(self, run: str, having: str = "") -> list[str]:
-        """Return the ids of all stored pieces of a conducted run, in the order of their numbers.
+        """Return the ids of all stored pieces of a led run, in the order of their numbers.
         Numbers may be missing: a piece that could not be stored has used up its number. `having`:
         return only pieces with an event of this kind. Raise Unavailable if the journal cannot be
         read."""
@@ -80,7 +80,7 @@ class RunHistory:
         return pieces_in(run, (row.stream.removeprefix(stream_of("")) for row in rows))
 
     async def pieces(self, run: str) -> tuple[list[LeftRun], list[str]]:
-        """Return the pieces of a conducted run in the order of their numbers, and the ids of the
+        """Return the pieces of a led run in the order of their numbers, and the ids of the
         pieces that cannot be read at all. Raise Unavailable if the journal cannot be read."""
         found: list[LeftRun] = []
         lacking: list[str] = []
@@ -125,18 +125,18 @@ class RunHistory:
 
 
 def pieces_in(run: str, ids: Iterable[str]) -> list[str]:
-    """Return those of `ids` that belong to pieces of the conducted run `run`, each once, in the
+    """Return those of `ids` that belong to pieces of the led run `run`, each once, in the
     order of their numbers."""
     return sorted({each for each in ids if whole_of(each) == run}, key=piece_number)
 
 
 def piece_number(piece: str) -> int:
-    """Return the number of a piece in its conducted run, the first being 1. `piece`: its id."""
+    """Return the number of a piece in its led run, the first being 1. `piece`: its id."""
     return int(piece.rpartition(".")[2])
 
 
 def whole_of(run: str) -> str:
-    """Return the id of the conducted run of which this run is a piece, going by its id; "" if it is
+    """Return the id of the led run of which this run is a piece, going by its id; "" if it is
     none."""
     whole, _, number = run.rpartition(".")
     return whole if number.isascii() and number.isdecimal() else ""

@@ -127,7 +127,7 @@ def _graph(wanted: Filter) -> tuple[ColumnElement[bool], ...]:
 
 
 def on_engine(engine: str | None) -> tuple[ColumnElement[bool], ...]:
-    """Return conditions, any of which holds for a run on this engine; a conducted run is on each
+    """Return conditions, any of which holds for a run on this engine; a led run is on each
     engine that plays an actor in it. For None (any engine), one that always holds."""
     if engine is None:
         return (true(),)
@@ -137,7 +137,7 @@ def on_engine(engine: str | None) -> tuple[ColumnElement[bool], ...]:
 
 
 def _robots() -> TableValuedAlias:
-    """Return the engines of a conducted run as a table of one column, `value`."""
+    """Return the engines of a led run as a table of one column, `value`."""
     return func.json_each(run.c.summary, "$.robots").table_valued("value")
 
 

@@ -79,7 +79,7 @@ class Said(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Press(msgspec.Struct, frozen=True):
-    """An order of a person to a conducted run. `by`: the id of the person; `what`: the kind of order
+    """An order of a person to a led run. `by`: the id of the person; `what`: the kind of order
     and its details, as `go_on_press` and `outcome_press` write them; "" stands for any."""
 
     by: str
@@ -121,15 +121,15 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     group: str | None = None
     like: str | None = None
     behaviours: bool = False
-    led: Led | None = None  # of a conducted run
+    led: Led | None = None  # of a led run
     piece: PieceOf | None = None  # of a piece of one
-    held: Held | None = None  # why a conducted run begins nothing further
+    held: Held | None = None  # why a led run begins nothing further
     lead: Author | None = None  # who let it go on last, or was handed it; None: its author
     batons: tuple[str, ...] = ()  # the robots whose baton the author held at the start
-    #: Of a conducted run, by piece: those that may go on, and the newest one of each robot.
+    #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
-    said: dict[str, tuple[Said, ...]] = {}  # by the action of a conducted run
-    #: The newest presses of people on a conducted run that counted, by their request ids.
+    said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run
+    #: The newest presses of people on a led run that counted, by their request ids.
     pressed: dict[str, Press] = {}
     desired: Desired = "running"
     incarnation: str | None = None  # None: nothing has been sent, as far as is known

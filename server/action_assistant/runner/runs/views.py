@@ -56,7 +56,7 @@ class VisitShown(msgspec.Struct, frozen=True, rename={"start": "from"}):
     `from`, there is no time at which it ran for certain. `inputs`: the values that the engine
     reported, by flat name, as JSON texts (a long one is cut and ends with an ellipsis); null if
     none were seen; `outputs`: likewise those that it gave, where an answer could show them. In a
-    conducted run, `robot`: the engine that played it; `said`: the person who stated the result,
+    led run, `robot`: the engine that played it; `said`: the person who stated the result,
     where no answer has shown it."""
 
     start: datetime
@@ -89,7 +89,7 @@ class MessageShown(msgspec.Struct, frozen=True):
 class ActionShown(msgspec.Struct, frozen=True, omit_defaults=True):
     """One action of a run. It ran `count` times; with `at_least` perhaps more often, since visits
     may have been missed. `visits` are the newest ones; `older`: how many are not listed. `robot`:
-    the engine that plays it in a conducted run; `piece`: the id of the run of its newest piece;
+    the engine that plays it in a led run; `piece`: the id of the run of its newest piece;
     `asks`: it has ended without an outcome, which a person has to give."""
 
     aid: str | None
@@ -125,7 +125,7 @@ class AtRestShown(msgspec.Struct, frozen=True):
 
 
 class HeldShown(msgspec.Struct, frozen=True):
-    """The hold of a conducted run, which begins nothing further: by whom (null: by the runner), why, and
+    """The hold of a led run, which begins nothing further: by whom (null: by the runner), why, and
     since when."""
 
     by: Author | None
@@ -137,7 +137,7 @@ class HeldShown(msgspec.Struct, frozen=True):
 
 
 class RobotRestShown(msgspec.Struct, frozen=True, omit_defaults=True):
-    """The state of the proof that one robot of a conducted run is at rest. `state`: nothing of the
+    """The state of the proof that one robot of a led run is at rest. `state`: nothing of the
     run was ever begun there ("unused"), an action goes on ("going"), it gets Stops until rest is
     proven ("stopping"), it does not answer ("silent"), no answer can prove rest any more
     ("unproven"), an answer has proven it ("proven"), a person or the runner has seen it ("seen"),
@@ -161,7 +161,7 @@ class RobotRestShown(msgspec.Struct, frozen=True, omit_defaults=True):
 
 class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     """A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
-    more, which is before the proof at `ended_at`; null if unknown. `robots`: of a conducted run, the
+    more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
     further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
     held at the start."""
@@ -232,7 +232,7 @@ class Listed(RunSummary, frozen=True, kw_only=True):
 class RunShown(RunSummary, frozen=True, kw_only=True):
     """A run with its actions, by full name, and the newest lines of its engine's log. `like`: the
     robot whose engine the simulator plays; `behaviours`: whether its actions have Python
-    behaviours; `rests`: of a conducted run, how far each robot is proven to be at rest."""
+    behaviours; `rests`: of a led run, how far each robot is proven to be at rest."""
 
     like: str | None
     behaviours: bool
@@ -467,7 +467,7 @@ _WORST: Final = (
 
 
 def _rests(run: Run) -> list[RobotRestShown] | msgspec.UnsetType:
-    """Return, for each robot of a conducted run, the state of its piece that is the furthest from
+    """Return, for each robot of a led run, the state of its piece that is the furthest from
     proven rest; unset for other runs."""
     if run.led is None:
         return msgspec.UNSET
@@ -509,7 +509,7 @@ def visit_view(
     each: Visit, robot: str = "", said: SaidShown | msgspec.UnsetType = msgspec.UNSET
 ) -> VisitShown:
     """Return the view of one visit, with its times as datetimes. `robot`: the engine that played it
-    in a conducted run; `said`: the person who stated its result."""
+    in a led run; `said`: the person who stated its result."""
     return VisitShown(
         time(each.start),
         time(each.not_before),

@@ -165,7 +165,7 @@ class ActionRun(msgspec.Struct, frozen=True, gc=False, kw_only=True):
     `held`: it may have been paused during the visit. `joined`: it runs once unless an action fails.
     `doubted`: the present state is of feedback that may be older than the last answer; it may
     contradict `visits` until the next one. `call`: the number of the call that the last visit is,
-    in a conducted run; `robot`: the engine that plays the action there; `piece`: the id of its newest
+    in a led run; `robot`: the engine that plays the action there; `piece`: the id of its newest
     piece. `answers`, `feedback`: the changes that each has shown.
     """
 
@@ -248,7 +248,7 @@ def after_result(action: ActionRun, item: NodeResult) -> ActionRun:
 def after_piece(
     action: ActionRun, call: int, state: str, visit: Visit | None, at: int
 ) -> ActionRun:
-    """Return an action of a conducted run after its robot showed another state of the call with
+    """Return an action of a led run after its robot showed another state of the call with
     this number, at `at` (µs UTC). `visit`: that call, None as long as nothing of it was seen. An
     outcome that is there stays, unless the action is seen to go on."""
     visits, older = action.visits, action.older
@@ -275,7 +275,7 @@ def after_piece(
 def after_outcome(
     action: ActionRun, call: int, outcome: str, how: How, outputs: dict[str, str] | None = None
 ) -> ActionRun:
-    """Return an action of a conducted run after the call with this number has an outcome. `how`:
+    """Return an action of a led run after the call with this number has an outcome. `how`:
     "observed" if an answer of its robot has shown the outcome, even where the visit was too short
     to be seen, else "inferred". `outputs`: the values that the answer showed, as texts for people.
     """

@@ -91,7 +91,7 @@ class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class WordRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The outcome of an action in a conducted run by the word of a person, with the reason. `action`:
+    """The outcome of an action in a led run by the word of a person, with the reason. `action`:
     its full name; `piece`: the run of its piece that the person has seen, so that the word counts for
     no later visit; `request_id`: as in `GoOnRequest`."""
 
@@ -319,7 +319,7 @@ def _placed(text: str) -> tuple[str, dict[str, object] | None]:
 
 
 class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
-    """An admitted start of a conducted run: the whole graph, and what robots get of it.
+    """An admitted start of a led run: the whole graph, and what robots get of it.
 
     `players`: the robot of each action that a robot plays, by full name; `texts`: the pieces;
     `by_robot`: all actions of a robot as one graph without arrows, which is looked at
@@ -338,7 +338,7 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
 def prepared_pieces(
     request: StartRequest, facts: EngineFacts, run: str, *, approved: bool = True
 ) -> PreparedPieces:
-    """Admit the start of a conducted run and write the texts of its pieces. For workers. Raises what
+    """Admit the start of a led run and write the texts of its pieces. For workers. Raises what
     `admit` raises, BadInput for an actor without a robot or a robot without an actor, Conflict for a
     graph that cannot run as pieces."""
     whole = prepared(request, facts, run, approved=approved)

@@ -1,4 +1,4 @@
-"""The texts of the pieces of a conducted run: written once, filled in for each call.
+"""The texts of the pieces of a led run: written once, filled in for each call.
 
 The id of the run of a piece, and the values that other pieces give, are known only when it is sent.
 """

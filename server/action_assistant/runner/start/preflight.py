@@ -564,7 +564,7 @@ def _graphs_in_places_of_actions(
 
 
 def _value_items(view: EngineView, handing: Sequence[Obstacle]) -> tuple[Item, ...]:
-    """Return the item about values that steps of a conducted run on this robot hand to others: they
+    """Return the item about values that steps of a led run on this robot hand to others: they
     can be read there only with the helper package. Empty without such values, or with the package."""
     if not handing or has_keeper(view.index.actions):
         return ()

@@ -250,7 +250,7 @@ class _LedGraph:
 
 def _report_shared(subject: Subject, action: Action, every: frozenset[str]) -> None:
     """Report that `action` stands for a sub-graph of several actors (`every`), which cannot be one
-    step of a conducted run."""
+    step of a led run."""
     whose = joined(set(every) - {""}) + ("; some name none" if "" in every else "")
     message = (
         f"{action.full_name} stands for a graph of several actors ({whose}). A runner that leads the "
