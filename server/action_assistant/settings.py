@@ -246,7 +246,7 @@ def _has_password(url: str) -> bool:
 
 def metrics_token(environ: Mapping[str, str] = os.environ) -> str | None:
     """Return the token of ACTION_ASSISTANT_METRICS_TOKEN, which opens only /metrics, or None if the
-    variable is not set. Raise CannotStart if the token is too short."""
+    variable is not set or empty. Raise CannotStart if the token is too short."""
     name = "ACTION_ASSISTANT_METRICS_TOKEN"
     token = environ.get(name, "").strip()
     if token and len(token) < _MIN_TOKEN:

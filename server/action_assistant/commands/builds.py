@@ -186,7 +186,9 @@ def _described(source: Path) -> Iterator[tuple[str, str]]:
 
 
 def _packages_of(file: str) -> frozenset[str]:
-    """Return the names of actions, in snake case, to which a generated file may belong."""
+    """Return the names in snake case (those of single packages) of actions to which a generated
+    file may belong, judged by its path alone. `file`: its path below the built package. Names of no
+    action may be among them."""
     parts = file.split("/")
     stem = parts[-1].split(".")[0]
     return frozenset({stem, stem.removesuffix("_test"), *parts[1:2]})

@@ -44,7 +44,9 @@ def _incident(options: argparse.Namespace) -> int:
 
 
 def _editor_audit(server: Server, run: dict[str, Any]) -> list[Any]:
-    """Return the rows of the editor's audit around a run; none where the editor refuses them."""
+    """Return the rows of the editor's audit from one hour before a run was requested until one hour
+    after its end (until now if it has not ended), at most 5,000. If the editor refuses or does not
+    answer, return the rows got so far."""
     begin = datetime.fromisoformat(run["requested_at"]) - _AROUND
     ended = run.get("ended_at")
     query: dict[str, Any] = {"since": begin.isoformat(), "limit": _PAGE}

@@ -204,8 +204,9 @@ def _end_before(client: "httpx.Client", before: StoredToken) -> None:
 
 
 def _end_at(client: "httpx.Client", where: str, token: str, bearer: str) -> None:
-    """Revoke a token by itself, at the editor or at the runner `where`. One that is not valid there
-    is no error."""
+    """Revoke a token at the editor (`where` is "") or at the runner with the URL `where`. `token`:
+    its id; `bearer`: its text, which authorises the request. No error is raised if the token is not
+    valid there."""
     try:
         request(
             client,

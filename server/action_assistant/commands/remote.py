@@ -314,8 +314,8 @@ def _unconfirmed(run: Run) -> str:
 
 
 def _unproven(stopped: dict[str, list[str]], robots: list[dict[str, Any]]) -> list[str]:
-    """Return one sentence for each graph that another program has started and that is not proven to
-    be at rest. `stopped`: the graphs by robot; `robots`: the robots as JSON."""
+    """Return one sentence for each graph of `stopped` that is not proven to be at rest. `stopped`:
+    the graphs of other programs that got a Stop, by robot; `robots`: the robots as JSON."""
     known = {robot["name"]: robot for robot in robots}
     found: list[str] = []
     for name, graphs in stopped.items():

@@ -186,7 +186,8 @@ def _index(folder: Path) -> EmulatedIndex:
 
 
 def _found(folder: Path) -> EmulatedIndex:
-    """Return the index of a folder; files that cannot be read are skipped."""
+    """Return the index (the actions and graphs that the emulated engine knows) of a folder; files
+    that cannot be read are skipped."""
     return index_of(_texts(folder, "umrf.json"), _texts(folder, "graph.json"))
 
 

@@ -15,8 +15,8 @@ T = TypeVar("T")
 
 
 def database_of(url: str) -> Database:
-    """Return the database that a URL names. Raise CannotStart for a malformed URL or a database of
-    another kind."""
+    """Return the PostgreSQL or SQLite database that a URL names, without connecting to it. Raise
+    CannotStart for a malformed URL or a database that is neither."""
     try:
         parsed = make_url(url)
     except ArgumentError as error:

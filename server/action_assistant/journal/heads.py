@@ -35,9 +35,9 @@ class LogHead(msgspec.Struct, frozen=True):
 async def head_at(
     journal: JournalReader, branch: Branch, position: int, read_kept: ReadKept
 ) -> LogHead:
-    """Return the end of the log of a branch after the event at `position`, with a digest over the
-    ends of all its streams then. `read_kept`: reads the events of streams that were archived since.
-    Raise OSError or Refused if an archive cannot be read."""
+    """Return the end of the log of a branch right after the event at `position`, with a digest over
+    the last event of each stream at that point. `read_kept` reads the events of streams that have
+    been archived in the meantime. Raise OSError or Refused if an archive cannot be read."""
     return LogHead(
         position, digest_of(branch, position, await heads_at(journal, position, read_kept))
     )

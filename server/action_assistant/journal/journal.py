@@ -319,8 +319,8 @@ class Journal(JournalReader):
         return None
 
     async def parts(self) -> Mapping[str, str | None]:
-        """Return for each part None if it works, else the reason. This tries to write, and answers
-        within seconds."""
+        """Return the health of the parts `database`, `writer` (its thread) and `schema`: None for a
+        part that works, else the reason. The check tries to write, and answers within seconds."""
         return await self._probe.parts()
 
     @property

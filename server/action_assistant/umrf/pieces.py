@@ -47,8 +47,8 @@ class Obstacle(msgspec.Struct, frozen=True, kw_only=True):
 
 def piece_name(graph: str, action: str, visit: str = "") -> str:
     """Return the name under which a robot runs the piece of an action. `graph`: the name of the
-    whole graph; `action`: the full name; `visit`: an id that distinguishes the visits if each needs
-    a name of its own, else "". No sub-graph of the whole graph has this name."""
+    whole graph; `action`: the full name; `visit`: an id of this one execution of the action, if
+    each needs a name of its own, else "". No sub-graph of the whole graph has this name."""
     return f"{graph}--{action}--v{visit}" if visit else f"{graph}--{action}"
 
 

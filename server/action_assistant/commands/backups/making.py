@@ -130,8 +130,9 @@ def _elsewhere(data: Path, sources: Mapping[Branch, str]) -> str | None:
 
 
 def _check_room(data: Path, sources: Mapping[Branch, str], folder: Path) -> None:
-    """Raise CannotStart if the disk of `folder` has less space than a copy of each journal and the
-    packed backup need. `sources`: the URL of each journal."""
+    """Raise CannotStart if the disk of `folder` has too little free space for making a backup: a
+    copy of each journal, and the packed file with the journals, archives and other files of the
+    data folder `data`. `sources`: the database URL of each journal."""
     journals = sum(_size(source) for source in sources.values())
     kept = settings.keep(data).folder
     files = [path for top in _ARCHIVES for path in (kept / top).rglob("*.gz")]

@@ -61,9 +61,9 @@ def tell_changes(root: Path, plan: PackagesPlan) -> None:
 
 
 def tell_notes(root: Path, plan: PackagesPlan, with_lines: bool) -> None:
-    """Print which files stay although they are generated differently now, or not at all. With
-    `with_lines`, print the difference too: once files are written, the earlier generated text is
-    lost."""
+    """Print to stderr which files stay on disk although the generator makes another text of them
+    now, or none. With `with_lines`, print also how the text that was generated last differs from
+    the one generated now: the former is lost once files are written."""
     for folder, each in plan.regenerations.items():
         for path in each.kept:
             _tell(
@@ -265,8 +265,9 @@ def _chosen(
 def _packages(
     actions: Sequence[Action], together: str | None
 ) -> tuple[dict[str, dict[str, bytes]], tuple[NameRefusal, ...]]:
-    """Return the files of all packages, by folder and path, and the reasons against them, of which
-    there must be none. `together`: the name of one package for all actions, None for one each."""
+    """Return the files of all packages, by folder and path, and the reasons why they must not be
+    written (empty if they may). `together`: the name of one package for all actions; None for one
+    package for each action."""
     if together is not None:
         try:
             return {together: bundle_files(together, actions)}, ()

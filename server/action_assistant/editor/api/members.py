@@ -74,7 +74,9 @@ class EndedSessions(msgspec.Struct, frozen=True):
 def routes(
     app_state: EditorState, addresses: Addresses, browsers: SessionFiles
 ) -> list[ControllerRouterHandler]:
-    """Return the routes under `/api/members` and `/api/groups`."""
+    """Return the routes under `/api/members` and `/api/groups`. `addresses`: the addresses under
+    which people reach the page, for links and their check; `browsers`: the sessions, which end with
+    a person."""
     return [
         *_list(app_state, addresses),
         *_one(app_state, addresses),

@@ -269,8 +269,9 @@ class Catalogue:
         file: Draft | None = None,
     ) -> GraphView:
         """Store a new graph, and return it as lists show it. `update`: its document as one Yjs
-        update; `of`: facts for lists; `about`: events about it. A large `file` is stored before it
-        in a commit of its own, since edits of others wait for every commit."""
+        update; `of`: facts for lists; `about`: events about it; `file`: the event with the imported
+        file. A large file is stored first, in a commit of its own, since edits of others wait for
+        every commit; else all is stored in one commit."""
         made = random_id()
         document = Draft(h.UPDATED, author, update)
         if file is not None and len(file.body) > _LARGE_FILE:

@@ -68,9 +68,10 @@ def _sent_back(replica: Replica, seq: int, damaged: StreamDamage | None = None) 
 
 
 def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
-    """Fold events that rooms have accepted, with the result of `fold` with `learn`, but without
-    reading every event completely. Return None if `document` is not readable as a snapshot. Other
-    events could crash the process."""
+    """Apply stored events to a document, with the result of `fold` with `learn` (which also
+    collects what only editing needs), but faster, since not every event is read completely. All
+    events must have been accepted by rooms (checked when they came): others could crash the
+    process. Return None if `document` is not readable as a snapshot."""
     replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None

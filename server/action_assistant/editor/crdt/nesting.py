@@ -34,9 +34,10 @@ class Nesting:
 
     def depths(self, placed: tuple[Placed, ...], known: Mapping[int, int]) -> dict[Span, int]:
         """Return how many types enclose each struct (item) that an update adds, by the struct's
-        span; structs that no type encloses are missing. `placed`: structs that name another one for
-        their position. `known`: per Yjs client, the first clock (number of an item) that the
-        document does not have yet. Raise Malformed if a struct lies too deep."""
+        span (client, first clock, clock after the last); structs that no type encloses are missing.
+        `placed`: the structs of the update whose position is given by another struct. `known`: per
+        Yjs client, the first clock (number of an item) that the document does not have yet. Raise
+        Malformed if a struct lies deeper than `DEEPEST_TYPES`."""
         if not placed or (not self.spans and not any(each.inside for each in placed)):
             return {}
         news = [each for each in placed if each.span[2] > known.get(each.span[0], 0)]

@@ -91,8 +91,9 @@ def _doubtful(bodies: Sequence[bytes]) -> list[int]:
 
 
 def _starts(bodies: Sequence[bytes]) -> list[int]:
-    """Return the offset of each update in their joined text, and the length of that text. An empty
-    update counts one byte, its separator."""
+    """Return the offset in bytes at which each update begins in the joined updates, and their whole
+    length. Joining replaces the last byte of each update by a separator; so an empty update counts
+    one byte."""
     return list(itertools.accumulate((len(body) or 1 for body in bodies), initial=0))
 
 

@@ -88,7 +88,8 @@ class GroupRemoved(msgspec.Struct, frozen=True):
 
 
 def fold(event: Event, read: Callable[[Event, type[Any]], Any]) -> Sequence[Executable]:
-    """Return the statements by which an event changes the tables. `read` decodes its body."""
+    """Return the statements by which an event about persons, links or groups changes the tables;
+    none for events of other kinds. `read` decodes the body of an event."""
     match event.kind:
         case "member.added.v1" | "member.changed.v1" | "member.ended.v1":
             return _member(event, read)

@@ -24,14 +24,16 @@ class LateRecords:
         self._task: asyncio.Task[None] | None = None
 
     async def add(self, store: Callable[[], Awaitable[None]]) -> None:
-        """Store something now or later. Wait a short time for it."""
+        """Queue a function that stores something. Wait until everything queued is stored, but at
+        most 2 s: then the storing goes on in the background. While the log is Unavailable, the
+        function is called again every 5 s until it succeeds."""
         self._waiting.append((store, copy_context()))
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._store(), name=self._what)
         await asyncio.wait([self._task], timeout=_PATIENCE_S)
 
     async def aclose(self) -> None:
-        """Give up what is not stored yet."""
+        """Cancel the storing of everything that is still queued; it is lost."""
         if self._task is not None:
             self._task.cancel()
             await asyncio.wait([self._task])

@@ -98,9 +98,9 @@ def keep_copy(folder: Path, connection: Connection, branch: Branch, revision: st
 
 
 def _superfluous(copies: list[UpgradeCopy]) -> list[UpgradeCopy]:
-    """Return the copies that may be deleted. The newest few stay, and the newest of each of the
-    last few revisions, since an upgrade that fails at each start must not push out the old
-    state."""
+    """Return the copies that may be deleted; `copies`: the newest first. The newest few stay, and
+    the newest one of each of the last few revisions of the database schema, since an upgrade that
+    fails at each start must not push out the old state."""
     newest: dict[str, UpgradeCopy] = {}
     for each in copies:
         newest.setdefault(each.revision, each)

@@ -214,9 +214,9 @@ def _exact(span: DurationBounds | None) -> float | None:
 def _never_taken(
     graph: Graph | None, actions: Mapping[str, ActionStatistics]
 ) -> tuple[list[NeverTaken], int]:
-    """Return the arrows of the graph that were certainly never taken, and the number of arrows for
-    which that is unknown. `actions`: the statistics by full name; `graph`: None for an unknown
-    graph, which has none of either."""
+    """Return the arrows of the graph that were certainly never taken although the action before
+    them has run, and the number of such arrows for which that is unknown. `actions`: the statistics
+    by full name; `graph`: None for an unknown graph, which has no arrow."""
     if graph is None:
         return [], 0
     names = {each.key: each.full_name for each in graph.actions} | {EXIT: EXIT}

@@ -114,8 +114,9 @@ class RunMetrics(Collector):
 
     @property
     def unconfirmed(self) -> Counter[str]:
-        """The number of unconfirmed Stops by engine: of open runs, counting lost ones, and of
-        graphs that other programs have started and whose Stop has a reason for being unproven."""
+        """The number of unconfirmed Stops by engine. Counted are open runs that are lost or have
+        the alarm of an unconfirmed Stop, and graphs of other programs that are being stopped and
+        for which a reason is known why rest is not proven."""
         open_runs = (each.run for each in self._control.open.values() if each.run.end is None)
         found = Counter(
             run.engine

@@ -487,9 +487,9 @@ def _rights_line(seq: int, event: RightsEvent) -> RobotLogLine:
 
 
 async def _behaviours(services: RunnerServices) -> BehaviourList | None:
-    """Return the list of Python behaviours, or None if this runner has no folder of them. A folder
-    that cannot be read is reported in the list and not raised, so that the page does not take it
-    for a runner that cannot be reached."""
+    """Return the list of Python behaviours (code that plays actions in simulated runs), or None if
+    this runner has no folder of them. If the folder cannot be read, the list has that as its
+    `problem`; an error would look on the page like a runner that does not answer."""
     if services.behaviours is None:
         return None
     try:

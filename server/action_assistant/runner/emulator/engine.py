@@ -459,7 +459,8 @@ class EmulatedEngine:
         self._plan_work(_NEXT_MS)
 
     def _hold(self, then: Callable[[], None]) -> None:
-        """Block the engine's thread until the present command is carried out, then call `then`."""
+        """Call `then` once the emulated engine has carried out its present command; until then it
+        handles no further message. The call itself does not wait."""
         self._under_way.append(then)
         self._see_to_it()
 

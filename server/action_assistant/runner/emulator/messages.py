@@ -243,8 +243,9 @@ def engine_inside(
     performer: Performer | None,
 ) -> Engine:
     """Return the engine that runs graphs, without the ROS node around it. `quirks`: the traits of
-    real engines that it has; `facts`: of the engine build; `script`: how actions act; `actor`: its
-    name; `performer`: runs behaviours, None without any."""
+    real engines that it imitates; `facts`: what is true of the imitated build; `script`: how
+    actions act; `actor`: the name of the engine; `performer`: runs Python behaviours, None without
+    any."""
     return Engine(
         facts=facts,
         script=script,

@@ -104,9 +104,9 @@ class LedLook:
     async def before_piece(
         self, robot: KnownEngine, run: Requested, lead: Identity | None
     ) -> Cleared:
-        """Ask a robot, and return the proof that a piece of a led run may begin on it. Wait
-        for its answer. `lead`: as for `why_not_allowed`. Raise NoAnswer with the reason if no piece
-        may, NotAllowed if `lead` may begin none there."""
+        """Ask a robot, wait for its answer, and return the proof that a piece of a led run may
+        begin on it. Raise NoAnswer with the reason if the robot does not answer, and also if its
+        answer or a check forbids a piece."""
         assert run.led is not None
         name = robot.registration.name
         if lead is None:

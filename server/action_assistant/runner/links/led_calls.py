@@ -53,10 +53,12 @@ class LedCalls:
         self._news.append(CallStopped(number=number))
 
     def pause(self, number: int) -> None:
-        """Do nothing: a led run is not paused, but held, so that nothing further begins."""
+        """Do nothing, whatever the number of the call: a led run is not paused, but held, so that
+        nothing further begins."""
 
     def resume(self, number: int) -> None:
-        """Do nothing: a led run is not paused, but held, so that nothing further begins."""
+        """Do nothing, whatever the number of the call: a led run is not paused, but held, so that
+        nothing further begins."""
 
     def give_up(self, number: int) -> str | None:
         """Return None and do nothing: only a proof ends a call that a robot carries out."""

@@ -120,7 +120,8 @@ class Snapshot(
 
     @property
     def active(self) -> bool:
-        """True if any node moves, or may move again without a new start."""
+        """True if any node is running, stopping or paused (or asked to pause): it moves, or may
+        move again without a new start."""
         return any(state in ACTIVE for state in self.nodes.values())
 
 

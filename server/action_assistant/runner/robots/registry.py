@@ -283,8 +283,8 @@ class Robots:
         return text
 
     async def candidates(self) -> tuple[Candidate, ...]:
-        """Return the engines in sight that are not registered. The call waits until discovery has
-        had its time."""
+        """Return the engines that discovery shows and that are not registered, none without ROS 2.
+        The call waits until discovery has had its time."""
         if isinstance(self._reach, str):
             return ()
         return self._strangers(await self._reach.candidates())

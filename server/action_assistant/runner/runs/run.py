@@ -92,7 +92,8 @@ class Press(msgspec.Struct, frozen=True):
 
 
 def go_on_press(by: Author, since: int) -> Press:
-    """Return the press that lets a run go on which was held at `since` (microseconds UTC)."""
+    """Return the record of a person's press of *Go on*, for a led run that was held at `since`
+    (microseconds UTC)."""
     return Press(by.id, ("go on", str(since)))
 
 

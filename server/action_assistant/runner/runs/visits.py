@@ -275,10 +275,11 @@ def after_piece(
 def after_outcome(
     action: ActionRun, call: int, outcome: str, how: How, outputs: dict[str, str] | None = None
 ) -> ActionRun:
-    """Return an action of a led run after the call with this number has an outcome. `how`:
-    "observed" if an answer of its robot has shown the outcome, even where the visit was too short
-    to be seen, else "inferred". `outputs`: the values that the answer showed, as texts for people.
-    """
+    """Return an action of a led run after a call of it has its outcome, which its newest visit
+    gets; unchanged if nothing was seen of that call. `call`: the number of the call; `how`:
+    "observed" if an answer of its robot has shown the outcome, even where the visit (this one
+    execution) was too short to be seen, else "inferred". `outputs`: the values that the answer
+    showed, as texts for people."""
     if action.call != call or not action.visits:  # nothing of it was ever seen
         return action
     result = _OUTCOMES.get(outcome)

@@ -57,7 +57,8 @@ def led_items(ready: PreparedPieces) -> tuple[Item, ...]:
 
 
 def _moving(ready: PreparedPieces) -> Item:
-    """Return the item that says which robots a led run moves, and what only the simulator plays."""
+    """Return the pre-flight item that says which robots a led run moves, with the number of actions
+    of each, and how many actions only the simulator plays."""
     played = Counter(ready.players.values())
     simulated = len(ready.whole.actions) - played.total()
     robots = [f"{name} ({counted(count, 'action')})" for name, count in sorted(played.items())]

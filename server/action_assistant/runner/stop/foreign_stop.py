@@ -92,7 +92,7 @@ class ForeignStopLoop:
         return None if found is None else found.why
 
     def is_stopping(self, robot: str) -> bool:
-        """Return whether a graph is being stopped on a robot."""
+        """Return whether any graph that another program has started is being stopped on a robot."""
         return any(name == robot for name, _ in self._going)
 
     def graphs(self) -> dict[str, list[str]]:

@@ -106,19 +106,21 @@ class Network:
 
     @cached_property
     def circling(self) -> dict[str, Mask]:
-        """Return for each outcome, as a mask, the actions that are bypassed again by their own
-        bypass with this outcome."""
+        """Return for each outcome, as a mask, the actions on a cycle of arrows that all respond to
+        this outcome with a bypass: the child does not run, and passes the outcome on."""
         return {outcome: self._circling(outcome) for outcome in PRECONDITIONS}
 
     @cached_property
     def plain(self) -> dict[str, Mask]:
-        """Return for each outcome, as a mask, the actions whose bypass causes only further bypasses
-        and halts nothing."""
+        """Return for each outcome, as a mask, the actions whose end with it causes only bypasses
+        (each child passes the outcome on without running), and halts nothing."""
         return {outcome: self._plain(outcome) for outcome in PRECONDITIONS}
 
     @cached_property
     def ends(self) -> dict[str, Mask]:
-        """Return for each outcome, as a mask, the actions from which bypasses lead to the exit."""
+        """Return for each outcome, as a mask, the actions from which arrows lead to the exit that
+        all respond to this outcome with a bypass: each child passes the outcome on without running.
+        """
         mask = (1 << len(self.nodes)) - 1
         return {o: self._leading(o, {self.exit}) & mask for o in PRECONDITIONS}
 

@@ -85,8 +85,8 @@ def read_action(text: str | bytes) -> ActionReading:
 
 
 def write_action(action: Action) -> str:
-    """Return the canonical file of an action, without run state, and with its number only if it is
-    not 0."""
+    """Return the canonical file of an action, without run state. Its number (`instance_id`) is
+    written only if it is not 0."""
     actions = tree_of(Graph(name=action.name, actions=(action,)))["actions"]
     assert isinstance(actions, list)
     (file,) = actions

@@ -129,9 +129,9 @@ class _LevelInstant(Instant):
         self.crossing = self.crossing or len(self._tasks) > 1
 
     def after(self, before: _LevelState) -> _LevelState:
-        """Return the state of the graph after this instant; `before`: the state before it. Times
-        are dropped, since any order of ends is followed, and so are states of actions that no
-        running action can reach any more."""
+        """Return the state of the graph once everything of this instant has happened; `before`: its
+        state before. Times are dropped, since actions may end in any order, and so are states of
+        actions that no running action can reach any more."""
         states = list(before.states)
         for index, state in self.states.items():
             states[index] = state._replace(due=0.0, waiting=False)

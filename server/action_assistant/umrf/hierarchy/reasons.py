@@ -56,7 +56,8 @@ _KINDS: Final[dict[TroubleKind, tuple[FlatteningCode, str]]] = {
 
 
 def of_trouble(trouble: Trouble, at: LevelPath) -> FlatteningReason:
-    """Return a trouble of a course as a reason. `at`: the levels to the action that it concerns."""
+    """Return, as a reason against flattening, a trouble that was found in a course of a graph.
+    `at`: the graphs and actions from the top graph down to the action that the trouble concerns."""
     code, message = _KINDS[trouble.kind]
     when = f", for instance when {trouble.by} ends {trouble.result}" if trouble.by else ""
     return FlatteningReason(code, message.format(when=when), at)

@@ -43,8 +43,8 @@ class _BundledAction(msgspec.Struct, frozen=True):
 
 def bundle_files(package: str, actions: Sequence[Action]) -> dict[str, bytes]:
     """Return the files of one package with all of these actions: contents by path below its folder.
-    Raise `ImpossiblePackage` if a name or parameter cannot be one of C++ or ROS. Files of a single
-    action have the same paths as in its own package."""
+    Raise `ImpossiblePackage` if C++ or ROS does not allow the name of the package, of an action or
+    of a parameter. Files of a single action have the same paths as in its own package."""
     refusals = [*_against(package, actions), *check_names(action.name for action in actions)]
     found: dict[str, bytes] = {}
     for action in actions:

@@ -218,7 +218,8 @@ def _spelled(value: Json) -> Initial:
 
 
 def _scalar(value: Json) -> Scalar | None:
-    """Return a single value that has a C++ literal, else None. A text with NUL would end there."""
+    """Return the value if it is a single one that C++ can write as a literal, else None: also None
+    for a text with NUL, at which a C++ text would end, and for a number that is not finite."""
     if isinstance(value, bool) or (isinstance(value, str) and "\x00" not in value):
         return value
     if isinstance(value, Number) and math.isfinite(value.value):

@@ -109,8 +109,8 @@ def _unresolved_by(
 
 
 def has_action(node: Node, known: Signature | None) -> bool:
-    """Return whether an indexed action (`known`: its signature, None without one) has exactly the
-    parameters of a node."""
+    """Return whether an action of the index with the signature `known` has exactly the inputs and
+    outputs of a node. `known`: None if the index has no such action; the result is False then."""
     return (
         known is not None
         and set(node.inputs) == set(known.inputs)

@@ -98,7 +98,7 @@ class GraphPrinter:
 
 
 def printed_action(action: Action) -> str:
-    """Return the text of an indexed action as the engine lists it."""
+    """Return the JSON text by which an engine lists an action that it has in its index."""
     node = Node(action, action.full_name, (DEFAULT,))
     return _text(_own_fields(node, action.description, "UNINITIALIZED"), "\n")
 

@@ -89,7 +89,8 @@ class PeopleFiles:
             self._replace(_GROUPS, msgspec.json.encode(names))
 
     def groups(self) -> dict[str, str]:
-        """Return the names of all groups by id, as far as they can be read."""
+        """Return the names of all groups by id; an empty dict if the file of groups is missing or
+        cannot be read."""
         try:
             return msgspec.json.decode(self._path(_GROUPS).read_bytes(), type=dict[str, str])
         except (OSError, msgspec.DecodeError):

@@ -116,7 +116,8 @@ class Revocations:
         self._mark(_TOKEN + _checked(token, "a token"))
 
     def write_again(self) -> None:
-        """Write the marks that could not be written before. Raise Unavailable if they still cannot."""
+        """Write to disk the marks of ended invitations, sessions, persons and tokens that could not
+        be written before. Raise Unavailable if they still cannot."""
         for mark in tuple(self._unwritten):
             self._mark(mark)
 

@@ -117,9 +117,11 @@ def _with_built(
     help_site: Path | None,
     root_of: Callable[[HTTPScope], str],
 ) -> tuple[ASGIApp, Callable[[str, bool], bool]]:
-    """Return the application `inner` behind the built page and documentation (None: without it),
-    and a function that says which paths these answer. `root_of` returns the path prefix of the page
-    for a request."""
+    """Return an application that answers the requests for files of the built page and
+    documentation, and passes all others to `inner`. `page`, `help_site`: the folders of the built
+    files, None without them. `root_of` returns the path prefix of the page for a request. The
+    second result is a function (path, accepts HTML) that returns whether the page or the
+    documentation answers the path."""
     shown = Page(inner, page, root_of) if page is not None else None
     helped = HelpSite(shown or inner, help_site) if help_site is not None else None
 

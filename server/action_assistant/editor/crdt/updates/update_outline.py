@@ -22,7 +22,8 @@ class PairedText(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def end(self) -> int:
-        """The first clock (item number) of the client after the text."""
+        """The clock (item number of the same Yjs client) of the item that comes right after the
+        text."""
         return self.start + len(self.units) // 2
 
     def is_within(self, clock: int) -> bool:
