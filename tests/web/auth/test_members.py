@@ -234,6 +234,24 @@ def test_a_device_is_added_by_a_code_that_the_first_one_confirms(
     assert first.http.get("/api/graphs").status_code == 200
 
 
+def test_a_browser_that_becomes_the_device_of_another_person_leaves_its_session(
+    product: Product, arrive: Arrive
+) -> None:
+    first, tablet = arrive(product), arrive(product)
+    come(first, added(product, "Nadia"))
+    come(tablet, added(product, "Nick"))
+    before = tablet.http.headers["cookie"]
+    made = first.http.post("/api/devices/codes").json()
+    sent = tablet.http.post("/api/session/device", json={"code": made["code"]}).json()
+    code = f"/api/devices/codes/{made['id']}/answer"
+    assert first.http.post(code, json={"yes": True}).status_code == 204
+    answer = tablet.http.post("/api/session/device/answer", json={"claim": sent["claim"]})
+    assert answer.json()["signed_in"]["person"]["name"] == "Nadia"
+    assert tablet.http.headers["cookie"] == before
+    for left in (tablet.http.get("/api/graphs"), tablet.runner("POST", "/api/stop")):
+        assert left.status_code == 401
+
+
 def test_a_recovery_link_of_the_command_line_works_with_the_server_down_and_up(
     tmp_path: Path, arrive: Arrive
 ) -> None:

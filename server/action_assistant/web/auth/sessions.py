@@ -191,6 +191,14 @@ class Sessions:
         """Keep in the audit that the person of this browser signed out."""
         note_sign_out(self._audit, request)
 
+    async def leave(self, request: _Asking) -> None:
+        """End the session that this browser has, since another one replaces it."""
+        now = session_of(request)
+        if now is not None:
+            note_sign_out(self._audit, request)
+            with contextlib.suppress(Unavailable):  # it holds here
+                await to_thread.run_sync(self._revoked.end, now.id)
+
     async def session(self, data: SignIn, request: _Asking) -> Session:
         """Return the session for a sign-in. Raise Unauthenticated, TooMany or BadInput."""
         name = " ".join((data.name or "").split())
@@ -244,11 +252,7 @@ class Sessions:
         ends, since its person changes."""
         browser = browser_of(request)
         person = await self._reception().come_in(link, browser, client_address(request.scope))
-        now = session_of(request)
-        if now is not None:
-            note_sign_out(self._audit, request)
-            with contextlib.suppress(Unavailable):  # it holds here
-                await to_thread.run_sync(self._revoked.end, now.id)
+        await self.leave(request)
         return self._keys.new_session(
             person.name,
             role=person.role,
@@ -411,6 +415,7 @@ def _new_device(
         codes.collected(data.claim)
         with acting_for(session.person.id, connection_of(session, request)):
             await added(session, confirmed.browser, confirmed.address)
+        await sessions.leave(request)
         sessions.note_sign_in(session, "device", request)
         await to_thread.run_sync(
             standings.browsers.note, session, confirmed.browser, confirmed.address
