@@ -43,7 +43,7 @@ from support.doses import examples
 
 def hold(control: ExecutionService, run: str) -> datetime:
     """Hold a led run now; return the moment as people see it."""
-    control._conductors._open[run].hold("A robot was lost.")
+    control._conductors._open[run].gate.hold_run("A robot was lost.")
     held = control.open[run].run.held
     assert held is not None
     return time(held.at)
