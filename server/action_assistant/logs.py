@@ -32,7 +32,7 @@ def subjects() -> Mapping[str, str]:
 
 
 def request_id() -> str | None:
-    """Return the id of the request that this task answers; None without one."""
+    """Return the id of the request that this task answers; None if there is none."""
     return _SUBJECTS.get().get("request")
 
 

@@ -74,7 +74,7 @@ class PublicUrl(msgspec.Struct, frozen=True):
         return self.scheme == "https"
 
     def is_named(self, name: str, port: int | None) -> bool:
-        """Return whether a Host header with this name and port (None: without one) names the
+        """Return whether a Host header with this name and port (None if there is none) names the
         address. Proxies may leave the port out."""
         return name == self.host and port in {None, self.port}
 

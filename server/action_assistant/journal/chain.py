@@ -134,7 +134,7 @@ class Inspector:
 
     @property
     def damage(self) -> Damage | None:
-        """Return one damage of the events that were inspected so far; None without any."""
+        """Return one damage of the events that were inspected so far; None if there is none."""
         return next(iter(self._damages.values()), None)
 
     def findings(self, ends: Iterable[Sequence[Any]] | None) -> list[Damage]:

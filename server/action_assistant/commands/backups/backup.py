@@ -188,8 +188,8 @@ class RegularBackups(msgspec.Struct, frozen=True):
 
 def back_up(plan: RegularBackups, progress: Progress) -> tuple[FinishedBackup, OffSite | None]:
     """Make a backup by `plan`, record its outcome in the data folder, and delete superfluous older
-    backups. Return it, and how the command that takes it elsewhere ended, None without one. Raise
-    CannotStart if the backup fails."""
+    backups. Return it, and how the command that takes it elsewhere ended, None if no such command
+    is set. Raise CannotStart if the backup fails."""
     try:
         with _alone(plan.into):
             target = _free(plan.into)
@@ -243,7 +243,7 @@ def keep_making(plan: RegularBackups, every: float) -> int:
 
 def told(done: FinishedBackup, off_site: OffSite | None) -> str:
     """Return the line to print about a finished backup. `off_site`: how the command that takes it
-    elsewhere ended, None without one."""
+    elsewhere ended, None if no such command is set."""
     made = done.made
     text = f"backup {made.file}: {made.bytes / 2**20:.1f} MiB in {made.seconds:.1f} s, proven"
     if made.missing:

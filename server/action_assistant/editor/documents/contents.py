@@ -184,7 +184,7 @@ def _counts(problems: list[Problem]) -> Counts:
 
 def first_action(graph: Graph) -> Action | None:
     """Return the action of a library document: its first one, since clients may write several; None
-    without any."""
+    if there is none."""
     return next((action for action in graph.actions if not action.missing), None)
 
 

@@ -326,8 +326,8 @@ def maps_of(doc: Doc) -> Maps:  # type: ignore[type-arg]
 
 
 def name_of(doc: Doc) -> str:  # type: ignore[type-arg]
-    """Return the name of the graph in a document; "" without one. All else in the document is not
-    read."""
+    """Return the name of the graph in a document; "" if there is none. All else in the document is
+    not read."""
     name = _root(doc, "meta").get("name")
     return name if isinstance(name, str) else ""
 

@@ -220,7 +220,7 @@ def refuse(edit: SubmittedEdit, error: Objection) -> None:
 
 def _answer(error: Objection) -> tuple[int, Refused, str | None]:
     """Return the close code for a socket, the error for server code, and the text of the close,
-    None without one."""
+    None if there is none."""
     match error:
         case Malformed():
             return messages.MALFORMED, BadInput(f"The update cannot be read: {error}."), None

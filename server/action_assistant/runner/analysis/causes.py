@@ -537,7 +537,7 @@ def _around(run: Run, going: set[str]) -> set[str]:
 
 def _given_up(run: Run) -> int | None:
     """Return the time (µs UTC) from which on states of actions prove nothing: a Stop, the beginning
-    of a silence, or the end of the run; None without any."""
+    of a silence, or the end of the run; None if there is none."""
     if run.stop_requested_at is not None:
         return run.stop_requested_at
     return run.unknown_since if run.unknown_since is not None else run.ended_at
@@ -637,7 +637,7 @@ def _failed(action: ActionRun) -> Visit | None:
 
 
 def _said(action: ActionRun, visit: Visit) -> str:
-    """Return the last message that an action sent during a visit; "" without one."""
+    """Return the last message that an action sent during a visit; "" if there is none."""
     until = visit.not_after
     said = [
         each.text

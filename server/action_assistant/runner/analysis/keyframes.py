@@ -79,13 +79,13 @@ class RunKeyframes(msgspec.Struct, frozen=True):
     marks: tuple[ReplayMark, ...] = ()
 
     def before(self, seq: int) -> Keyframe | None:
-        """Return the last keyframe at or before event number `seq`; None without one."""
+        """Return the last keyframe at or before event number `seq`; None if there is none."""
         place = bisect.bisect_right(self.keys, seq, key=lambda key: key.seq)
         return self.keys[place - 1] if place else None
 
     def until(self, at: int) -> Keyframe | None:
-        """Return the last keyframe whose events had all happened by `at` (µs UTC); None without
-        one."""
+        """Return the last keyframe whose events had all happened by `at` (µs UTC); None if there is
+        none."""
         place = bisect.bisect_right(self.keys, at, key=lambda key: key.at)
         return self.keys[place - 1] if place else None
 
@@ -220,8 +220,8 @@ def fold(
 ) -> Run | None:
     """Fold events, going on from `run`, and return the run after the last one. Without a run
     (None), the first `Requested` begins it; events before that are skipped, and the result is None
-    without one. Call `see` after each event with the event, its decoded body, and the run before
-    and after it."""
+    if there is none. Call `see` after each event with the event, its decoded body, and the run
+    before and after it."""
     for event in events:
         decoded = decode(event.kind, event.body)
         before = run

@@ -245,6 +245,6 @@ def _outcomes(arrow: Relation) -> list[str]:
 
 def _must_have_been(arrow: Relation, graph: Graph, child: ActionStatistics | None) -> bool:
     """Return whether an arrow must have been taken: its child has run (`child`: its statistics,
-    None without any), and no other arrow of the graph leads there."""
+    None if there is none), and no other arrow of the graph leads there."""
     ways = [each for each in graph.relations if each.child == arrow.child and _outcomes(each)]
     return child is not None and child.visits > 0 and len(ways) == 1

@@ -87,11 +87,11 @@ class Word(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
-    """A led run that an earlier process left unfinished. `order`: its start; `course`: the
-    outcomes so far; `sent`: the highest number of a piece; `pieces`: by number of a call without an
-    outcome, its piece and the seq of the last event of that; `again`: pieces that moved again after
-    their outcome, each with its seq; `states`: of the actions that robots carry out; `unproven`:
-    the last piece that ended without a proof of rest by an answer, None without one."""
+    """A led run that an earlier process left unfinished. `order`: its start; `course`: the outcomes
+    so far; `sent`: the highest number of a piece; `pieces`: by the number of each call without an
+    outcome, the piece and the seq of its last event; `again`: pieces that moved again after their
+    outcome, each with that seq; `states`: of the actions that robots carry out; `unproven`: the last
+    piece that ended without a proof of rest by an answer, None if there is none."""
 
     order: Order
     course: LedCourse

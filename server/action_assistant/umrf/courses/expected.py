@@ -32,7 +32,7 @@ class CourseCheck(msgspec.Struct, frozen=True):
 
     @property
     def why(self) -> str:
-        """The first difference in words; "" without one."""
+        """The first difference in words; "" if there is none."""
         if self.apart is None:
             return ""
         expected, found = step_text(self.apart.expected), step_text(self.apart.found)

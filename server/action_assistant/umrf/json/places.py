@@ -154,7 +154,7 @@ def doubled_in(text: str) -> tuple[str, int] | None:
 
 def path_at(text: str, offset: int) -> str:
     """Return the JSON pointer of the value that begins at an offset (in characters) of a text, or
-    of the last one before it; "" without one."""
+    of the last one before it; "" if there is none."""
     last = ""
     for path, start, _ in _members(text):
         if start > offset:

@@ -72,8 +72,8 @@ class Performer(Protocol):
 
     def give_up(self, number: int) -> str | None:
         """End the code of the call with this number by force, since the engine's stop timeout has
-        passed, and return a message about it for people, None without one. The end is then reported
-        like any other return."""
+        passed, and return a message about it for people, None if there is none. The end is then
+        reported like any other return."""
 
 
 class PerformedCalls:

@@ -165,8 +165,8 @@ class Needs(DeclaredRight):
 
 
 def expired_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None:
-    """Return the expired session of this browser; None without one. It proves only that the same
-    person is back."""
+    """Return the expired session of this browser; None if there is none. It proves only that the
+    same person is back."""
     session: Session | None = connection.scope["state"].get("expired")
     return session
 
@@ -421,8 +421,8 @@ class Access:
         return [each for each in tried if each is not None]
 
     def _device(self, headers: dict[str, str]) -> str:
-        """Return the id of the browser from the first cookie that this server sealed; "" without
-        one."""
+        """Return the id of the browser from the first cookie that this server sealed; "" if there
+        is none."""
         given = cookie_values(headers.get("cookie", ""), self._device_cookie)
         return next(filter(None, map(self._keys.device, given)), "")
 

@@ -200,9 +200,9 @@ class Drafts:
         return await self.get(draft)
 
     async def _proposal(self, row: Row[Any]) -> tuple[DraftProposal | None, str]:
-        """Return the open proposal of a draft (None without one), and the id of the browser it came
-        from. Answers that earlier versions stored to one's own proposal or to unknown changes do
-        not count. `row`: of the draft."""
+        """Return the open proposal of a draft (None if there is none), and the id of the browser it
+        came from. Answers that earlier versions stored to one's own proposal or to unknown changes
+        do not count. `row`: of the draft."""
         found: DraftProposal | None = None
         device = ""
         answers: dict[str, DraftAnswer] = {}
