@@ -243,7 +243,7 @@ export interface RunnerApi {
      * Author
      * @description The person behind a command, and the origin of the command. `address`: on the network; "" for
      *     the runner's own computer. `by`: "" if it was not recorded. `program`: the name of the token by
-     *     which a program acted for the person; "" without one.
+     *     which a program acted for the person; "" if there is none.
      */
     Author: {
         id: string;
@@ -1973,7 +1973,7 @@ export interface RunnerApi {
     /**
      * SubgraphShown
      * @description A graph inside of the started one, as it was sent along. `name`: of the actions that stand
-     *     for it; `graph`: its id; `version`: its version, null without one.
+     *     for it; `graph`: its id; `version`: its version, null if none was named.
      */
     SubgraphShown: {
         name: string;

@@ -144,8 +144,8 @@ def latest(connection: Connection, graph: str, seq: int, of: Collection[str]) ->
 
 
 def latest_since(connection: Connection, graph: str, seq: int) -> dict[Place, int]:
-    """Return the number of the last change of each key of a graph that was changed at or after the
-    change `seq`."""
+    """Return, for each key of a graph that was changed at or after the change `seq`, the number of
+    the last change of that key."""
     head, _ = _head(connection, graph)
     newest = select(_c.root, _c.key, func.max(_c.seq).label("seq"))
     chosen = newest.where(_c.graph == graph, _c.seq >= seq, _c.seq <= head)

@@ -212,8 +212,8 @@ class MissedVisits:
         self._a, self._b = _MissedVisitsOfRun(a), _MissedVisitsOfRun(b)
 
     def relation(self, pair: "_ActionPair", seen: Relation) -> Relation:
-        """Return `seen`, the relation of two visits of a pair of actions, or "unknown" if missed
-        visits may explain it."""
+        """Return `seen`, the relation of the visits of one action in both runs, or "unknown" if
+        missed visits may explain it."""
         in_a = self._a.may_miss(pair.a, pair.place)
         in_b = self._b.may_miss(pair.b, pair.place)
         unsure = (

@@ -84,9 +84,9 @@ def _inside(run: Run) -> Iterator[tuple[str, str, Laps]]:
 
 
 def _needs_inside(inside: Iterable[tuple[str, str, Laps]]) -> Iterator[tuple[str, str, int]]:
-    """Yield how visits of actions inside of sub-graphs need visits of others, as (action, needed
-    action, visits possible without it): of the only parent, and of the action around it. `inside`:
-    as `_inside` yields."""
+    """Yield, for actions in sub-graphs, the actions that must run for them to run, as (action,
+    needed action, visits possible without it). The needed action is the only parent, or the action
+    around the sub-graph. `inside`: as `_inside` yields."""
     needs: dict[str, Mapping[str, str]] = {}
     for name, around, laps in inside:
         part, _, node = name.rpartition("/")

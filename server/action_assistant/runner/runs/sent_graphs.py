@@ -159,7 +159,7 @@ def _require_tree(recorded: Sequence[RunSubgraph], own: str, tree: str | None) -
 
 class SubgraphShown(msgspec.Struct, frozen=True):
     """A graph inside of the started one, as it was sent along. `name`: of the actions that stand
-    for it; `graph`: its id; `version`: its version, null without one."""
+    for it; `graph`: its id; `version`: its version, null if none was named."""
 
     name: str
     version: str | None

@@ -219,8 +219,8 @@ class Sessions:
                 raise BadInput("Send the token or an invitation, not both.")
 
     def follow(self, first: Session) -> Session:
-        """Return the session of another browser of the person of a session. Raise Unauthenticated
-        if that session has ended meanwhile."""
+        """Return a new session, for another browser, of the person to whom the session `first`
+        belongs. Raise Unauthenticated if `first` has ended meanwhile."""
         standing = self._standings.of(first)
         if self._revoked.ends(first) or standing.expired:
             raise Unauthenticated("The session that showed the code has ended.")

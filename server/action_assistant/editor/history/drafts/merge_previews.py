@@ -168,8 +168,8 @@ def made_merge(connection: Connection, merge: DraftMerge) -> MadeMerge:
 def authors_of(
     connection: Connection, source: GraphAtSeq, places: Collection[Place]
 ) -> tuple[str, ...]:
-    """Return the ids of the authors of the present values of these places (root map and key) in
-    `source`, the last one first."""
+    """Return the ids of the persons who set the present values at these places (root map and key)
+    in `source`, the last one first."""
     wanted = frozenset(places)
     owners = {owner_of(*place) for place in wanted}
     last = index_queries.latest(connection, source.graph, source.seq, owners)

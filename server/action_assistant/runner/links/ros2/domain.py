@@ -182,7 +182,7 @@ class Domain:
         return any(each.process == server.process for each in marks)
 
     def paths(self) -> tuple[str, ...]:
-        """Return the names (paths) of all services of the type of an engine's get."""
+        """Return the names (paths) of all services that have the type of an engine's get service."""
         found = self._node.get_service_names_and_types()
         return tuple(name for name, kinds in found if _KIND in kinds and self.servers(name))
 

@@ -100,8 +100,8 @@ class Ros2Link:
 
     @property
     def standing(self) -> Standing:
-        """The condition of the engine as of the last check of discovery, which is a second old at
-        most, or of the last get."""
+        """The condition of the engine as it was found by the last check of discovery (at most a
+        second ago) or the last get."""
         return self._standing
 
     # --- commands -----------------------------------------------------------------------------
