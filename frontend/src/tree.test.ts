@@ -357,6 +357,7 @@ const UNDRAFTED: Readonly<Record<string, string>> = {
   "account/sign-in.tsx SignInBar": "a secret: never kept",
   "account/sign-in.tsx SignIn": "a secret: never kept",
   "library/action-list.tsx ActionList": "a search",
+  "account/people-page.tsx FreshLink": "read only: a link to copy",
   "library/actions-page.tsx NewActionForm": DIALOG,
   "administration/audit-page.tsx Filters": "a filter",
   "courses/keep-dry-run.tsx NameField": DIALOG,

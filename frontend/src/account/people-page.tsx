@@ -25,6 +25,7 @@ import { pageUrl } from "../api/page-url";
 import { useMay, usePerson } from "../api/people";
 import { ROLE_WORDS, type Role } from "../api/session";
 import { copyText } from "../ui/copy-text";
+import { usePendingText } from "../ui/drafts";
 import { ago, dateText, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
@@ -191,6 +192,7 @@ function NewPerson({ groups }: { groups: readonly Group[] }) {
   const [name, setName] = useState("");
   const [role, setRole] = useState<Role>("operator");
   const [chosen, setChosen] = useState<string[]>([]);
+  usePendingText(name, null);
   return (
     <form
       className={style.form}
@@ -428,6 +430,7 @@ function Groups({ groups, people }: { groups: readonly Group[]; people: readonly
   const make = useMakeGroup();
   const remove = useRemoveGroup();
   const [name, setName] = useState("");
+  usePendingText(name, null);
   const [asking, setAsking] = useState<string | null>(null);
   return (
     <section className="page-card min-w-0" aria-label="Groups">

@@ -140,15 +140,15 @@ export function Invitation({ link, invited, onOpen }: InvitationProps) {
     "",
     name ?? "",
   );
-  const who = name == null ? "you" : isolated(name);
+  const guest = name == null ? "you" : isolated(name);
   return (
     <main className={style.page}>
       <Paper className={style.card} withBorder radius="lg">
         <Logo />
         <Title order={1} size="h3" mt="md">
           {invited.by === ""
-            ? `${name == null ? "You are" : `${who} is`} invited`
-            : `${isolated(invited.by)} invites ${who}`}{" "}
+            ? `${name == null ? "You are" : `${guest} is`} invited`
+            : `${isolated(invited.by)} invites ${guest}`}{" "}
           as {invited.role}
         </Title>
         <Text c="dimmed" mt="xs">

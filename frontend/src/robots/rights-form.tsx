@@ -110,8 +110,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
     setBusy(true);
     try {
       const operators = all ? ("all" as const) : [...chosen];
-      const { drill_days, watcher } = robot;
-      await setRights(runner ?? "", robot.name, { operators, baton, drill_days, watcher });
+      await setRights(runner ?? "", robot.name, { operators, baton });
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
     } catch (problem) {

@@ -26,13 +26,16 @@ import {
 } from "../api/robots";
 import { Baton, OutOfService } from "../status/robot-rights";
 import { EngineLabel } from "../status/state-label";
+import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { colorOfName } from "../ui/name-colors";
 import { ago, clock, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
-import { LockForm, RightsForm } from "./rights-form";
 import style from "./robot-card.module.css";
 import { RobotLog } from "./robot-log";
 import { notifyRobotFailure, RobotRuns } from "./robot-runs";
+
+const RightsForm = lazyPart(() => import("./rights-form").then((part) => part.RightsForm));
+const LockForm = lazyPart(() => import("./rights-form").then((part) => part.LockForm));
 
 interface Props {
   robot: Robot;
@@ -104,8 +107,10 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
   };
   return (
     <>
-      {asks === "rights" && <RightsForm robot={robot} onClose={close} />}
-      {asks === "lock" && <LockForm robot={robot} onClose={close} />}
+      <OverlayBoundary>
+        {asks === "rights" && <RightsForm robot={robot} onClose={close} />}
+        {asks === "lock" && <LockForm robot={robot} onClose={close} />}
+      </OverlayBoundary>
       <Menu>
         <Menu.Target>
           <ActionIcon size={32} aria-label={`More about ${isolated(robot.name)}`}>

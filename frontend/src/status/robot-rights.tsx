@@ -41,10 +41,10 @@ export function batonWords(robot: Robot, me: string): string {
   if (!robot.baton) return "";
   if (robot.holder === null) return "Nobody has its baton";
   const { person, here, falls_at } = robot.holder;
-  const who = person.id === me ? "You have" : `${isolated(person.name || "Somebody")} has`;
+  const subject = person.id === me ? "You have" : `${isolated(person.name || "Somebody")} has`;
   const at = instant(falls_at);
   const gone = here || at === null ? "" : `, and no page open: it falls at ${clock(at)}`;
-  return `${who} its baton${gone}`;
+  return `${subject} its baton${gone}`;
 }
 
 /** The baton of a robot: who has it, and to take it, hand it over or drop it. */

@@ -195,8 +195,6 @@ def _rights(options: argparse.Namespace) -> int:
             wanted = {
                 "operators": operators,
                 "baton": robot.baton if options.baton is None else options.baton == "on",
-                "drill_days": robot.drill_days,
-                "watcher": robot.watcher,
             }
             body = msgspec.to_builtins(wanted)
             robot = _changed(server, "PUT", f"{_path(options)}/rights", body)

@@ -1382,18 +1382,13 @@ export interface RunnerApi {
     /**
      * RightsWanted
      * @description The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
-     *     `baton`: only the holder of its baton may; `drill_days`: the age in days of the last Stop drill from
-     *     which nothing starts, null for any; `watcher`: each start names who watches the robot.
+     *     `baton`: only the holder of its baton may.
      */
     RightsWanted: {
         /** @default all */
         operators?: "all" | RunnerApi["OperatorWanted"][];
         /** @default false */
         baton?: boolean;
-        /** @default null */
-        drill_days?: number | null;
-        /** @default false */
-        watcher?: boolean;
     };
     /**
      * Robot
@@ -1402,8 +1397,7 @@ export interface RunnerApi {
      *     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
      *     besides this runner. `actions`, `graphs`: the size of its index; null before its first answer.
      *     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
-     *     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
-     *     `drill_days`, `watcher`: what an owner asks for before a start.
+     *     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service.
      */
     Robot: {
         name: string;
@@ -1432,8 +1426,6 @@ export interface RunnerApi {
         graphs: number | null;
         operators: "all" | RunnerApi["OperatorShown"][];
         baton: boolean;
-        drill_days: number | null;
-        watcher: boolean;
         holder: RunnerApi["HolderShown"] | null;
         locks: RunnerApi["LockShown"][];
     };

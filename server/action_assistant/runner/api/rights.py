@@ -35,15 +35,12 @@ class OperatorWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
 class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
-    `baton`: only the holder of its baton may; `drill_days`: the age in days of the last Stop drill from
-    which nothing starts, null for any; `watcher`: each start names who watches the robot."""
+    `baton`: only the holder of its baton may."""
 
     operators: (
         Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
     ) = "all"
     baton: bool = False
-    drill_days: Annotated[int, msgspec.Meta(ge=1, le=3650)] | None = None
-    watcher: bool = False
 
 
 class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -225,12 +222,7 @@ def _rules_of(wanted: RightsWanted) -> Rules:
         if len(set(ids)) < len(ids):
             raise BadInput("Somebody is named twice.", where={"path": "/operators"})
         operators = tuple(map(_operator, wanted.operators))
-    return Rules(
-        operators=operators,
-        baton=wanted.baton,
-        drill_days=wanted.drill_days,
-        watcher=wanted.watcher,
-    )
+    return Rules(operators=operators, baton=wanted.baton)
 
 
 def _operator(wanted: OperatorWanted) -> Operator:

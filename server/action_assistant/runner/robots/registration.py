@@ -106,8 +106,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
     besides this runner. `actions`, `graphs`: the size of its index; None before its first answer.
     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
-    `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
-    `drill_days`, `watcher`: what an owner asks for before a start.
+    `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service.
     """
 
     name: str
@@ -133,8 +132,6 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     graphs: int | None = None
     operators: Literal["all"] | tuple[OperatorShown, ...] = "all"
     baton: bool = False
-    drill_days: int | None = None
-    watcher: bool = False
     holder: HolderShown | None = None
     locks: tuple[LockShown, ...] = ()
 
@@ -224,8 +221,6 @@ def with_rights(plain: Robot, rights: RobotRights, holder: HolderShown | None) -
         plain,
         operators=operators,
         baton=rules.baton,
-        drill_days=rules.drill_days,
-        watcher=rules.watcher,
         holder=holder,
         locks=locks,
     )

@@ -36,13 +36,10 @@ class Operator(msgspec.Struct, frozen=True, omit_defaults=True):
 
 class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there; None: every operator.
-    `baton`: only its holder may. `drill_days`: the age of the last Stop drill in days from which
-    nothing starts; `watcher`: each start names who watches."""
+    `baton`: only its holder may."""
 
     operators: tuple[Operator, ...] | None = None
     baton: bool = False
-    drill_days: int | None = None
-    watcher: bool = False
 
 
 class Holder(msgspec.Struct, frozen=True):

@@ -20,7 +20,7 @@ AuditKind: TypeAlias = Literal[
     "starts",  # and pause, resume, change, go on, words of people about runs
     "refused",  # starts that were refused
     "stops",
-    "robots",  # registrations, rights, batons, words about engines, drills
+    "robots",  # registrations, rights, batons, words about engines
     "sessions",  # sign-ins, ended sessions
     "people",  # links, persons, groups, tokens, names
     "strangers",  # refused requests without valid credentials
