@@ -89,7 +89,14 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
         {graphs.isPending && <Skeletons />}
         {graphs.isError && (
           <>
-            <Empty icon={<IconAlertTriangle size={22} />} title="The list cannot be read">
+            <Empty
+              icon={<IconAlertTriangle size={22} />}
+              title={
+                graphs.data === undefined
+                  ? "The list cannot be read"
+                  : "The list below may be out of date"
+              }
+            >
               {errorText(graphs.error)}
             </Empty>
             {kept}
@@ -98,7 +105,7 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
         {asked !== null && known.isSuccess && folder === null && (
           <p role="status">This folder is not there any more. Its graphs are where it was.</p>
         )}
-        {graphs.isSuccess && list.length === 0 && folders.length === 0 && (
+        {graphs.data !== undefined && list.length === 0 && folders.length === 0 && (
           <Empty
             icon={<IconPlus size={22} />}
             title="No graph yet"
@@ -115,12 +122,12 @@ export function Home({ onNew, onImport, kept, greeting }: Props) {
               : "Graphs of others appear here."}
           </Empty>
         )}
-        {graphs.isSuccess && list.length + folders.length > 0 && (
+        {graphs.data !== undefined && list.length + folders.length > 0 && (
           <GraphCards key={folder} graphs={list} folders={folders} folder={folder}>
             <FolderCards folder={folder} folders={folders} />
           </GraphCards>
         )}
-        {graphs.isSuccess && (
+        {graphs.data !== undefined && (
           <div className={style.foot}>
             <DeletedGraphs />
           </div>
