@@ -303,7 +303,8 @@ def run_shown(state: str, result: str | None, visits: list[str | None]) -> RunSh
     at = "2026-11-27T20:00:00Z"
     unknown = {"not_before": at, "not_after": None, "until": None, "how": "observed"}
     shown = [{"from": at, "result": each, **unknown} for each in visits]
-    known: dict[str, Any] = dict.fromkeys(RunShown.__struct_fields__)
+    required = (each.name for each in msgspec.structs.fields(RunShown) if each.required)
+    known: dict[str, Any] = dict.fromkeys(required)
     known |= {"id": "R", "number": 1, "graph_name": "pair", "digest": "", "engine": "David"}
     known |= {"author": {"id": "A", "name": "Ada"}, "desired": "running", "requested_at": at}
     known |= {"state": state, "result": result, "detail": "", "alarms": [], "log": [], "rests": []}

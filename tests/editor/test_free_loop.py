@@ -231,6 +231,7 @@ def values_in(pickled: bytes) -> int:
 #: it, `{v}`: a version, `{a}`: the key of one action. None: not asked here, and why.
 ASKED: Final[dict[str, tuple[str, str, Any] | None]] = {
     "getGraph": ("GET", "/api/graphs/{g}", None),
+    "fileGraph": ("PUT", "/api/graphs/{g}/folder", {"folder": None}),
     "describeGraph": ("PATCH", "/api/graphs/{g}", {"description": "new"}),
     "deleteGraph": None,  # the last thing that is done to a graph; below
     "recoverGraph": ("POST", "/api/graphs/{g}/recover", None),
