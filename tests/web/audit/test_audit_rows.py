@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.log import people_events as e
 from action_assistant.editor.people import audit_facts
 from action_assistant.journal.databases import ask_once
 from action_assistant.journal.events import Draft
@@ -122,3 +123,22 @@ async def test_an_event_of_before_is_shown_as_not_recorded(tmp_path: Path) -> No
     broken, old = await everything(url, AuditFilter())
     assert (old.event, old.origin) == (h.DELETED, None)
     assert broken.text.endswith("(it cannot be read)")
+
+
+async def test_a_person_who_has_only_come_in_is_called_by_the_name_of_the_link(
+    tmp_path: Path,
+) -> None:
+    url = f"sqlite:///{tmp_path / 'editor.db'}"
+    journal = await Journal.open(url, branch="editor", fold=h.fold)
+    added = e.MemberState("p1", "Ben of the lab", "operator")
+    for kind, author, body in (
+        (e.ADDED, "ada", added),
+        (e.LINKED, "ada", e.LinkMade("l1", "p1", 1)),
+        (e.LINK_USED, "p1", e.LinkUsed("l1", "Chrome on Linux", "10.0.0.7")),
+    ):
+        await journal.append(h.PEOPLE, [h.draft(kind, author, body)])
+    await journal.close()
+    used, linked, _ = await everything(url, AuditFilter())
+    assert linked.text == "made a personal link for Ben of the lab"
+    assert used.person is not None
+    assert used.person.name == "Ben of the lab"

@@ -63,7 +63,9 @@ class People:
 
 def stored_people(connection: Connection) -> Callable[[str], PersonRef]:
     """Return who the author of an event is, by the names that are stored. For workers."""
-    person = editor_tables.person.c
-    rows = connection.execute(select(person.id, person.name))
-    names = {row.id: row.name for row in rows}
+    person, member = editor_tables.person.c, editor_tables.member.c
+    # A person of a personal link has a name before they act; the name that they gave last counts.
+    named = select(member.id, member.name), select(person.id, person.name)
+    rows = (row for each in named for row in connection.execute(each))
+    names = {row.id: row.name for row in rows if row.name}
     return lambda author: PersonRef(author, names.get(author) or _OURS.get(author, ""))
