@@ -184,7 +184,7 @@ test("what was, and what was otherwise", async ({ browser }) => {
       await expect(page.getByText("here they part").first()).toBeVisible();
       await picture(page, "compare-light");
       await page.goto(`${product.url}/runs?graph=${id}`);
-      await page.getByRole("link", { name: "Statistics" }).click();
+      await page.getByRole("link", { name: "Statistics", exact: true }).click();
       await expect(page.getByText(/of \d+ runs finished true/)).toBeVisible();
       await picture(page, "statistics-light");
     }

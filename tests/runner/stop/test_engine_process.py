@@ -10,6 +10,7 @@ import pytest
 
 from action_assistant.runner.links.engine_process import (
     EngineProcess,
+    command_line,
     has_ended,
     indexes_again,
     indexes_by,
@@ -28,6 +29,7 @@ from runner.harness import (
     virtual,
 )
 from runner.robots_in_network import STUBBORN
+from support import waiting
 
 
 @pytest.fixture
@@ -79,6 +81,8 @@ def test_the_command_line_of_an_engine_shows_whether_it_indexes_while_it_runs(
 def test_only_the_very_process_of_an_engine_shows_how_it_indexes() -> None:
     line = ["action_engine_node", "-c", "read -r line", "--indexing-rate", "2"]
     with subprocess.Popen(line, executable="/bin/sh", stdin=subprocess.PIPE) as node:
+        # The kernel shows none yet while the program begins.
+        waiting.until("it shows its arguments", lambda: command_line(node.pid)[0])
         known = process(node.pid)
         assert known is not None
         assert indexes_again(known) is True
