@@ -1,4 +1,4 @@
-"""Who may start on a robot, who holds its baton, and who has put it out of service."""
+"""Add the table of rights of robots: operators, the holder of the baton, and locks."""
 
 from collections.abc import Sequence
 

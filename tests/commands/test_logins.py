@@ -72,7 +72,7 @@ class Elsewhere:
         )
 
     def sign_in(self, *words: str, scopes: list[str] | None = None) -> str:
-        """What a login says that a person confirms."""
+        """Return what a login prints after a person has confirmed it."""
         waiting = self.begin(*words)
         code = code_of(waiting)
         confirm(self.product, code, scopes)

@@ -24,6 +24,7 @@ import { useLive } from "../api/page-link";
 import { pageUrl } from "../api/page-url";
 import { useMay, usePerson } from "../api/people";
 import { ROLE_WORDS, type Role } from "../api/session";
+import { ConfirmRow } from "../ui/confirm-row";
 import { copyText } from "../ui/copy-text";
 import { usePendingText } from "../ui/drafts";
 import { ago, dateText, instant, useNow } from "../ui/times";
@@ -62,29 +63,6 @@ function Trouble({ of }: { of: readonly { isError: boolean; error: unknown }[] }
     <p className="m-0 ink-error text-13" role="alert">
       {errorText(failed.error)}
     </p>
-  );
-}
-
-interface SureProps {
-  /** What happens when the person goes on. */
-  children: string;
-  action: string;
-  loading: boolean;
-  onCancel: () => void;
-  onSure: () => void;
-}
-
-function Sure({ children, action, loading, onCancel, onSure }: SureProps) {
-  return (
-    <div className={style.ask} role="alert">
-      <span>{children}</span>
-      <Button size="compact-sm" onClick={onCancel}>
-        Keep
-      </Button>
-      <Button size="compact-sm" color="red" variant="filled" loading={loading} onClick={onSure}>
-        {action}
-      </Button>
-    </div>
   );
 }
 
@@ -369,15 +347,15 @@ function Person({ member, groups, origin, sessions }: PersonProps) {
         </>
       )}
       {asking && (
-        <Sure
+        <ConfirmRow
           action="End now"
           loading={end.isPending}
           onCancel={() => setAsking(false)}
-          onSure={() => end.mutate(member.id)}
+          onConfirm={() => end.mutate(member.id)}
         >
           All devices, links and programs of this person are out at once, for good. Runs go on;
           whoever is here can stop them.
-        </Sure>
+        </ConfirmRow>
       )}
       <Trouble of={[change, link, end, endSession, signOut]} />
     </li>
@@ -477,14 +455,14 @@ function Groups({ groups, people }: { groups: readonly Group[]; people: readonly
                 </Button>
               </div>
               {asking === group.id && (
-                <Sure
+                <ConfirmRow
                   action="Remove"
                   loading={remove.isPending}
                   onCancel={() => setAsking(null)}
-                  onSure={() => remove.mutate(group.id)}
+                  onConfirm={() => remove.mutate(group.id)}
                 >
                   Its persons stay. What only this group may do, they may do no more.
-                </Sure>
+                </ConfirmRow>
               )}
             </li>
           );

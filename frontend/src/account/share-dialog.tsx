@@ -22,6 +22,7 @@ import {
   useRevoke,
   useSharing,
 } from "../api/sharing";
+import { ConfirmRow } from "../ui/confirm-row";
 import { copyText } from "../ui/copy-text";
 import { useIsPhone } from "../ui/hooks";
 import { Segments } from "../ui/segments";
@@ -300,21 +301,14 @@ export function ShareLink({ invitation, origin, revoke }: ShareLinkProps) {
         </Button>
       </div>
       {asking && (
-        <div className={style.ask} role="alert">
-          <span>Everybody who signed in with this link is signed out at once, on all devices.</span>
-          <Button size="compact-sm" onClick={() => setAsking(false)}>
-            Keep
-          </Button>
-          <Button
-            size="compact-sm"
-            color="red"
-            variant="filled"
-            loading={revoke.isPending && revoke.variables === invitation.id}
-            onClick={() => revoke.mutate(invitation.id)}
-          >
-            Revoke now
-          </Button>
-        </div>
+        <ConfirmRow
+          action="Revoke now"
+          loading={revoke.isPending && revoke.variables === invitation.id}
+          onCancel={() => setAsking(false)}
+          onConfirm={() => revoke.mutate(invitation.id)}
+        >
+          Everybody who signed in with this link is signed out at once, on all devices.
+        </ConfirmRow>
       )}
       {code && <Code src={codeUrl(invitation.id, origin)} label={label} />}
     </li>

@@ -5,6 +5,7 @@ import { useEffect, useState } from "react";
 import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
 import { useMay, usePerson } from "../api/people";
+import { ConfirmRow } from "../ui/confirm-row";
 import { copyText } from "../ui/copy-text";
 import { ago, dateText, useNow } from "../ui/times";
 import { counted } from "../words/counted";
@@ -226,21 +227,14 @@ function TokenRow({ token, revoke }: RowProps) {
         </Button>
       )}
       {asking && (
-        <div className={style.ask} role="alert">
-          <span>The program is shut out at once. Runs that it has started go on.</span>
-          <Button size="compact-sm" onClick={() => setAsking(false)}>
-            Keep
-          </Button>
-          <Button
-            size="compact-sm"
-            color="red"
-            variant="filled"
-            loading={revoke.isPending && revoke.variables === record.id}
-            onClick={() => revoke.mutate(record.id)}
-          >
-            Revoke now
-          </Button>
-        </div>
+        <ConfirmRow
+          action="Revoke now"
+          loading={revoke.isPending && revoke.variables === record.id}
+          onCancel={() => setAsking(false)}
+          onConfirm={() => revoke.mutate(record.id)}
+        >
+          The program is shut out at once. Runs that it has started go on.
+        </ConfirmRow>
       )}
     </li>
   );

@@ -1,8 +1,7 @@
 """*Go on* and an outcome by word count once for each press, also if its answer is lost and it is sent
 again."""
 
-import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime, timedelta
 from typing import Literal
 
@@ -263,7 +262,7 @@ class History:
                     rest.pop(0)
                     self.control = None
 
-    async def _take(self, step: Step, start_soon: "functools.partial[None] | object") -> None:
+    async def _take(self, step: Step, start_soon: Callable[..., object]) -> None:
         assert self.control is not None
         now = self.control.open[self.run].run
         if now.held is not None and time(now.held.at) not in self.seen:
@@ -278,7 +277,7 @@ class History:
                 self.lab.david.silent = False
             case Sent(back=back, arrivals=arrivals) if len(self.seen) > back:
                 for after in arrivals:
-                    start_soon(self._arrive, step, self.seen[-1 - back], after)  # type: ignore[operator]
+                    start_soon(self._arrive, step, self.seen[-1 - back], after)
             case _:
                 await anyio.sleep(2)
 

@@ -137,7 +137,9 @@ async def test_a_run_that_is_handed_over_with_all_its_batons_goes_on() -> None:
             await control.hand_over(run, "ben", author(ANN), ANN)
             lab.harness.journal.slow = 0.0
         for robot in ("David", "Carol"):
-            assert control.rights.holder(robot).person.id == "ben"  # type: ignore[union-attr]
+            holder = control.rights.holder(robot)
+            assert holder is not None
+            assert holder.person.id == "ben"
         assert held(control, run) == ""
         assert await ended(control, run) == "finished"
         assert sent(lab) == 4
@@ -189,7 +191,9 @@ async def test_a_run_is_not_handed_over_to_somebody_who_may_not_start_on_all_its
         run = await begin(lab, control)
         with control.rights.here(BEN), pytest.raises(Forbidden, match="on Carol: only Ann may"):
             await control.hand_over(run, "ben", author(ANN), ANN)
-        assert control.rights.holder("David").person.id == "ann"  # type: ignore[union-attr]
+        holder = control.rights.holder("David")
+        assert holder is not None
+        assert holder.person.id == "ann"
         assert held(control, run) == ""
         assert await ended(control, run) == "finished"
 

@@ -1,4 +1,4 @@
-"""What is noted for the audit is stored; what a flood brings stays small."""
+"""The audit stores each fact that it was given, and few rows of a flood."""
 
 import asyncio
 from collections.abc import Sequence

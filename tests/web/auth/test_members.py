@@ -172,7 +172,7 @@ def test_a_person_ends_without_postgres(tmp_path: Path) -> None:
 def test_a_personal_link_changes_the_person_and_the_session_of_a_browser(
     product: Product, arrive: Arrive
 ) -> None:
-    """Whoever planted the cookie of a session that they know gains nothing (fixation)."""
+    """An attacker who plants the cookie of a session that they know gains nothing (fixation)."""
     planted = Keys(TOKEN).new_session("Eve", role="viewer")
     guest, eve = arrive(product), arrive(product)
     for each in (guest, eve):

@@ -235,11 +235,11 @@ def _utc(at: int) -> datetime:
 
 def kinds_of(names: Iterable[str]) -> tuple[AuditKind, ...]:
     """Return the kinds of these names. Raise ValueError for an unknown one."""
-    found: list[AuditKind] = []
-    for name in names:
-        if name not in AUDIT_KINDS:
+    by_name = {kind: kind for kind in AUDIT_KINDS}
+    asked = tuple(names)
+    for name in asked:
+        if name not in by_name:
             raise ValueError(
                 f"{name!r} is no kind of the audit; there are {', '.join(AUDIT_KINDS)}"
             )
-        found.append(name)  # type: ignore[arg-type]
-    return tuple(found)
+    return tuple(by_name[name] for name in asked)
