@@ -26,6 +26,7 @@ test("a person is invited, adds a phone, and is put out on both at once", async 
   const mari = await newBrowser(browser);
   await mari.page.goto(link);
   await mari.page.getByRole("button", { name: /^Come in as .*Mari/ }).click();
+  await expect(mari.page.getByRole("button", { name: /^You are .*Mari/ })).toBeVisible();
   await mari.page.goto(`${product.url}/people`);
   await expect(mari.page.getByText("this one")).toBeVisible();
   await expect(persons.getByText("1 device")).toBeVisible({ timeout: 10_000 });
