@@ -30,7 +30,7 @@ from action_assistant.runner.archives.raw_messages import RawArchived
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
 from action_assistant.system import posix
-from action_assistant.web.auth import keys, revocations
+from action_assistant.web.auth import graph_seals, keys, revocations
 from action_assistant.web.network import certificate
 
 BRANCHES: Final[tuple[Branch, ...]] = ("editor", "runner")
@@ -39,7 +39,10 @@ RECORDINGS: Final = "recordings"
 #: its files never change; the others are put back where there is none.
 MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
 WHOLE: Final = frozenset(
-    {keys.TOKEN_FILE, certificate.FOLDER, "people", "sessions", "sessions.db", "tokens"}
+    {
+        *(keys.TOKEN_FILE, certificate.FOLDER, graph_seals.FILE),
+        *("people", "sessions", "sessions.db", "tokens"),
+    }
 )
 #: Files that are created again, or that belong to this data folder only.
 _OWN: Final = frozenset(
