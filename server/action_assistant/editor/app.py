@@ -43,6 +43,7 @@ from action_assistant.settings import EditorSettings
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.audit.routes import audit_routes
 from action_assistant.web.audit.rows import AuditFilter
+from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.device_codes import DeviceCodes
 from action_assistant.web.auth.keys import Keys, ScrapeToken, Session
 from action_assistant.web.auth.people_files import PeopleFiles
@@ -124,7 +125,10 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     revoked = Revocations(settings.data)
     people_files = PeopleFiles(settings.data)
     browsers = SessionFiles(settings.data, revoked)
-    standings = Standings(people_files, browsers, limits_of(settings.sessions))
+    confirmations = Confirmations(settings.data, keys)
+    confirmations.prune()
+    session_limits = limits_of(settings.sessions)
+    standings = Standings(people_files, browsers, session_limits, confirmations=confirmations)
     browsers.every()  # forgets those that are over
     token_files = TokenFiles(settings.data, keys, revoked, most_days=settings.token_days)
     codes = DeviceCodes(limits=settings.limits)

@@ -49,6 +49,7 @@ from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.audit.events import StopPressed
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.caller import BackgroundTasks
+from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, ScrapeToken
 from action_assistant.web.auth.people_files import PeopleFiles
@@ -132,7 +133,12 @@ def _identity_now(
     standing = standings.of(credential)
     if revoked.ends(credential) or standing.expired:
         return None
-    return msgspec.structs.replace(identity, person=standing.person, groups=standing.groups)
+    return msgspec.structs.replace(
+        identity,
+        person=standing.person,
+        groups=standing.groups,
+        confirmed_at=standing.confirmed_at,
+    )
 
 
 def _note_idle_stop(audit: AuditLog, author: Author, robot: str, run: str) -> None:
@@ -258,7 +264,10 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     tokens = TokenFiles(settings.data, keys, revoked)
     people_files = PeopleFiles(settings.data)
     browsers = SessionFiles(settings.data, revoked)
-    standings = Standings(people_files, browsers, limits_of(settings.sessions))
+    confirmations = Confirmations(settings.data, keys)
+    confirmations.prune()
+    limits = limits_of(settings.sessions)
+    standings = Standings(people_files, browsers, limits, confirmations=confirmations)
     services.identity_now = partial(_identity_now, standings, revoked)
     return application(
         [

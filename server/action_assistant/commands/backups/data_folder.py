@@ -30,7 +30,7 @@ from action_assistant.runner.archives.raw_messages import RawArchived
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
 from action_assistant.system import posix
-from action_assistant.web.auth import graph_seals, keys, revocations
+from action_assistant.web.auth import confirmations, graph_seals, keys, revocations
 from action_assistant.web.network import certificate
 
 BRANCHES: Final[tuple[Branch, ...]] = ("editor", "runner")
@@ -49,6 +49,7 @@ _OWN: Final = frozenset(
     {
         *(f"{branch}.db" for branch in BRANCHES),
         *("editor.mark", "editor.database", "open.html", ARCHIVE, RESTORING),
+        confirmations.FOLDER,
         *(backup_state.FILE, before_upgrade.FOLDER),
     }
 )

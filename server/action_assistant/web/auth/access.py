@@ -365,7 +365,12 @@ class Access:
                 self._standings.browsers.use(session.id)
             state["session"] = session
             state["identity"] = Identity(
-                standing.person, standing.groups, session, device=device, address=address
+                standing.person,
+                standing.groups,
+                session,
+                device=device,
+                address=address,
+                confirmed_at=standing.confirmed_at,
             )
             state["is_expired"] = lambda: self._standing(session).expired
             return

@@ -40,11 +40,13 @@ Credential: TypeAlias = Session | Token
 
 
 class Standing(NamedTuple):
-    """The present worth of a credential. `expired`: good for nothing but Stop."""
+    """The present worth of a credential. `expired`: good for nothing but Stop. `confirmed_at`: when
+    the person of the session was last confirmed, in seconds since 1970; None if never."""
 
     person: Person
     groups: frozenset[str]
     expired: bool
+    confirmed_at: float | None = None
 
 
 class Identity(msgspec.Struct, frozen=True):
@@ -52,7 +54,9 @@ class Identity(msgspec.Struct, frozen=True):
 
     `groups`: ids of the groups to which an owner has added the person. `session` and `token` are
     both None for the owner's token. `device`: the id of the browser; "" if unknown. `address`: the
-    address of the client on the network; "" for this computer itself.
+    address of the client on the network; "" for this computer itself. `confirmed_at`: when the person
+    last proved, in this session, that it is they, in seconds since 1970; None if never, and always
+    for programs.
     """
 
     person: Person
@@ -61,6 +65,7 @@ class Identity(msgspec.Struct, frozen=True):
     token: Token | None = None
     device: str = ""
     address: str = ""
+    confirmed_at: float | None = None
 
     @property
     def scopes(self) -> frozenset[Scope] | None:

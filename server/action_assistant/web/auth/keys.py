@@ -159,6 +159,10 @@ class Keys:
         """Return the seal of a program's token, which only a server with this token can make."""
         return _text(hmac.digest(self._seal, b"program token\0" + record, "sha256"))
 
+    def confirmation_seal(self, record: bytes) -> str:
+        """Return the seal of a confirmation, which only a server with this token can make."""
+        return _text(hmac.digest(self._seal, b"confirmation\0" + record, "sha256"))
+
     def prove(self, challenge: str, address: str) -> ServerProof:
         """Prove to a client that this server knows the token, before the client shows it.
         `challenge`: the text that the client chose. `address`: the address (`HOST:PORT`) that

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Final
 
+from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.identity import Credential, Standing, Token
 from action_assistant.web.auth.keys import Person, Session
 from action_assistant.web.auth.people_files import PeopleFiles
@@ -17,7 +18,8 @@ from action_assistant.web.auth.session_limits import DEFAULTS, Limit
 
 
 class Standings:
-    """Knows the present standing of all credentials."""
+    """Knows the present standing of all credentials. `confirmations`: None where nobody is asked to
+    confirm anything."""
 
     def __init__(
         self,
@@ -25,7 +27,9 @@ class Standings:
         browsers: SessionFiles,
         limits: Mapping[Role, Limit] = DEFAULTS,
         clock: Callable[[], float] = time.time,
+        confirmations: Confirmations | None = None,
     ) -> None:
+        self.confirmations: Final = confirmations
         self.people: Final = people
         self.browsers: Final = browsers
         self.limits: Final = limits
@@ -47,7 +51,11 @@ class Standings:
             over = over or (file.until is not None and now >= file.until)
         if not over and not isinstance(credential, Token):
             over = self._is_idle(credential, person.role, now)
-        return Standing(person, frozenset(file.groups if file is not None else ()), over)
+        confirmed_at = None
+        if self.confirmations is not None and not isinstance(credential, Token):
+            confirmed_at = self.confirmations.confirmed_at(credential.id)
+        groups = frozenset(file.groups if file is not None else ())
+        return Standing(person, groups, over, confirmed_at)
 
     def _is_idle(self, session: Session, role: Role, now: float) -> bool:
         """Return whether a session was not used for too long. One whose last use is unknown, as on

@@ -1,0 +1,162 @@
+"""Confirmations: the times at which people proved that it is they who use a session.
+
+`confirmed/SESSION.json` in the data folder holds the last confirmation of one session, sealed under the
+token of the server. A process reads the file itself, so it needs neither the other process nor a
+database. A runner with a data folder of its own gets the sealed record from the page. On a full disk a
+confirmation holds in the processes that were told of it, until they end.
+"""
+
+import contextlib
+import hmac
+import logging
+import re
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
+
+import msgspec
+
+from action_assistant.errors import BadInput, Unauthenticated
+from action_assistant.private_files import make_folder, replace_file
+from action_assistant.random_ids import random_id
+from action_assistant.web.auth.keys import Keys
+
+log: Final = logging.getLogger(__name__)
+
+FOLDER: Final = "confirmed"
+#: Seconds after which a confirmation counts nowhere any more.
+LONGEST_S: Final = 24 * 3600.0
+_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
+_SKEW_S: Final = 60.0  # by which the clock of another process may be ahead
+_MOST: Final = 5000  # sessions that one process keeps in memory
+
+#: The means by which a person was confirmed: on another device of theirs, by a passkey, or by
+#: signing in at an identity provider again.
+ConfirmedBy: TypeAlias = Literal["device", "passkey", "oidc"]
+_Text = Annotated[str, msgspec.Meta(max_length=100)]
+
+
+class Confirmation(msgspec.Struct, frozen=True):
+    """The last confirmation of a session. `at`: seconds since 1970. `seal`: proves that a server
+    with the same token made it, so it may be shown to anybody."""
+
+    session: _Text
+    at: float
+    how: ConfirmedBy
+    seal: _Text = ""
+
+
+class _Known(NamedTuple):
+    """A confirmation in memory, and the state of its file as it was read; None without a file."""
+
+    state: tuple[int, int, int] | None
+    found: Confirmation | None
+
+
+class Confirmations:
+    """Keeps, verifies and reads the last confirmation of each session."""
+
+    def __init__(self, data: Path, keys: Keys, clock: Callable[[], float] = time.time) -> None:
+        self._folder = data / FOLDER
+        self._keys = keys
+        self._clock = clock
+        self._known: dict[str, _Known] = {}
+
+    def confirm(self, session_id: str, how: ConfirmedBy) -> Confirmation:
+        """Keep that the person of a session is confirmed now, and return the sealed record of that,
+        for other runners. Raise ValueError for a malformed id."""
+        if _ID.fullmatch(session_id) is None:
+            raise ValueError(f"{session_id!r} is no id of a session")
+        plain = Confirmation(session_id, self._clock(), how)
+        made = msgspec.structs.replace(plain, seal=self._seal(plain))
+        self._keep(made)
+        return made
+
+    def adopt(self, given: Confirmation) -> None:
+        """Keep a confirmation that another process made; an older one than is known changes nothing.
+        Raise BadInput or Unauthenticated if this server's token did not seal it."""
+        seal = self._seal(given).encode()
+        if _ID.fullmatch(given.session) is None:
+            raise BadInput("This names no session.", where={"path": "/session"})
+        if not hmac.compare_digest(seal, given.seal.encode(errors="replace")):
+            raise Unauthenticated("No server with this token has made this confirmation.")
+        if given.at > self._clock() + _SKEW_S:
+            raise BadInput(
+                "The clocks of the editor's computer and of the runner's differ by more than a "
+                "minute: set them, then confirm again.",
+                where={"path": "/at"},
+            )
+        known = self.last(given.session)
+        if known is None or known.at < given.at:
+            self._keep(given)
+
+    def confirmed_at(self, session_id: str) -> float | None:
+        """Return when the person of a session was last confirmed, in seconds since 1970; None if
+        that is not known."""
+        found = self.last(session_id)
+        return None if found is None else found.at
+
+    def last(self, session_id: str) -> Confirmation | None:
+        """Return the last confirmation of a session; None if none is known."""
+        if _ID.fullmatch(session_id) is None:
+            return None
+        known = self._known.get(session_id)
+        path = self._path(session_id)
+        try:
+            found = path.stat()
+            state = (found.st_mtime_ns, found.st_ino, found.st_size)
+            if known is None or known.state != state:
+                known = _Known(state, _newer(known, self._read(path, session_id)))
+                self._remember(session_id, known)
+        except OSError:  # not there, or the disk is gone: what is in memory holds
+            pass
+        return None if known is None else known.found
+
+    def prune(self) -> None:
+        """Delete the files of confirmations that are too old for every rule."""
+        with contextlib.suppress(OSError):
+            for path in self._folder.iterdir():
+                if self._clock() - path.stat().st_mtime > LONGEST_S:
+                    path.unlink(missing_ok=True)
+
+    def _keep(self, made: Confirmation) -> None:
+        """Keep a confirmation in memory and as a file. A full disk is no error."""
+        self._remember(made.session, _Known(None, made))
+        path = self._path(made.session)
+        part = self._folder / f"{made.session}.{random_id()}.part"  # both processes may write
+        try:
+            make_folder(self._folder)
+            replace_file(path, msgspec.json.encode(made), part=part, is_durable=False)
+        except OSError as error:
+            log.warning("a confirmation could not be kept in %s: %s", self._folder, error.strerror)
+
+    def _remember(self, session_id: str, known: _Known) -> None:
+        if len(self._known) >= _MOST:
+            self._known.clear()  # the files have them
+        self._known[session_id] = known
+
+    def _read(self, path: Path, session_id: str) -> Confirmation | None:
+        """Return the confirmation in a file; None if it is not genuine. Raise OSError."""
+        try:
+            found = msgspec.json.decode(path.read_bytes(), type=Confirmation)
+        except msgspec.DecodeError:
+            return None
+        genuine = hmac.compare_digest(self._seal(found).encode(), found.seal.encode())
+        is_past = found.at <= self._clock() + _SKEW_S
+        return found if genuine and found.session == session_id and is_past else None
+
+    def _seal(self, given: Confirmation) -> str:
+        plain = msgspec.json.encode(msgspec.structs.replace(given, seal=""))
+        return self._keys.confirmation_seal(plain)
+
+    def _path(self, session_id: str) -> Path:
+        return self._folder / f"{session_id}.json"
+
+
+def _newer(known: _Known | None, read: Confirmation | None) -> Confirmation | None:
+    """Return the newer one of a confirmation in memory and one read from a file."""
+    kept = None if known is None else known.found
+    if kept is None or read is None:
+        return kept or read
+    return kept if kept.at > read.at else read
