@@ -110,7 +110,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
     setBusy(true);
     try {
       const operators = all ? ("all" as const) : [...chosen];
-      await setRights(runner ?? "", robot.name, { operators, baton });
+      await setRights(runner ?? "", robot.name, { operators, baton, watched: robot.watched });
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
     } catch (problem) {

@@ -140,6 +140,8 @@ def _first_summary(asked: Requested) -> dict[str, object]:
         summary |= {"robots": asked.led.robots, "lost": asked.led.lost}
     if asked.batons:
         summary["batons"] = asked.batons
+    if asked.watching:
+        summary["watching"] = asked.watching
     return summary
 
 

@@ -538,13 +538,17 @@ export interface RunnerApi {
      * GoOnRequest
      * @description Lets a held run go on. `since`: the `since` of `held`, as the person saw it; a run that has gone
      *     on meanwhile has another one. `request_id`: names this press; if it has counted already, a repeat
-     *     changes nothing and is answered with the run as it is now.
+     *     changes nothing and is answered with the run as it is now. `watching`: as in `StartRequest`.
      */
     GoOnRequest: {
         /** Format: date-time */
         since: string;
         /** @default  */
         request_id?: string;
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
     };
     /**
      * GraphFile
@@ -596,6 +600,10 @@ export interface RunnerApi {
          * @enum {string}
          */
         lost?: "stop" | "wait";
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
     };
     /**
      * GroupShown
@@ -831,6 +839,7 @@ export interface RunnerApi {
         held: RunnerApi["HeldShown"] | null;
         lead?: RunnerApi["Author"];
         batons?: string[];
+        watching?: string[];
         cause: string;
         pinned: boolean;
         note: string;
@@ -907,7 +916,7 @@ export interface RunnerApi {
     /**
      * ModifyRequest
      * @description Another version of the graph of a run, by value. `continue_from`: the full name of an action
-     *     to start when the graph continues.
+     *     to start when the graph continues; `watching`: as in `StartRequest`.
      */
     ModifyRequest: {
         version: string;
@@ -920,6 +929,10 @@ export interface RunnerApi {
         continue_from?: string;
         /** @default null */
         override?: RunnerApi["Override"] | null;
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
     };
     /**
      * NeverTaken
@@ -1345,6 +1358,16 @@ export interface RunnerApi {
         how: string;
     };
     /**
+     * ResumeRequest
+     * @description Lets a paused run go on. `watching`: as in `StartRequest`.
+     */
+    ResumeRequest: {
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
+    };
+    /**
      * Revocation
      * @description The invitation or token that is revoked, or the session or person that is ended: exactly one
      *     of them.
@@ -1382,13 +1405,16 @@ export interface RunnerApi {
     /**
      * RightsWanted
      * @description The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
-     *     `baton`: only the holder of its baton may.
+     *     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
+     *     they watch it.
      */
     RightsWanted: {
         /** @default all */
         operators?: "all" | RunnerApi["OperatorWanted"][];
         /** @default false */
         baton?: boolean;
+        /** @default false */
+        watched?: boolean;
     };
     /**
      * Robot
@@ -1397,7 +1423,8 @@ export interface RunnerApi {
      *     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
      *     besides this runner. `actions`, `graphs`: the size of its index; null before its first answer.
      *     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
-     *     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service.
+     *     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
+     *     `watched`: each start has the word of its person that they watch it.
      */
     Robot: {
         name: string;
@@ -1428,6 +1455,7 @@ export interface RunnerApi {
         baton: boolean;
         holder: RunnerApi["HolderShown"] | null;
         locks: RunnerApi["LockShown"][];
+        watched: boolean;
     };
     /**
      * RobotChange
@@ -1637,6 +1665,7 @@ export interface RunnerApi {
         held: RunnerApi["HeldShown"] | null;
         lead?: RunnerApi["Author"];
         batons?: string[];
+        watching?: string[];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -1651,7 +1680,7 @@ export interface RunnerApi {
      *     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
      *     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
      *     further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
-     *     held at the start.
+     *     held at the start; `watching`: those that they said to watch.
      */
     RunSummary: {
         id: string;
@@ -1689,6 +1718,7 @@ export interface RunnerApi {
         held: RunnerApi["HeldShown"] | null;
         lead?: RunnerApi["Author"];
         batons?: string[];
+        watching?: string[];
     };
     /**
      * RunWhole
@@ -1732,6 +1762,7 @@ export interface RunnerApi {
         held: RunnerApi["HeldShown"] | null;
         lead?: RunnerApi["Author"];
         batons?: string[];
+        watching?: string[];
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -1848,7 +1879,8 @@ export interface RunnerApi {
      *     `behaviours`: actions with a Python behaviour on the runner do what that does, before what the
      *     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
      *     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
-     *     of each actor ("" for actions without one); `lost`: see `Led`.
+     *     of each actor ("" for actions without one); `lost`: see `Led`. `watching`: true for each robot of
+     *     which the person says that they watch it, with its hardware stop within reach.
      */
     StartRequest: {
         version: string;
@@ -1881,6 +1913,10 @@ export interface RunnerApi {
          * @enum {string}
          */
         lost?: "stop" | "wait";
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
     };
     /**
      * StartShown
@@ -2445,6 +2481,11 @@ interface RunnerOperations {
         parameters: {
             path: {
                 run: string;
+            };
+        };
+        requestBody?: {
+            content: {
+                "application/json": RunnerApi["ResumeRequest"];
             };
         };
         responses: {

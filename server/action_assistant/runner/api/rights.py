@@ -35,12 +35,14 @@ class OperatorWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
 class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
-    `baton`: only the holder of its baton may."""
+    `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
+    they watch it."""
 
     operators: (
         Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
     ) = "all"
     baton: bool = False
+    watched: bool = False
 
 
 class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -222,7 +224,7 @@ def _rules_of(wanted: RightsWanted) -> Rules:
         if len(set(ids)) < len(ids):
             raise BadInput("Somebody is named twice.", where={"path": "/operators"})
         operators = tuple(map(_operator, wanted.operators))
-    return Rules(operators=operators, baton=wanted.baton)
+    return Rules(operators=operators, baton=wanted.baton, watched=wanted.watched)
 
 
 def _operator(wanted: OperatorWanted) -> Operator:

@@ -43,6 +43,7 @@ from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.start.admission import (
     GoOnRequest,
+    ResumeRequest,
     StartRequest,
     WordRequest,
     decoded,
@@ -184,14 +185,15 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="resumeRun",
         status_code=202,
         summary="Let a paused run go on",
+        opt=reads(ResumeRequest | None),
         guards=[StartNeeds(services, "go_on")],
     )
     async def resume(run: str, request: _Asking) -> views.RunShown:
+        asked = decoded(await request.body() or b"{}", ResumeRequest)
         with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
             await _require_command_role(services, run, request)
-            return views.run_view(
-                await services.control.resume(run, author_of(request), identity_of(request))
-            )
+            author, me = author_of(request), identity_of(request)
+            return views.run_view(await services.control.resume(run, author, me, asked))
 
     @post(
         "/api/runs/{run:str}/modify",

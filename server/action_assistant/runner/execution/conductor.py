@@ -430,7 +430,9 @@ class Conductor:
             return
         robot = self._robots.reachable(step.engine)
         try:
-            cleared = await self._look.before_piece(robot, self._first, self.gate.person)
+            cleared = await self._look.before_piece(
+                robot, self._first, self.gate.person, self.gate.claim
+            )
         except NotAllowed as why:  # whatever the starter has chosen, this stops nothing
             if not self.gate.is_waiting:
                 self.gate.hold_run(str(why))
@@ -642,16 +644,19 @@ class Conductor:
 
     # --- the gate -----------------------------------------------------------------------------
 
-    async def go_on(self, author: Author, lead: Identity, request_id: str) -> None:
-        """Let a held run go on for `lead`, once every robot that has a step of it has answered. Raise
-        Conflict if no engine leads the run, and as `LedGate.go_on` does."""
+    async def go_on(
+        self, author: Author, lead: Identity, request_id: str, watching: tuple[str, ...]
+    ) -> None:
+        """Let a held run go on for `lead`, once every robot that has a step of it has answered.
+        `watching`: the robots that `lead` says to watch. Raise Conflict if no engine leads the run, and
+        as `LedGate.go_on` does."""
         if self._is_past_help:
             raise Conflict("What leads this run has failed too often: only Stop is left.")
         if not self._has_engine:
             raise Conflict("What leads this run is being begun again. Try that in some seconds.")
         names = {step.engine for step in self._steps.values() if not step.over.is_set()}
         names |= {piece.run.engine for piece in self._again.values() if piece.run.end is None}
-        await self.gate.go_on(author, lead, names, request_id)
+        await self.gate.go_on(author, lead, names, request_id, watching)
         for step in self._steps.values():
             step.troubles &= {"ended"}
 

@@ -170,10 +170,17 @@ class Conductors:
         that a repeat of it waits for the first one. A request without an id ("") has no lock."""
         return self._claims.once(f"{run} {request_id}") if request_id else nullcontext()
 
-    async def go_on(self, run: str, author: Author, lead: Identity, request_id: str) -> None:
-        """Let a held run go on for `lead`. Raise Conflict if nothing can lead it any more, or one of its
-        robots may begin no piece."""
-        await self._conductor(run).go_on(author, lead, request_id)
+    async def go_on(
+        self,
+        run: str,
+        author: Author,
+        lead: Identity,
+        request_id: str,
+        watching: tuple[str, ...],
+    ) -> None:
+        """Let a held run go on for `lead`, who watches these robots. Raise Conflict if nothing can lead
+        it any more, or one of its robots may begin no piece."""
+        await self._conductor(run).go_on(author, lead, request_id, watching)
 
     async def hand_over(
         self, run: str, author: Author, to: Identity, pass_batons: Callable[[], Awaitable[None]]

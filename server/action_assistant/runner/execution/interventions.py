@@ -15,10 +15,18 @@ from action_assistant.runner.links.port import (
     Order,
 )
 from action_assistant.runner.robots.engine import KnownEngine
+from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import SentGraph
-from action_assistant.runner.start.admission import StartRequest, decoded, prepared
+from action_assistant.runner.start.admission import (
+    StartRequest,
+    Watching,
+    claim_of,
+    decoded,
+    prepared,
+    watched_in,
+)
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.preflight import not_matched_in
 from action_assistant.umrf.facts import SIMULATED
@@ -29,13 +37,14 @@ _MOVING: Final = frozenset({"running", "paused"})
 
 class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Another version of the graph of a run, by value. `continue_from`: the full name of an action
-    to start when the graph continues."""
+    to start when the graph continues; `watching`: as in `StartRequest`."""
 
     version: str
     digest: str
     umrf: SentGraph
     continue_from: str = ""
     override: Override | None = None
+    watching: Watching = {}
 
 
 async def pause(opened: OpenRun, author: Author) -> Run:
@@ -53,13 +62,13 @@ async def pause(opened: OpenRun, author: Author) -> Run:
     return opened.run
 
 
-async def resume(opened: OpenRun, author: Author) -> Run:
-    """Let a paused run go on in the name of `author`, and return it. Raise Conflict if the run is
+async def resume(opened: OpenRun, author: Author, watching: tuple[str, ...]) -> Run:
+    """Let a paused run go on in the name of `author`, who watches these robots, and return it. Raise Conflict if the run is
     not paused, Unavailable if the message could not be sent."""
     if opened.run.desired != "paused":
         raise Conflict(f"Only a paused run can go on; this one is {_condition(opened.run)}.")
     try:
-        await opened.resume(author)
+        await opened.resume(author, watching)
     except NotSent as why:
         raise Unavailable(f"The resume could not be sent: {why}") from why
     return opened.run
@@ -73,12 +82,12 @@ async def modify(
     engine: KnownEngine | None,
     approvals: Approvals,
     run_in_worker: RunInWorker,
-    require: Callable[[], None],
+    require: Callable[[Claim], None],
 ) -> Run:
     """Give a running graph another structure, in the name of `author`, and return the run. `body`
     is an encoded ModifyRequest; `engine` is None for a simulated run; `approvals` checks the yes of
     a second person, where the robot demands it; `require` raises a refusal if the author may not
-    start on its robot. Raise BadInput if the body is wrong, Conflict if
+    start this on its robot. Raise BadInput if the body is wrong, Conflict if
     the run or its engine does not allow the change, Unavailable if the message could not be sent,
     and OutcomeUnknown if it cannot be known whether the engine has made the change."""
     run = opened.run
@@ -89,8 +98,10 @@ async def modify(
             "stop it and start the new version."
         )
     asked = decoded(body, ModifyRequest)
+    watching = watched_in(asked.watching, run.robots)
     facts = SIMULATED if engine is None else engine.facts
-    ready = await run_in_worker(prepared, _as_start(asked, run), facts, run.id)
+    start = _as_start(asked, run)
+    ready = await run_in_worker(prepared, start, facts, run.id)
     if engine is not None:
         await approvals.require(engine.registration, ready.digest, author.id)
         await _require_matched(engine, ready.umrf, run_in_worker)
@@ -103,9 +114,11 @@ async def modify(
     targets = () if run.simulated else (run.engine,)
     graph = GraphOutline(ready.name, ready.actions)
     order = Order(run=run.id, graph=graph, umrf=ready.umrf, targets=targets)
-    require()
+    require(claim_of(start, ready))
     try:
-        await opened.modify(author, order, asked.version, ready.digest, asked.continue_from)
+        await opened.modify(
+            author, order, asked.version, ready.digest, asked.continue_from, watching
+        )
     except NotSent as why:
         raise Unavailable(f"The change could not be sent: {why}") from why
     except EngineRefused as why:
@@ -124,6 +137,7 @@ def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
         request_id=run.request_id,
         graph=run.graph,
         override=asked.override,
+        watching=asked.watching,
     )
 
 

@@ -17,6 +17,7 @@ from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.port import Answer, NoAnswer, NotSent
 from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.runs.events import Author, Requested
 from action_assistant.runner.start.led_items import IndexingWords, indexing_item, led_item
 from action_assistant.runner.start.preflight import Item, is_blocking
@@ -31,7 +32,7 @@ _FRESH_S: Final = 3.0  # for which a look at a robot counts
 #: Why nothing begins for a run that nobody has let go on since the runner's restart.
 _NOBODY: Final = "nobody has let it go on since the runner was restarted"
 #: The codes of the items about the rights of a robot.
-_RIGHTS: Final = frozenset({"service", "right", "baton"})
+_RIGHTS: Final = frozenset({"service", "right", "baton", "watched"})
 
 
 class NotAllowed(NoAnswer):
@@ -73,25 +74,31 @@ class LedLook:
         self._indexing = indexing
 
     async def items(
-        self, robot: KnownEngine, answer: Answer, lead: Identity, cleared: str = ""
+        self,
+        robot: KnownEngine,
+        answer: Answer,
+        lead: Identity,
+        claim: Claim,
+        cleared: str = "",
     ) -> list[Item]:
         """Return an item of each rule for a robot that has just given this answer. `lead`: for whom the
-        run is led; `cleared`: the life of its engine that was looked at before the start, "" before
-        that, when `lead` reads the items. Raise Unavailable if the journal cannot be read."""
+        run is led; `claim`: of its start; `cleared`: the life of its engine that was looked at before
+        the start, "" before that, when `lead` reads the items. Raise Unavailable if the journal cannot
+        be read."""
         indexing = await self._indexing_item(robot, answer.incarnation, cleared)
         name = robot.registration.name
-        rights = self._rights.items(name, lead, is_asking=not cleared)
+        rights = self._rights.items(name, lead, claim, is_asking=not cleared)
         return [led_item(robot.registration), indexing, *rights]
 
     def why_not_allowed(
-        self, robot: str, lead: Identity | None, *, is_decided: bool = False
+        self, robot: str, lead: Identity | None, claim: Claim, *, is_decided: bool = False
     ) -> str:
         """Return why a run that is led for `lead` may begin nothing on a robot now; "" if it may.
-        None: nobody has let it go on since the runner's restart. `is_decided`: a change counts before
-        it is stored."""
+        None: nobody has let it go on since the runner's restart. `claim`: of the run; `is_decided`: a
+        change counts before it is stored."""
         if lead is None:
             return _NOBODY
-        refused = self._rights.refusals(robot, lead, is_asking=False, is_decided=is_decided)
+        refused = self._rights.refusals(robot, lead, claim, is_asking=False, is_decided=is_decided)
         return refused[0].text if refused else ""
 
     async def _indexing_item(self, robot: KnownEngine, life: str, cleared: str) -> Item:
@@ -102,16 +109,16 @@ class LedLook:
         return indexing_item(name, robot.facts, standing, word)
 
     async def before_piece(
-        self, robot: KnownEngine, run: Requested, lead: Identity | None
+        self, robot: KnownEngine, run: Requested, lead: Identity | None, claim: Claim
     ) -> Cleared:
         """Ask a robot, wait for its answer, and return the proof that a piece of a led run may
-        begin on it. Raise NoAnswer with the reason if the robot does not answer, and also if its
+        begin on it. `claim`: of the run. Raise NoAnswer with the reason if the robot does not answer, and also if its
         answer or a check forbids a piece."""
         assert run.led is not None
         name = robot.registration.name
         if lead is None:
             raise NotAllowed(_NOBODY)
-        if why := self.why_not_allowed(name, lead):
+        if why := self.why_not_allowed(name, lead, claim):
             raise NotAllowed(why)
         await robot.indexed()
         try:
@@ -133,7 +140,7 @@ class LedLook:
             raise NoAnswer(f"run {taken.number} is {taken.state} there")
         self._require_known(name, run.run)
         try:
-            items = await self.items(robot, answer, lead, answer.incarnation)
+            items = await self.items(robot, answer, lead, claim, answer.incarnation)
         except Refused as unreadable:
             raise NoAnswer(unreadable.detail) from unreadable
         overridden = run.override.codes if run.override is not None else ()
@@ -159,16 +166,21 @@ class LedLook:
                 raise NoAnswer(f"nobody knows whether {node} has ended there: {why}")
 
     async def before_going_on(
-        self, robots: Robots, names: Iterable[str], run: Requested, lead: Identity
+        self,
+        robots: Robots,
+        names: Iterable[str],
+        run: Requested,
+        lead: Identity,
+        claim: Claim,
     ) -> None:
         """Check the robots with these names at the same time, before a held run goes on, and wait
-        for their answers. `run`: its first event; `lead`: the person who lets it go on. Raise Conflict with the reasons of all robots on
-        which no piece may begin."""
+        for their answers. `run`: its first event; `lead`: the person who lets it go on; `claim`: of the
+        run from then on. Raise Conflict with the reasons of all robots on which no piece may begin."""
         found: dict[str, str] = {}
 
         async def look(name: str) -> None:
             try:
-                await self.before_piece(robots.reachable(name), run, lead)
+                await self.before_piece(robots.reachable(name), run, lead, claim)
             except NoAnswer as why:
                 found[name] = str(why)
             except Refused as why:

@@ -175,19 +175,26 @@ class OpenRun:
         await self._link.pause(self.run.graph_name)
         self.look()
 
-    async def resume(self, author: Author) -> None:
-        """Record that `author` wants the run to go on, and send that to the engine. Do not wait for
-        its effect. Raise NotSent if the message could not be sent."""
-        self.tell(ResumeRequested(self._clock_us(), author), author.id)
+    async def resume(self, author: Author, watching: tuple[str, ...] = ()) -> None:
+        """Record that `author` wants the run to go on, and send that to the engine. `watching`: the
+        robots that they watch. Do not wait for its effect. Raise NotSent if the message could not be
+        sent."""
+        self.tell(ResumeRequested(self._clock_us(), author, watching), author.id)
         await self._link.resume(self.run.graph_name)
         self.look()
 
     async def modify(
-        self, author: Author, order: Order, version: str, digest: str, continue_from: str
+        self,
+        author: Author,
+        order: Order,
+        version: str,
+        digest: str,
+        continue_from: str,
+        watching: tuple[str, ...] = (),
     ) -> None:
         """Record that `author` gave the run another graph, and send it (`order`) to the engine.
         `version` and `digest`: of the new graph; `continue_from`: the full name of an action to
-        start then, "" for none. Raise NotSent if it could not be sent, EngineRefused if the engine
+        start then, "" for none; `watching`: the robots that they watch. Raise NotSent if it could not be sent, EngineRefused if the engine
         refuses it, and OutcomeUnknown if it cannot be known whether the engine runs it."""
         asked = ModifyRequested(
             at=self._clock_us(),
@@ -197,6 +204,7 @@ class OpenRun:
             actions=graph_outline(order.graph).actions,
             umrf=order.umrf,
             continue_from=continue_from,
+            watching=watching,
         )
         self._doubts.reach()
         before = self.run

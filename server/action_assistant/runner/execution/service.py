@@ -35,6 +35,7 @@ from action_assistant.runner.robots.registration import (
     with_rights,
 )
 from action_assistant.runner.robots.registry import Robots
+from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended
@@ -46,8 +47,10 @@ from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import (
     GoOnRequest,
     GroupRequest,
+    ResumeRequest,
     StartRequest,
     WordRequest,
+    watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.idempotency import StopOrder
@@ -274,19 +277,29 @@ class ExecutionService:
         Unavailable if the message could not be sent."""
         return await interventions.pause(_no_piece(await self._movable(run)), author)
 
-    async def resume(self, run: str, author: Author, identity: Identity | None = None) -> Run:
+    async def resume(
+        self,
+        run: str,
+        author: Author,
+        identity: Identity | None = None,
+        asked: ResumeRequest | None = None,
+    ) -> Run:
         """Resume a paused run. Raise NotFound if there is no such run, Conflict if it is not
         paused, Unavailable if the message could not be sent, Forbidden or Conflict if the author may
         not start on its robot."""
         opened = _no_piece(await self._movable(run))
-        self._require_rights(opened.run, author, identity)
-        return await interventions.resume(opened, author)
+        watching = watched_in(asked.watching if asked else {}, opened.run.robots)
+        self._require_rights(opened.run, author, identity, _claim(opened.run, watching))
+        return await interventions.resume(opened, author, watching)
 
-    def _require_rights(self, run: Run, author: Author, identity: Identity | None) -> None:
-        """Raise Forbidden or Conflict unless the author may start on each robot of a run."""
+    def _require_rights(
+        self, run: Run, author: Author, identity: Identity | None, claim: Claim | None = None
+    ) -> None:
+        """Raise Forbidden or Conflict unless the author may start on each robot of a run. `claim`: as
+        for `RightsRegistry.refusals`."""
         by = identity or _operator(author)
         self.rights.act(by)
-        self.rights.require(run.robots, by)
+        self.rights.require(run.robots, by, claim)
 
     async def modify(
         self, run: str, body: bytes, author: Author, identity: Identity | None = None
@@ -295,8 +308,7 @@ class ExecutionService:
         NotFound if there is no such run, what `interventions.modify` raises, and Forbidden or Conflict
         if the author may not start on its robot."""
         opened = _no_piece(await self._movable(run))
-        require = partial(self._require_rights, opened.run, author, identity)
-        require()
+        self._require_rights(opened.run, author, identity)
         engine = self.robots.link(opened.run.engine)
         return await interventions.modify(
             opened,
@@ -305,7 +317,7 @@ class ExecutionService:
             engine=engine,
             approvals=self.approvals,
             run_in_worker=self._runtime.run_in_worker,
-            require=require,
+            require=partial(self._require_rights, opened.run, author, identity),
         )
 
     async def go_on(
@@ -352,9 +364,10 @@ class ExecutionService:
             )
         if opened.run.desired == "stopped":
             raise Conflict("The run is being stopped.")
-        self._require_rights(opened.run, author, identity)
+        watching = watched_in(asked.watching, opened.run.robots)
+        self._require_rights(opened.run, author, identity, _claim(opened.run, watching))
         lead = identity or _operator(author)
-        await self._conductors.go_on(run, author, lead, asked.request_id)
+        await self._conductors.go_on(run, author, lead, asked.request_id, watching)
         return opened.run
 
     async def hand_over(
@@ -594,6 +607,12 @@ def _ignore_stop(_author: Author, _robot: str, _run: str) -> None:
 def _operator(author: Author) -> Identity:
     """Return an operator without groups, for commands that come from no route."""
     return Identity(Person(author.id, author.name, "operator"))
+
+
+def _claim(run: Run, watching: tuple[str, ...]) -> Claim:
+    """Return what a run brings to the rules of its robots when a person who watches these robots lets
+    it go on."""
+    return Claim(digest=run.tree_digest or run.digest, watching=frozenset(watching))
 
 
 def _wholes_of(run: Run) -> set[str]:

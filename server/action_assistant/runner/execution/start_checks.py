@@ -33,8 +33,10 @@ from action_assistant.runner.start.admission import (
     Prepared,
     PreparedPieces,
     StartRequest,
+    claim_of,
     prepared,
     prepared_pieces,
+    watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.led_items import INDEXING, led_item, led_items
@@ -147,6 +149,7 @@ class StartChecks:
             return await self._accept_conducted(request, starter)
         if request.robots:
             raise BadInput("Only a led run has several robots.", where={"path": "/robots"})
+        watched_in(request.watching, engines_of(request))
         if request.engine == SIMULATOR:
             return await self._accept_simulation(request)
         robot = self._robots.reachable(request.engine)
@@ -195,6 +198,7 @@ class StartChecks:
         time. `starter`: the person. Raise Conflict, with the reasons of all robots, if a
         check refuses it."""
         _require_plain(request)
+        watched_in(request.watching, engines_of(request))
         ready = await self._run_in_worker(prepared_pieces, request, CONDUCTED_FACTS, random_id())
         items = led_items(ready)
         overridden = request.override.codes if request.override else ()
@@ -253,7 +257,7 @@ class StartChecks:
     ) -> None:
         """Make the checks that need no answer of the engine: the rights of the robot, the yes of a second person, whether a
         run keeps the robot, and whether anything is being stopped there. `starter`: the person. Raise Conflict or Forbidden if one fails."""
-        self._rights.require([request.engine], starter)
+        self._rights.require([request.engine], starter, claim_of(request, ready))
         await self._approvals.require(robot.registration, ready.tree_digest, starter.person.id)
         overridden = request.override.codes if request.override else ()
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
@@ -304,7 +308,11 @@ class StartChecks:
         run."""
         items = [
             *await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes),
-            *(await self._look_led.items(robot, view.answer, starter) if is_led else ()),
+            *(
+                await self._look_led.items(robot, view.answer, starter, claim_of(request, ready))
+                if is_led
+                else ()
+            ),
         ]
         free = self._free_item(request.engine, ready.name)  # again: time has passed
         accepted = AcceptedStart(
@@ -426,7 +434,7 @@ class StartChecks:
             own = ready.by_robot[name]
             listed = [
                 self._free_item(name, own.name),
-                *await self._engine_items(robot, own, starter, is_led=True),
+                *await self._engine_items(robot, own, starter, led=request),
             ]
             listed += await self._approval_items(robot, own, starter)
             found.append(preflight.with_verdict(name, listed, whole.digest, whole.tree_digest))
@@ -455,7 +463,7 @@ class StartChecks:
             items.append(preflight.refusal_item("graph", refused))
         if robot is not None:
             items.append(self._free_item(request.engine, ready.name if ready is not None else ""))
-            items += self._rights.items(request.engine, starter)
+            items += self._rights.items(request.engine, starter, claim_of(request, ready))
             items += await self._engine_items(robot, ready, starter)
             items += await self._approval_items(robot, ready, starter)
         digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
@@ -467,8 +475,10 @@ class StartChecks:
         ready: Prepared | None,
         starter: Identity,
         *,
-        is_led: bool = False,
+        led: StartRequest | None = None,
     ) -> list[Item]:
+        """Return the items that need an answer of the robot. `led`: the start of a led run, else
+        None."""
         try:
             view = await self._ask(robot)
         except NoAnswer as nothing:
@@ -476,8 +486,10 @@ class StartChecks:
         if ready is None:
             return [preflight.answer_item(view)]
         items = await self._run_in_worker(preflight.engine_items, view, ready, self._prefixes)
-        led = await self._look_led.items(robot, view.answer, starter) if is_led else ()
-        return [*items, *led]
+        if led is None:
+            return list(items)
+        claim = claim_of(led, ready)
+        return [*items, *await self._look_led.items(robot, view.answer, starter, claim)]
 
     async def _approval_items(
         self, robot: KnownEngine, ready: Prepared | None, starter: Identity

@@ -31,7 +31,7 @@ from action_assistant.runner.links.port import SIMULATOR, GraphOutline, Order
 from action_assistant.runner.runs.events import Author, Led, Requested
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
-from action_assistant.runner.start.admission import GroupRequest, StartRequest
+from action_assistant.runner.start.admission import GroupRequest, StartRequest, claim_of
 from action_assistant.runner.start.idempotency import IdempotentStarts, StopOrder
 from action_assistant.runner.start.rights_registry import RightsRegistry
 from action_assistant.web.auth.identity import Identity
@@ -158,10 +158,12 @@ class StartPipeline:
         requested, order = _to_store(accepted, author, at=at, number=number, group=group)
         robots = engines_of(accepted.request)
         batons = self._rights.with_baton(robots)
-        requested = msgspec.structs.replace(requested, batons=batons)
+        claim = claim_of(accepted.request, accepted.prepared)
+        watching = tuple(sorted(claim.watching))
+        requested = msgspec.structs.replace(requested, batons=batons, watching=watching)
         await self._checks.give_words(accepted, author)
         self._checks.require_free(accepted)
-        self._rights.require(robots, starter)
+        self._rights.require(robots, starter, claim)
         with anyio.CancelScope(shield=True):
             run = await self._claims.store(requested)
             occupied = self._checks.why_occupied(accepted)
@@ -178,7 +180,8 @@ class StartPipeline:
         self, accepted: AcceptedStart, requested: Requested, run: Run, starter: Identity
     ) -> OpenRun:
         robots = engines_of(accepted.request)
-        may_leave = partial(self._rights.require_still, robots, starter)
+        claim = claim_of(accepted.request, accepted.prepared)
+        may_leave = partial(self._rights.require_still, robots, starter, claim)
         if accepted.led is None or accepted.is_simulated:
             is_simulated = accepted.is_simulated
             return self._runs.open(

@@ -106,7 +106,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     `servers`: how many engines answer on the path of its get; `others`: publishers of starts
     besides this runner. `actions`, `graphs`: the size of its index; None before its first answer.
     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
-    `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service.
+    `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
+    `watched`: each start has the word of its person that they watch it.
     """
 
     name: str
@@ -134,6 +135,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     baton: bool = False
     holder: HolderShown | None = None
     locks: tuple[LockShown, ...] = ()
+    watched: bool = False
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -223,4 +225,5 @@ def with_rights(plain: Robot, rights: RobotRights, holder: HolderShown | None) -
         baton=rules.baton,
         holder=holder,
         locks=locks,
+        watched=rules.watched,
     )

@@ -19,7 +19,7 @@ from action_assistant.web.auth.rights import Denied, may
 from action_assistant.web.auth.roles import Permission
 
 #: The codes of refusals, which are those of the items of a pre-flight.
-RightCode: TypeAlias = Literal["service", "right", "baton"]
+RightCode: TypeAlias = Literal["service", "right", "baton", "watched"]
 #: How a baton came to another person, or to nobody.
 BatonChange: TypeAlias = Literal["taken", "handed", "forced", "dropped", "fell", "off"]
 _NAMED: Final = 4
@@ -36,10 +36,21 @@ class Operator(msgspec.Struct, frozen=True, omit_defaults=True):
 
 class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there; None: every operator.
-    `baton`: only its holder may."""
+    `baton`: only its holder may; `watched`: each start has the word of its person that they watch
+    the robot, with its hardware stop within reach."""
 
     operators: tuple[Operator, ...] | None = None
     baton: bool = False
+    watched: bool = False
+
+
+class Claim(msgspec.Struct, frozen=True, kw_only=True):
+    """The part of a start that the rules of robots ask about, apart from its person. `digest`: of the
+    graph that is sent together with those inside; `watching`: the robots that a person has said to
+    watch."""
+
+    digest: str
+    watching: frozenset[str] = frozenset()
 
 
 class Holder(msgspec.Struct, frozen=True):
@@ -137,10 +148,16 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
         return None if first is None else first.text
 
     def refusals(
-        self, identity: Identity, now: float, *, is_asking: bool = True
+        self,
+        identity: Identity,
+        now: float,
+        *,
+        claim: Claim | None = None,
+        is_asking: bool = True,
     ) -> Iterator[Refusal]:
-        """Yield every reason why an identity may not start here. `now`: seconds since 1970;
-        `is_asking`: the sentences are for this person, else about them."""
+        """Yield every reason why an identity may not start here. `now`: seconds since 1970; `claim`: of
+        the start, None where no start is meant yet; `is_asking`: the sentences are for this person, else
+        about them."""
         who = "You" if is_asking else identity.person.name or "The starter"
         if self.is_unread:
             yield Refusal(
@@ -152,6 +169,15 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
             yield Refusal("right", why)
         if why := self._no_baton(identity, who):
             yield Refusal("baton", why)
+        if claim is not None and self.rules.watched and self.name not in claim.watching:
+            yield Refusal("watched", self._unwatched(is_asking))
+
+    def _unwatched(self, is_asking: bool) -> str:
+        if is_asking:
+            return (
+                f"Say that you watch {self.name}, and that its hardware stop is within your reach."
+            )
+        return f"Nobody has said that they watch {self.name} with its hardware stop within reach."
 
     def _out_of_service(self) -> str:
         said = [f"{_name(each.by)}: “{each.reason.rstrip('. ')}”." for each in self.locks]

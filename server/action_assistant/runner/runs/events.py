@@ -117,6 +117,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     led: Led | None = None  # of a led run
     piece: PieceOf | None = None  # of a piece, which is no run of its own for people
     batons: tuple[str, ...] = ()  # the robots whose baton the author held
+    watching: tuple[str, ...] = ()  # the robots that the author said to watch
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -148,17 +149,19 @@ class PauseRequested(msgspec.Struct, frozen=True):
     author: Author
 
 
-class ResumeRequested(msgspec.Struct, frozen=True):
-    """A person wants the run to go on."""
+class ResumeRequested(msgspec.Struct, frozen=True, omit_defaults=True):
+    """A person wants the run to go on. `watching`: the robots that they said to watch."""
 
     kind: ClassVar[str] = "run.resume_requested.v1"
 
     at: int
     author: Author
+    watching: tuple[str, ...] = ()
 
 
 class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """A person gave the run another version of its graph. Stored before it is sent."""
+    """A person gave the run another version of its graph. Stored before it is sent. `watching`: the
+    robots that they said to watch."""
 
     kind: ClassVar[str] = "run.modify_requested.v1"
 
@@ -169,6 +172,7 @@ class ModifyRequested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=T
     actions: dict[str, str]  # full name -> aid
     umrf: str  # as sent
     continue_from: str = ""
+    watching: tuple[str, ...] = ()
 
 
 class ModifyRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -403,7 +407,8 @@ class Held(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 
 class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A person let a held run go on. `since`: when it was held; 0 in events of earlier versions;
-    `request_id`: names the press, "" where the caller gave none."""
+    `request_id`: names the press, "" where the caller gave none. `watching`: the robots that they said
+    to watch."""
 
     kind: ClassVar[str] = "run.released.v1"
 
@@ -411,6 +416,7 @@ class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     author: Author
     since: int = 0
     request_id: str = ""
+    watching: tuple[str, ...] = ()
 
 
 class HandedOver(msgspec.Struct, frozen=True, kw_only=True):

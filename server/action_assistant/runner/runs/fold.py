@@ -337,6 +337,7 @@ def _modified(run: Run, event: ModifyRequested) -> Run:
         _with_intervention(run, event, "modify"),
         version=event.version,
         digest=event.digest,
+        tree_digest=None,
         actions=run.actions | actions,
         reshaped=True,
     )

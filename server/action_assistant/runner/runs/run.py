@@ -126,7 +126,9 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     piece: PieceOf | None = None  # of a piece of one
     held: Held | None = None  # why a led run begins nothing further
     lead: Author | None = None  # who let it go on last, or was handed it; None: its author
+    tree_digest: str | None = None  # of the graph together with those inside; None if unknown
     batons: tuple[str, ...] = ()  # the robots whose baton the author held at the start
+    watching: tuple[str, ...] = ()  # the robots that the author said to watch
     #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run

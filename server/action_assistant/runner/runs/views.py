@@ -164,7 +164,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
     further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
-    held at the start."""
+    held at the start; `watching`: those that they said to watch."""
 
     id: str
     number: int
@@ -196,6 +196,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     held: HeldShown | None = None
     lead: Author | msgspec.UnsetType = msgspec.UNSET
     batons: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+    watching: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         hold_names(self, "unconfirmed", "detail")
@@ -375,6 +376,7 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
         recorded=True,
         robots=more.get("robots"),
         batons=tuple(more["batons"]) if "batons" in more else msgspec.UNSET,
+        watching=tuple(more["watching"]) if "watching" in more else msgspec.UNSET,
     )
 
 
@@ -440,6 +442,7 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "held": _held(run),
         "lead": run.lead or msgspec.UNSET,
         "batons": run.batons or msgspec.UNSET,
+        "watching": run.watching or msgspec.UNSET,
     }
 
 

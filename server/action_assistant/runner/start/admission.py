@@ -4,13 +4,14 @@ Pure."""
 import re
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
-from typing import Annotated, Final, Literal, TypeVar
+from typing import Annotated, Final, Literal, TypeAlias, TypeVar
 
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, TooLarge
 from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
 from action_assistant.runner.links.simulator import slowed
+from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.runs.events import Override, RunSubgraph
 from action_assistant.runner.runs.sent_graphs import (
     Inner,
@@ -49,6 +50,9 @@ _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 #: Made by the client, once per press; "" from a client that repeats nothing.
 _PressId = Annotated[str, msgspec.Meta(max_length=200)]
 
+#: True for each robot of which a person says that they watch it.
+Watching: TypeAlias = Annotated[dict[_Name, bool], msgspec.Meta(max_length=100)]
+
 _MOST_SHOWN: Final = 20  # problems in one refusal
 _MOST_ENGINES: Final = 20  # of one group
 _MOST_KEPT: Final = 40  # errors, and warnings, that a prepared start keeps
@@ -62,7 +66,8 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     `behaviours`: actions with a Python behaviour on the runner do what that does, before what the
     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
-    of each actor ("" for actions without one); `lost`: see `Led`.
+    of each actor ("" for actions without one); `lost`: see `Led`. `watching`: true for each robot of
+    which the person says that they watch it, with its hardware stop within reach.
     """
 
     version: str
@@ -79,15 +84,23 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     tree_digest: str | None = None
     robots: dict[str, str] = {}
     lost: Literal["stop", "wait"] = "stop"
+    watching: Watching = {}
 
 
 class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Lets a held run go on. `since`: the `since` of `held`, as the person saw it; a run that has gone
     on meanwhile has another one. `request_id`: names this press; if it has counted already, a repeat
-    changes nothing and is answered with the run as it is now."""
+    changes nothing and is answered with the run as it is now. `watching`: as in `StartRequest`."""
 
     since: datetime
     request_id: _PressId = ""
+    watching: Watching = {}
+
+
+class ResumeRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Lets a paused run go on. `watching`: as in `StartRequest`."""
+
+    watching: Watching = {}
 
 
 class WordRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -119,6 +132,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     tree_digest: str | None = None
     robots: dict[str, str] = {}
     lost: Literal["stop", "wait"] = "stop"
+    watching: Watching = {}
 
     def for_engine(self, engine: str) -> StartRequest:
         """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
@@ -136,6 +150,9 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             tree_digest=self.tree_digest,
             robots=self.robots if engine == CONDUCTED else {},
             lost=self.lost,
+            watching=self.watching
+            if engine == CONDUCTED
+            else {name: said for name, said in self.watching.items() if name == engine},
         )
 
 
@@ -175,6 +192,16 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     tree_digest: str
     is_led: bool = False
     handing: tuple[Obstacle, ...] = ()
+
+
+def watched_in(watching: Watching, robots: Collection[str]) -> tuple[str, ...]:
+    """Return the robots that a person watches, sorted. Raise BadInput for one that is not in
+    `robots`."""
+    for name in watching:
+        if name not in robots:
+            where: dict[str, object] = {"path": pointer("watching", name)}
+            raise BadInput(f"Nothing of this moves {name}.", where=where)
+    return tuple(sorted(name for name, is_watched in watching.items() if is_watched))
 
 
 def read_request(body: bytes) -> StartRequest:
@@ -333,6 +360,13 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     by_robot: dict[str, Prepared]
     problems: tuple[Problem, ...]
     remedies: dict[str, str] = {}
+
+
+def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
+    """Return what a start brings to the rules of robots. `ready`: None for a graph that is refused
+    anyway."""
+    watching = frozenset(name for name, is_watched in request.watching.items() if is_watched)
+    return Claim(digest="" if ready is None else ready.tree_digest, watching=watching)
 
 
 def prepared_pieces(

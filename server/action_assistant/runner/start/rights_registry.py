@@ -21,6 +21,7 @@ from action_assistant.runner.links.port import SIMULATOR, NotSent
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import (
     BatonPassed,
+    Claim,
     Holder,
     Lock,
     Refusal,
@@ -114,13 +115,14 @@ class RightsRegistry:
         self,
         robot: str,
         identity: Identity,
+        claim: Claim | None = None,
         *,
         is_asking: bool = True,
         is_decided: bool = False,
     ) -> tuple[Refusal, ...]:
-        """Return why an identity may not start on a robot now; empty if it may. `is_asking`: the
-        sentences are for this person, else about them; `is_decided`: a right that begins counts before
-        it is stored."""
+        """Return why an identity may not start on a robot now; empty if it may. `claim`: of the start,
+        None where no start is meant yet; `is_asking`: the sentences are for this person, else about
+        them; `is_decided`: a right that begins counts before it is stored."""
         record, now = self._record(robot), self._runtime.clock_us() / 1e6
         who = identity.person.name or "The starter"
         current = self.current(identity)
@@ -130,10 +132,10 @@ class RightsRegistry:
         if isinstance(denied, Denied):
             text = denied.reason if is_asking else f"{who} may not run graphs on robots any more."
             return (Refusal("right", text),)
-        found = tuple(record.decided.refusals(current, now, is_asking=is_asking))
+        found = tuple(record.decided.refusals(current, now, claim=claim, is_asking=is_asking))
         if found or is_decided or record.stored is record.decided:
             return found
-        pending = tuple(record.stored.refusals(current, now, is_asking=is_asking))
+        pending = tuple(record.stored.refusals(current, now, claim=claim, is_asking=is_asking))
         text = f"The rights of {robot} are just changing, and that is not stored yet. Try it again."
         return tuple(Refusal(each.code, text) for each in pending[:1])
 
@@ -145,10 +147,12 @@ class RightsRegistry:
                 return found
         return None
 
-    def require(self, robots: Iterable[str], identity: Identity) -> None:
+    def require(
+        self, robots: Iterable[str], identity: Identity, claim: Claim | None = None
+    ) -> None:
         """Raise Forbidden or Conflict, with the sentences of all robots, if an identity may not start
-        on one of them."""
-        found = {name: self.refusals(name, identity) for name in robots if name != SIMULATOR}
+        on one of them. `claim`: as for `refusals`."""
+        found = {name: self.refusals(name, identity, claim) for name in robots if name != SIMULATOR}
         reasons = {name: refused for name, refused in found.items() if refused}
         if not reasons:
             return
@@ -161,18 +165,20 @@ class RightsRegistry:
         refuse = Forbidden if any(each.code == "right" for each in every) else Conflict
         raise refuse(" ".join(each.text for each in every), where=where)
 
-    def require_still(self, robots: Iterable[str], identity: Identity) -> None:
+    def require_still(self, robots: Iterable[str], identity: Identity, claim: Claim) -> None:
         """Raise NotSent if an identity may not start on one of these robots any more: for the step in
         which a message leaves."""
         try:
-            self.require(robots, identity)
+            self.require(robots, identity, claim)
         except Refused as why:
             raise NotSent(why.detail) from why
 
-    def items(self, robot: str, identity: Identity, *, is_asking: bool = True) -> tuple[Item, ...]:
+    def items(
+        self, robot: str, identity: Identity, claim: Claim, *, is_asking: bool = True
+    ) -> tuple[Item, ...]:
         """Return the items of a pre-flight: none for a robot without rules on which everybody with
-        the role may start."""
-        refused = self.refusals(robot, identity, is_asking=is_asking)
+        the role may start. `claim`: of the start."""
+        refused = self.refusals(robot, identity, claim, is_asking=is_asking)
         found = [Item(code=each.code, verdict="blocked", text=each.text) for each in refused]
         rules, blocked = self.of(robot).rules, {each.code for each in refused}
         if rules.operators is not None and "right" not in blocked:
@@ -181,6 +187,10 @@ class RightsRegistry:
         if rules.baton and "baton" not in blocked and "right" not in blocked:
             who = "You hold" if is_asking else f"{identity.person.name or 'The starter'} holds"
             found.append(Item(code="baton", verdict="passed", text=f"{who} the baton of {robot}."))
+        if rules.watched and "watched" not in blocked:
+            who = "You watch" if is_asking else "Somebody watches"
+            text = f"{who} {robot}, with its hardware stop within reach."
+            found.append(Item(code="watched", verdict="passed", text=text))
         return tuple(found)
 
     def with_baton(self, robots: Iterable[str]) -> tuple[str, ...]:
