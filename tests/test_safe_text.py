@@ -167,7 +167,7 @@ def _try_secrets(product: Product) -> None:
     try:
         with product.editor() as editor, product.runner() as runner:
             name = f"patrol{EVIL}\nforged"
-            editor.post("/api/graphs", json={"name": name}).raise_for_status()
+            editor.post("/api/graphs", json={"graph_name": name, "actions": []}).raise_for_status()
             link = editor.post("/api/invitations", json={"role": "viewer", "label": "x"}).json()
             proof = link["path"].removeprefix("/#i=")
             for client in (editor, runner):

@@ -86,6 +86,13 @@ def is_name(text: str) -> bool:
     return seen and _STEERING.search(text) is None
 
 
+def steering_in(text: str) -> str | None:
+    """Return the first character of a text that controls how it is shown; None for a text without
+    any. Line breaks and tabs are none."""
+    found = _STEERING.search(text.replace("\r", ""))
+    return None if found is None else found[0]
+
+
 def hold_names(told: msgspec.Struct, *fields: str) -> None:
     """Replace the named text fields of a struct by their `sentence`. Structs that people read call
     this in `__post_init__`."""

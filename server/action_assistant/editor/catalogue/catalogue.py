@@ -23,6 +23,7 @@ from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Action, Graph, Key
 from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.http.plain_texts import require_plain
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 NAME_LIMIT: Final = 200  # characters
@@ -136,6 +137,7 @@ class Catalogue:
             wanted = msgspec.json.decode(body, type=NewGraph)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
             return await self.bring(body, author, folder=folder)
+        require_plain(body)
         name, description = fit(wanted.name, wanted.description)
         graph = Graph(name=name, description=description, direction="right")
         made = h.draft(h.CREATED, author, h.GraphCreated(name, description))

@@ -34,6 +34,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.action_updates import Renames
 from action_assistant.umrf.model import Action
+from action_assistant.web.http.plain_texts import require_plain
 from action_assistant.web.workers.lanes import HOPELESS, RunInWorker
 
 _AT_ONCE: Final = 4  # documents that are read
@@ -174,6 +175,8 @@ class LibraryEdits:
             wanted = msgspec.json.decode(body, type=NewAction)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
             return await self._bring(body, author)
+        if not wanted.from_graphs:  # else a file may have brought the name
+            require_plain(body)
         name, description = fit(wanted.name, wanted.description)
         action = Action(key=new_aid(), name=name, description=description)
         if wanted.from_graphs:

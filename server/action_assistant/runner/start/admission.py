@@ -42,6 +42,7 @@ from action_assistant.umrf.model import Action, Graph, Problem
 from action_assistant.umrf.pieces import Obstacle, handed_by, obstacles, piece_name
 from action_assistant.umrf.run_size import RunSize, excess
 from action_assistant.umrf.semantics import SCRIPT, Script, script_from
+from action_assistant.web.http.plain_texts import require_plain
 
 T = TypeVar("T")
 
@@ -220,6 +221,7 @@ def read_group(body: bytes) -> GroupRequest:
 
 def decoded(body: bytes, kind: type[T]) -> T:
     """Decode a JSON body as this type. Raises BadInput with the place."""
+    require_plain(body)
     try:
         return msgspec.json.decode(body, type=kind)
     except (msgspec.DecodeError, UnicodeDecodeError) as error:

@@ -46,6 +46,7 @@ from action_assistant.web.auth.revocations import (
 from action_assistant.web.auth.rights import Denied, Thing, may
 from action_assistant.web.auth.roles import OWNER, Permission
 from action_assistant.web.auth.standing import Standings
+from action_assistant.web.http.plain_texts import require_plain_address
 from action_assistant.web.http.problems import problem_of
 from action_assistant.web.network.addresses import Addresses
 
@@ -326,6 +327,8 @@ class Access:
         if method == "OPTIONS" and "access-control-request-method" in headers:
             return True
         self._identify(scope, headers, method=str(method), origin=origin)
+        if not _is_stop(str(method), scope["path"]):
+            require_plain_address(scope.get("raw_path", b""), scope["query_string"])
         return False
 
     def _identify(

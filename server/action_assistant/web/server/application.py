@@ -21,6 +21,7 @@ from action_assistant.web.auth.keys import METRICS, Keys, ScrapeToken, ServerPro
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Permission
 from action_assistant.web.auth.standing import Standings
+from action_assistant.web.http.plain_texts import PlainRequest
 from action_assistant.web.http.problems import problem_handlers
 from action_assistant.web.http.requests import RequestCounts, Requests
 from action_assistant.web.http.static_files import HelpSite, Page
@@ -144,6 +145,7 @@ def _routed(
     without authentication."""
     return Litestar(
         handlers,
+        request_class=PlainRequest,
         exception_handlers=problem_handlers(),
         lifespan=list(lifespan),
         openapi_config=openapi_config(title, openapi),
