@@ -14,7 +14,7 @@ from action_assistant.runner.runs.views import run_view, time
 from action_assistant.runner.start.admission import GoOnRequest, GroupRequest
 from action_assistant.web.auth.identity import Identity
 from runner.execution.test_conductor import Lab, led, shared
-from runner.harness import ended, sequence, until, virtual
+from runner.harness import clock_us, ended, sequence, until, virtual
 from runner.start.test_rights_registry import (
     ANN,
     BATON,
@@ -26,6 +26,7 @@ from runner.start.test_rights_registry import (
 )
 
 SLOW = {"*": [{"after_s": 5}]}
+ASKS = Rules(ask_again=10)
 
 
 async def batons(control: ExecutionService, *robots: str, by: Identity = ANN) -> None:
@@ -287,3 +288,52 @@ async def test_a_baton_that_goes_while_a_piece_is_stored_keeps_it_from_leaving()
         assert await ended(control, run) == "finished"
         assert sent(lab) == 4
         assert msgspec.json.encode(run_view(await control.find(run)))
+
+
+def confirmed(identity: Identity, age_s: float = 0.0) -> Identity:
+    """The same person, who asks now and was confirmed so long ago."""
+    now = clock_us() / 1e6
+    return msgspec.structs.replace(identity, confirmed_at=now - age_s, asked_at=now)
+
+
+@virtual
+async def test_a_led_run_needs_a_new_confirmation_when_it_starts_and_goes_on_not_for_each_piece() -> (
+    None
+):
+    lab = Lab({"*": [{"after_s": 400}]})
+    async with lab.runner() as control:
+        for robot in ("David", "Carol"):
+            await control.rights.set_rules(robot, ASKS, OLGA)
+        request = led(shared(sequence("task", 4), "Scout", "Carrier"))
+        with pytest.raises(Refused, match=r"David: .* confirm that it is you") as refused:
+            await control.start(request, author(ANN), confirmed(ANN, 601))
+        assert '"item":"confirm"' in msgspec.json.encode(refused.value.where).decode()
+        assert sent(lab) == 0
+        run = (await control.start(request, author(ANN), confirmed(ANN, 300))).run.id
+        await anyio.sleep(1_000)  # what was started goes on, however old the confirmation is
+        assert (sent(lab), held(control, run)) == (3, "")
+        await control.rights.set_rules("David", Rules(ask_again=1), OLGA)
+        assert "at most 1 min old: Ann has given none" in held(control, run)
+        with pytest.raises(Forbidden, match="confirm that it is you"):
+            await go_on(control, run, confirmed(ANN, 61))
+        assert sent(lab) == 3
+        await go_on(control, run, confirmed(ANN, 59))
+        await anyio.sleep(1_000)
+        assert (sent(lab), run in control.open) == (4, False)
+
+
+@virtual
+async def test_a_led_run_that_is_handed_to_an_unconfirmed_person_waits_for_them() -> None:
+    lab = Lab(SLOW)
+    async with lab.runner() as control:
+        await batons(control, "David", "Carol")
+        run = await begin(lab, control)
+        with control.rights.here(BEN):
+            await control.rights.set_rules("David", Rules(baton=True, ask_again=10), OLGA)
+            assert "Ann has given none" in held(control, run)
+            await go_on(control, run, confirmed(ANN))
+            assert held(control, run) == ""
+            await control.hand_over(run, "ben", author(ANN), ANN)
+            assert "Ben has given none" in held(control, run)
+        assert await control.stop(run, author(CARL)) == [run]
+        await ended(control, run)

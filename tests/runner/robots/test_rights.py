@@ -18,8 +18,8 @@ from action_assistant.runner.robots.rights import (
     Rules,
 )
 from action_assistant.runner.runs.events import Author
-from action_assistant.web.auth.identity import Identity
-from action_assistant.web.auth.keys import Person, PersonRef
+from action_assistant.web.auth.identity import Identity, Token
+from action_assistant.web.auth.keys import Person, PersonRef, Session
 from action_assistant.web.auth.roles import Role
 
 NOW_US = round(datetime(2026, 11, 28, 12, tzinfo=UTC).timestamp() * 1e6)
@@ -200,3 +200,36 @@ def test_whatever_people_do_at_most_the_holder_may_start(commands: list[Any]) ->
             assert [each.person.id for each in able] == holder
         else:
             assert len(able) == 4
+
+
+def confirmed(age_s: float | None, **fields: Any) -> Identity:
+    """A person in a browser whose last confirmation is so old; None: there was none."""
+    now = NOW_US / 1e6
+    session = Session("s1", ANN.person, now + 1e6)
+    at = None if age_s is None else now - age_s
+    return Identity(ANN.person, session=session, confirmed_at=at, **fields)
+
+
+def test_a_start_needs_a_confirmation_that_is_new_enough() -> None:
+    rights = RobotRights(name="David", rules=Rules(ask_again=10))
+    rule = "A start on David needs a confirmation that is at most 10 min old"
+    for age in (None, 601.0):
+        assert why(rights, confirmed(age)) == f"{rule}: confirm that it is you."
+    assert why(rights, confirmed(600.0)) is None
+    about = next(rights.refusals(confirmed(None), NOW_US / 1e6, is_asking=False))
+    assert about.text == f"{rule}: Ann has given none."
+    assert about.code == "confirm"
+
+
+def test_a_confirmation_has_to_be_new_when_the_request_is_made_not_when_it_is_carried_out() -> None:
+    rights = RobotRights(name="David", rules=Rules(ask_again=10))
+    asked = confirmed(600.0, asked_at=NOW_US / 1e6)
+    assert why(rights, asked, NOW_US + DAY_US) is None
+
+
+def test_no_program_and_no_server_token_can_confirm_anything() -> None:
+    rights = RobotRights(name="David", rules=Rules(ask_again=10))
+    token = Token("t1", "night", ANN.person, frozenset({"operate"}))
+    by_program = Identity(ANN.person, token=token, confirmed_at=NOW_US / 1e6)
+    assert "a program cannot give one: start on the page" in str(why(rights, by_program))
+    assert "the server's token cannot give one" in str(why(rights, ANN))

@@ -28,6 +28,7 @@ from action_assistant.web.auth.keys import Person, Session
 from runner.harness import (
     Harness,
     Robot,
+    clock_us,
     engine,
     order,
     run_in_virtual_time,
@@ -126,6 +127,53 @@ async def test_a_person_without_the_right_is_refused_in_every_way_that_starts() 
                 await command()
         assert await control.stop(run, author(BEN)) == [run]  # everybody may
         await until(lambda: run not in control.open)
+
+
+@virtual
+async def test_a_person_without_a_new_confirmation_is_refused_in_every_way_that_starts() -> None:
+    robot, harness = david(), Harness()
+    harness.links = {"David": robot}
+    now = clock_us() / 1e6
+    new = msgspec.structs.replace(ANN, confirmed_at=now, asked_at=now)
+    old = msgspec.structs.replace(ANN, confirmed_at=now - 601, asked_at=now)
+    async with lab(harness, Rules(ask_again=10)) as control:
+        items = await confirm_item(control, old)
+        assert (items.verdict, items.overridable) == ("blocked", False)
+        with pytest.raises(Forbidden, match="confirm that it is you") as refused:
+            await start(control, old)
+        assert (refused.value.where or {})["item"] == "confirm"
+        with pytest.raises(Refused, match="confirm that it is you"):
+            await control.start_group(group(sequence(), "David"), author(ANN), old)
+        assert robot.starts == []
+        assert (await confirm_item(control, new)).verdict == "passed"
+        run = await start(control, new)
+        await until(lambda: control.open[run].run.state == "running")
+        for command in (
+            lambda: control.modify(run, b"{}", author(ANN), old),
+            lambda: control.resume(run, author(ANN), old),
+        ):
+            with pytest.raises(Forbidden, match="confirm that it is you"):
+                await command()
+        assert await control.stop(run, author(ANN)) == [run]  # Stop asks nobody
+        await until(lambda: run not in control.open)
+
+
+async def confirm_item(control: ExecutionService, by: Identity) -> Item:
+    (found,) = await control.look(group(sequence(), "David"), by.person.id, by)
+    return next(item for item in found.items if item.code == "confirm")
+
+
+@virtual
+async def test_a_rule_that_begins_while_a_start_is_stored_keeps_the_start_from_leaving() -> None:
+    robot, harness = david(), Harness()
+    harness.links = {"David": robot}
+    async with lab(harness, Rules()) as control:
+        harness.journal.slow = 1.0
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(control.rights.set_rules, "David", Rules(ask_again=10), OLGA)
+            with pytest.raises(Refused, match="confirm that it is you"):
+                await start(control, ANN)
+        assert robot.starts == []
 
 
 @virtual

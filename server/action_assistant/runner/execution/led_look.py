@@ -32,7 +32,7 @@ _FRESH_S: Final = 3.0  # for which a look at a robot counts
 #: Why nothing begins for a run that nobody has let go on since the runner's restart.
 _NOBODY: Final = "nobody has let it go on since the runner was restarted"
 #: The codes of the items about the rights of a robot.
-_RIGHTS: Final = frozenset({"service", "right", "baton", "watched"})
+_RIGHTS: Final = frozenset({"service", "right", "baton", "watched", "confirm"})
 
 
 class NotAllowed(NoAnswer):

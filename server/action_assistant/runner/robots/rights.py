@@ -19,7 +19,7 @@ from action_assistant.web.auth.rights import Denied, may
 from action_assistant.web.auth.roles import Permission
 
 #: The codes of refusals, which are those of the items of a pre-flight.
-RightCode: TypeAlias = Literal["service", "right", "baton", "watched"]
+RightCode: TypeAlias = Literal["service", "right", "baton", "watched", "confirm"]
 #: How a baton came to another person, or to nobody.
 BatonChange: TypeAlias = Literal["taken", "handed", "forced", "dropped", "fell", "off"]
 _NAMED: Final = 4
@@ -37,11 +37,13 @@ class Operator(msgspec.Struct, frozen=True, omit_defaults=True):
 class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there; None: every operator.
     `baton`: only its holder may; `watched`: each start has the word of its person that they watch
-    the robot, with its hardware stop within reach."""
+    the robot, with its hardware stop within reach; `ask_again`: minutes after which a person has to
+    confirm again that it is they who start, 0 where nobody is asked."""
 
     operators: tuple[Operator, ...] | None = None
     baton: bool = False
     watched: bool = False
+    ask_again: int = 0
 
 
 class Claim(msgspec.Struct, frozen=True, kw_only=True):
@@ -169,6 +171,8 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
             yield Refusal("right", why)
         if why := self._no_baton(identity, who):
             yield Refusal("baton", why)
+        if why := self._unconfirmed(identity, now, is_asking=is_asking):
+            yield Refusal("confirm", why)
         if claim is not None and self.rules.watched and self.name not in claim.watching:
             yield Refusal("watched", self._unwatched(is_asking))
 
@@ -214,6 +218,23 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
             f"{who} may not start on {self.name}: {name} has its baton. Ask {name} to hand it over, or "
             "take it over with a reason."
         )
+
+    def _unconfirmed(self, identity: Identity, now: float, *, is_asking: bool) -> str:
+        """Return why the last confirmation of an identity does not count for a start here; "" if it
+        does, or none is needed."""
+        minutes = self.rules.ask_again
+        if not minutes:
+            return ""
+        rule = f"A start on {self.name} needs a confirmation that is at most {minutes} min old"
+        if identity.session is None:
+            by = "the server's token" if identity.token is None else "a program"
+            return f"{rule}, and {by} cannot give one: start on the page, in a browser."
+        at = now if identity.asked_at is None else identity.asked_at
+        if identity.confirmed_at is not None and identity.confirmed_at >= at - minutes * 60:
+            return ""
+        if is_asking:
+            return f"{rule}: confirm that it is you."
+        return f"{rule}: {identity.person.name or 'the starter'} has given none."
 
     # --- changes ------------------------------------------------------------------------------
 

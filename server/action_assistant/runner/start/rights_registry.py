@@ -14,6 +14,7 @@ from typing import Any, Final
 
 import anyio
 import msgspec
+from msgspec.structs import replace
 from sqlalchemy import Row
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, Refused, Unavailable
@@ -144,7 +145,7 @@ class RightsRegistry:
         session was ended; None if the person was ended."""
         for each in (identity, *self._live.get(identity.person.id, ())):
             if (found := self._now(each)) is not None:
-                return found
+                return replace(found, asked_at=identity.asked_at)
         return None
 
     def require(
@@ -162,7 +163,8 @@ class RightsRegistry:
             "item": every[0].code,
             "robots": {name: refused[0].text for name, refused in reasons.items()},
         }
-        refuse = Forbidden if any(each.code == "right" for each in every) else Conflict
+        is_forbidden = any(each.code in {"right", "confirm"} for each in every)
+        refuse = Forbidden if is_forbidden else Conflict
         raise refuse(" ".join(each.text for each in every), where=where)
 
     def require_still(self, robots: Iterable[str], identity: Identity, claim: Claim) -> None:
@@ -187,6 +189,9 @@ class RightsRegistry:
         if rules.baton and "baton" not in blocked and "right" not in blocked:
             who = "You hold" if is_asking else f"{identity.person.name or 'The starter'} holds"
             found.append(Item(code="baton", verdict="passed", text=f"{who} the baton of {robot}."))
+        if rules.ask_again and not blocked & {"confirm", "right"}:
+            text = f"Confirmed. {robot} asks again after {rules.ask_again} min."
+            found.append(Item(code="confirm", verdict="passed", text=text))
         if rules.watched and "watched" not in blocked:
             who = "You watch" if is_asking else "Somebody watches"
             text = f"{who} {robot}, with its hardware stop within reach."
@@ -237,9 +242,13 @@ class RightsRegistry:
         return sorted(able, key=lambda each: (each.person.name.casefold(), each.person.id))
 
     def present(self, person: str) -> Identity | None:
-        """Return a person who has a page open, as they are now; None for anybody else."""
-        found = map(self._now, self._live.get(person, ()))
-        return next((each for each in found if each is not None), None)
+        """Return a person who has a page open, as they are now; None for anybody else. Of several
+        pages the one that was confirmed last counts."""
+        pages = map(self._now, self._live.get(person, ()))
+        found = max(filter(None, pages), key=lambda each: each.confirmed_at or 0.0, default=None)
+        if found is None:
+            return None
+        return replace(found, asked_at=self._runtime.clock_us() / 1e6)
 
     def falls_at(self, person: str) -> float | None:
         """Return when a baton falls whose holder has no page open, in seconds of the event loop; None

@@ -374,6 +374,7 @@ class Access:
                 device=device,
                 address=address,
                 confirmed_at=standing.confirmed_at,
+                asked_at=time.time(),
             )
             state["is_expired"] = lambda: self._standing(session).expired
             return

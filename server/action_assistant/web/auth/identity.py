@@ -56,7 +56,8 @@ class Identity(msgspec.Struct, frozen=True):
     both None for the owner's token. `device`: the id of the browser; "" if unknown. `address`: the
     address of the client on the network; "" for this computer itself. `confirmed_at`: when the person
     last proved, in this session, that it is they, in seconds since 1970; None if never, and always
-    for programs.
+    for programs. `asked_at`: when the request was made, the moment at which a confirmation must not
+    be too old, in seconds since 1970; None for now.
     """
 
     person: Person
@@ -66,6 +67,7 @@ class Identity(msgspec.Struct, frozen=True):
     device: str = ""
     address: str = ""
     confirmed_at: float | None = None
+    asked_at: float | None = None
 
     @property
     def scopes(self) -> frozenset[Scope] | None:
