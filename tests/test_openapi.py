@@ -23,6 +23,7 @@ WITHOUT_BODY = frozenset(
         "/api/devices/codes",
         "/api/devices/{session}/end",
         "/api/tokens/{token}/revoke",
+        "/api/view-links/{link}/revoke",
         "/api/runs/{run}/pause",
         "/api/runs/{run}/resume",
         "/api/robots/{name}/stop",

@@ -1,6 +1,7 @@
 """What a process is told when it starts: command line first, then the environment."""
 
 import os
+import re
 import sys
 from collections.abc import Mapping, MutableMapping, Sequence
 from pathlib import Path
@@ -48,6 +49,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_BACKUP_AFTER": "the command that takes a finished one elsewhere, as --backup-after",
     "ACTION_ASSISTANT_SESSIONS": "when sessions expire, unused and in any case, by role, such as "
     "`owner=12h/7d,operator=3d/30d` (owner=7d/30d, operator=14d/30d, others 30d/30d)",
+    "ACTION_ASSISTANT_FRAME_ORIGINS": "sites that may show links to one graph or run in a frame, such as "
+    "`https://wiki.lab.example`, comma separated (none)",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
     "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
     "direct one fail",
@@ -60,6 +63,8 @@ _FILES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "ACTION_ASSISTANT_METRICS_TOKEN",
     "ACTION_ASSISTANT_DATABASE_PASSWORD_FILE": "PGPASSWORD",
 }
+#: An origin as `frame-ancestors` takes it; the first part of its host may be an asterisk.
+_ORIGIN: Final = re.compile(r"https?://((\*\.)?[A-Za-z0-9.-]+|\[[0-9a-fA-F:]+\])(:\d{1,5})?")
 _SECRET: Final = 65_536  # characters of such a file
 #: The folder of archives, inside the data folder.
 ARCHIVE: Final = "archive"
@@ -86,7 +91,8 @@ class Reachability(msgspec.Struct, frozen=True):
 
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`.
-    `sessions`: when sessions expire, as in ACTION_ASSISTANT_SESSIONS."""
+    `sessions`: when sessions expire, as in ACTION_ASSISTANT_SESSIONS; `frames`: the origins of sites
+    that may show links to one thing in a frame."""
 
     data: Path
     database: str
@@ -102,6 +108,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     metrics_token: str | None = None
     sessions: str = ""
     token_days: float = TOKEN_DAYS
+    frames: tuple[str, ...] = ()
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -265,6 +272,19 @@ def backup_rule(name: str, environ: Mapping[str, str] = os.environ) -> str | Non
 def sessions(environ: Mapping[str, str] = os.environ) -> str:
     """Return when sessions expire, by role, as the environment says it; "" for the defaults."""
     return environ.get("ACTION_ASSISTANT_SESSIONS", "").strip()
+
+
+def frame_origins(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
+    """Return the origins of sites that may show links to one thing in a frame, as the environment
+    says them. Raise CannotStart if one is no origin, such as one with a path or for every site."""
+    written = environ.get("ACTION_ASSISTANT_FRAME_ORIGINS", "").replace(",", " ").split()
+    for each in written:
+        if _ORIGIN.fullmatch(each) is None:
+            raise CannotStart(
+                "ACTION_ASSISTANT_FRAME_ORIGINS is a list of origins, such as "
+                f"`https://wiki.lab.example`, not {each!r}."
+            )
+    return tuple(written)
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:

@@ -239,6 +239,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         metrics_token=settings.metrics_token(),
         sessions=settings.sessions(),
         token_days=settings.token_days(),
+        frames=settings.frame_origins(),
     )
 
 

@@ -29,6 +29,7 @@ from action_assistant.editor.api import (
     subgraphs,
     tokens,
     versions,
+    view,
 )
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
@@ -53,6 +54,7 @@ from action_assistant.web.auth.session_limits import limits_of
 from action_assistant.web.auth.sessions import session_routes
 from action_assistant.web.auth.standing import Standings
 from action_assistant.web.auth.tokens import TokenFiles
+from action_assistant.web.auth.view_links import ViewLinks
 from action_assistant.web.monitoring.gauges import Family
 from action_assistant.web.monitoring.monitoring import Monitoring, Watched
 from action_assistant.web.monitoring.status import Activity
@@ -131,6 +133,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     standings = Standings(people_files, browsers, session_limits, confirmations=confirmations)
     browsers.every()  # forgets those that are over
     token_files = TokenFiles(settings.data, keys, revoked, most_days=settings.token_days)
+    view_links = ViewLinks(settings.data, keys, revoked, "graph")
     codes = DeviceCodes(limits=settings.limits)
     addresses = _addresses(settings)
     monitoring = Monitoring("editor", settings.data)
@@ -166,6 +169,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
             *_routes(app_state, addresses, browsers),
             *devices.routes(codes, browsers, addresses, audit),
             *tokens.routes(app_state, token_files, limits=settings.limits),
+            *view.routes(app_state, view_links, addresses, audit, settings.frames),
             *doctor.routes(settings),
         ],
         title="TeMoto Action Assistant: editor",
@@ -178,6 +182,8 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         scraped=ScrapeToken(settings.metrics_token),
         standings=standings,
         tokens=token_files,
+        views=view_links,
+        frames=settings.frames,
         page=paths.page(),
         help_site=paths.help_site(),
         runner_port=settings.runner_port,

@@ -22,6 +22,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.kit.clock import utc_us
 from action_assistant.public_url import RUNNER
 from action_assistant.runner import projection
+from action_assistant.runner.api import view
 from action_assistant.runner.api.caller import SMALL
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.api.monitoring import WatchedRunner
@@ -60,6 +61,7 @@ from action_assistant.web.auth.sessions import revocation
 from action_assistant.web.auth.standing import Standings
 from action_assistant.web.auth.token_routes import adoption, shared_token_routes
 from action_assistant.web.auth.tokens import TokenFiles
+from action_assistant.web.auth.view_links import ViewLinks
 from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.connection_limits import ConnectionLimits
@@ -262,6 +264,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
 
     keys = Keys.of(settings.data)
     tokens = TokenFiles(settings.data, keys, revoked)
+    view_links = ViewLinks(settings.data, keys, revoked, "run")
     people_files = PeopleFiles(settings.data)
     browsers = SessionFiles(settings.data, revoked)
     confirmations = Confirmations(settings.data, keys)
@@ -272,6 +275,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     return application(
         [
             *routes(services),
+            *view.routes(services, view_links),
             *revocation(revoked, people_files, services.audit),
             *shared_token_routes(tokens),
             *adoption(tokens, limits=settings.limits),
@@ -293,6 +297,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         scraped=ScrapeToken(settings.metrics_token),
         standings=standings,
         tokens=tokens,
+        views=view_links,
         mount=public.path + RUNNER if public is not None else "",
         body_limit=SMALL,
     )

@@ -103,7 +103,8 @@ def test_every_route_says_who_may_call_it_and_means_it(product: Product, process
                 open_to_strangers = "/healthz|/readyz|/api/server|/api/session"
                 by_programs = "/api/logins(/claim|/cancel)?$|/api/tokens/records$"
                 of_all_signed_in = "/api/tokens/{token}/revoke$"
-                known = f"{open_to_strangers}|{by_programs}|{of_all_signed_in}"
+                of_links = "/api/view$|/api/view/(graph|run)(/events)?$"
+                known = f"{open_to_strangers}|{by_programs}|{of_all_signed_in}|{of_links}"
                 assert re.match(known, path), f"who may {method} {path}?"
                 continue
             for role in ROLES:

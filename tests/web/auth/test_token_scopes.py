@@ -92,7 +92,7 @@ def expected(
     """The refusal that a cell of the matrix has to have; None where it must be none."""
     if end in {"revoked", "person", "link"} or (end == "expired" and needed != "stop"):
         return 401
-    if (method, path) in FOR_PEOPLE or path.startswith("/api/devices"):
+    if (method, path) in FOR_PEOPLE or path.startswith(("/api/devices", "/api/view/")):
         return 403
     if needed is None:
         return None

@@ -1397,6 +1397,17 @@ export interface EditorApi {
         hours?: number;
     };
     /**
+     * NewViewLink
+     * @description The graph or run that a new link shows, by its id, and for how many days.
+     */
+    NewViewLink: {
+        thing: string;
+        /** @default  */
+        label?: string;
+        /** @default 7 */
+        days?: number;
+    };
+    /**
      * NodeResultEvent
      * @description A visit of an action ended with this result; the real engine reports it to no client.
      */
@@ -1912,6 +1923,23 @@ export interface EditorApi {
         token_proof: string;
     };
     /**
+     * SharedGraph
+     * @description A graph as a link shows it, as it is now. `problems`: of the graph alone, without those of the
+     *     graphs that its actions stand for.
+     */
+    SharedGraph: {
+        /** @description A UMRF graph. */
+        umrf: {
+            [key: string]: unknown;
+        };
+        problems: EditorApi["Problem"][];
+    };
+    /**
+     * SharedGraphChanged
+     * @description The graph of a link may have changed; sent once for many changes.
+     */
+    SharedGraphChanged: Record<string, unknown>;
+    /**
      * Sharing
      * @description The addresses of this server for other people, and the invitation links.
      *
@@ -2148,6 +2176,35 @@ export interface EditorApi {
         /** @default  */
         note?: string;
         subgraphs?: EditorApi["PinnedGraph"][];
+    };
+    /**
+     * ViewLink
+     * @description A link as owners see it. `path` follows the address of the page, and holds the secret.
+     *     `opened`: how often somebody opened it, `opened_at` the last time.
+     */
+    ViewLink: {
+        id: string;
+        /** @enum {string} */
+        kind: "graph" | "run";
+        thing: string;
+        label: string;
+        made_by: EditorApi["PersonRef"];
+        /** Format: date-time */
+        made_at: string;
+        /** Format: date-time */
+        expires: string;
+        path: string;
+        opened: number;
+        opened_at: string | null;
+    };
+    /**
+     * ViewPlaces
+     * @description The address of the runner, without a slash at its end, and the origins of sites that may show
+     *     links in a frame.
+     */
+    ViewPlaces: {
+        runner_url: string;
+        frame_origins: string[];
     };
     /**
      * WaitingDevice
@@ -2467,6 +2524,22 @@ export interface EditorPaths {
     };
     "/api/logins/refuse": {
         post: EditorOperations["refuseLogin"];
+    };
+    "/api/view": {
+        get: EditorOperations["getViewPlaces"];
+    };
+    "/api/view/graph": {
+        get: EditorOperations["viewGraph"];
+    };
+    "/api/view/graph/events": {
+        get: EditorOperations["followViewedGraph"];
+    };
+    "/api/view-links": {
+        get: EditorOperations["listViewLinks"];
+        post: EditorOperations["makeViewLink"];
+    };
+    "/api/view-links/{link}/revoke": {
+        post: EditorOperations["revokeViewLink"];
     };
     "/api/doctor": {
         get: EditorOperations["examine"];
@@ -4124,6 +4197,77 @@ interface EditorOperations {
         requestBody: {
             content: {
                 "application/json": EditorApi["LoginCode"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    getViewPlaces: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ViewPlaces"];
+                };
+            };
+        };
+    };
+    viewGraph: {
+        parameters: {
+            query?: {
+                again?: boolean;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["SharedGraph"];
+                };
+            };
+        };
+    };
+    followViewedGraph: {
+        responses: {
+            200: {
+                content: {
+                    "text/event-stream": EditorApi["SharedGraphChanged"];
+                };
+            };
+        };
+    };
+    listViewLinks: {
+        parameters: {
+            query?: {
+                thing?: string | null;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ViewLink"][];
+                };
+            };
+        };
+    };
+    makeViewLink: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["NewViewLink"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["ViewLink"];
+                };
+            };
+        };
+    };
+    revokeViewLink: {
+        parameters: {
+            path: {
+                link: string;
             };
         };
         responses: {

@@ -944,6 +944,17 @@ export interface RunnerApi {
         outcomes: string[];
     };
     /**
+     * NewViewLink
+     * @description The graph or run that a new link shows, by its id, and for how many days.
+     */
+    NewViewLink: {
+        thing: string;
+        /** @default  */
+        label?: string;
+        /** @default 7 */
+        days?: number;
+    };
+    /**
      * NoteChange
      * @description A note or frame that was added, removed or changed. `text`: its text after the change, or
      *     before it if the note was removed.
@@ -1852,6 +1863,74 @@ export interface RunnerApi {
         token_proof: string;
     };
     /**
+     * SharedBeat
+     * @description Sent once a second while the run goes on. `seen`: when its engine showed it last; null if it
+     *     never did.
+     */
+    SharedBeat: {
+        /** @enum {string} */
+        type: "beat";
+        /** Format: date-time */
+        at: string;
+        seen: string | null;
+    };
+    /**
+     * SharedRun
+     * @description A run with the graph that was sent, as a link shows it.
+     */
+    SharedRun: {
+        run: RunnerApi["SharedState"];
+        /** @description A UMRF graph. */
+        umrf: {
+            [key: string]: unknown;
+        };
+    };
+    /**
+     * SharedState
+     * @description The state of a run, as a link shows it. `unconfirmed`: a Stop of it is not proven.
+     *     `seen_to_rest`: a person or the runner saw that it is at rest, since no answer could prove it.
+     *     `held_since`: since when a led run begins nothing further. `robots`: of a led run, the engine of
+     *     each actor.
+     */
+    SharedState: {
+        graph_name: string;
+        engine: string;
+        simulated: boolean;
+        /** @enum {string} */
+        state: "error" | "finished" | "halted" | "lost" | "paused" | "published" | "refused" | "requested" | "running" | "stopped" | "stopping" | "unknown";
+        /** @enum {string} */
+        desired: "paused" | "running" | "stopped";
+        result: ("on_error" | "on_false" | "on_halted" | "on_stopped" | "on_true") | null;
+        /** Format: date-time */
+        requested_at: string;
+        started_at: string | null;
+        ended_at: string | null;
+        proof_at: string | null;
+        unknown_since: string | null;
+        moves_again_at: string | null;
+        held_since: string | null;
+        unconfirmed: boolean;
+        seen_to_rest: boolean;
+        took: RunnerApi["DurationBounds"] | null;
+        recorded: boolean;
+        robots: {
+            [key: string]: string;
+        } | null;
+        rests: RunnerApi["RobotRestShown"][];
+        actions: {
+            [key: string]: RunnerApi["ActionShown"];
+        };
+    };
+    /**
+     * SharedStateMessage
+     * @description The present state of the run of a link.
+     */
+    SharedStateMessage: {
+        /** @enum {string} */
+        type: "run";
+        run: RunnerApi["SharedState"];
+    };
+    /**
      * Sighting
      * @description The engines that are seen now. `left_s`: seconds during which discovery may still find
      *     others; 0 when it is complete.
@@ -2077,6 +2156,26 @@ export interface RunnerApi {
     UnlockWanted: {
         /** @default  */
         of?: string;
+    };
+    /**
+     * ViewLink
+     * @description A link as owners see it. `path` follows the address of the page, and holds the secret.
+     *     `opened`: how often somebody opened it, `opened_at` the last time.
+     */
+    ViewLink: {
+        id: string;
+        /** @enum {string} */
+        kind: "graph" | "run";
+        thing: string;
+        label: string;
+        made_by: RunnerApi["PersonRef"];
+        /** Format: date-time */
+        made_at: string;
+        /** Format: date-time */
+        expires: string;
+        path: string;
+        opened: number;
+        opened_at: string | null;
     };
     /**
      * VisitShown
@@ -2334,6 +2433,19 @@ export interface RunnerPaths {
     };
     "/api/audit": {
         get: RunnerOperations["listAudit"];
+    };
+    "/api/view/run": {
+        get: RunnerOperations["viewRun"];
+    };
+    "/api/view/run/events": {
+        get: RunnerOperations["followViewedRun"];
+    };
+    "/api/view-links": {
+        get: RunnerOperations["listViewLinks"];
+        post: RunnerOperations["makeViewLink"];
+    };
+    "/api/view-links/{link}/revoke": {
+        post: RunnerOperations["revokeViewLink"];
     };
     "/api/members/{person}": {
         put: RunnerOperations["storeMember"];
@@ -3348,6 +3460,68 @@ interface RunnerOperations {
                 content: {
                     "application/json": RunnerApi["AuditPage"];
                 };
+            };
+        };
+    };
+    viewRun: {
+        parameters: {
+            query?: {
+                again?: boolean;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["SharedRun"];
+                };
+            };
+        };
+    };
+    followViewedRun: {
+        responses: {
+            200: {
+                content: {
+                    "text/event-stream": RunnerApi["SharedStateMessage"] | RunnerApi["SharedBeat"];
+                };
+            };
+        };
+    };
+    listViewLinks: {
+        parameters: {
+            query?: {
+                thing?: string | null;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ViewLink"][];
+                };
+            };
+        };
+    };
+    makeViewLink: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["NewViewLink"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["ViewLink"];
+                };
+            };
+        };
+    };
+    revokeViewLink: {
+        parameters: {
+            path: {
+                link: string;
+            };
+        };
+        responses: {
+            204: {
             };
         };
     };

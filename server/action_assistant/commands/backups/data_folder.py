@@ -41,7 +41,7 @@ MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
 WHOLE: Final = frozenset(
     {
         *(keys.TOKEN_FILE, certificate.FOLDER, graph_seals.FILE),
-        *("people", "sessions", "sessions.db", "tokens"),
+        *("people", "sessions", "sessions.db", "tokens", "views"),
     }
 )
 #: Files that are created again, or that belong to this data folder only.

@@ -136,6 +136,9 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     "ACTION_ASSISTANT_TOKEN_DAYS": lambda value: settings.token_days(
         {"ACTION_ASSISTANT_TOKEN_DAYS": value}
     ),
+    "ACTION_ASSISTANT_FRAME_ORIGINS": lambda value: settings.frame_origins(
+        {"ACTION_ASSISTANT_FRAME_ORIGINS": value}
+    ),
     "ACTION_ASSISTANT_LIMITS": _limits,
     **{name: _log(name) for name in ("ACTION_ASSISTANT_LOG_FORMAT", "ACTION_ASSISTANT_LOG_LEVEL")},
     **{

@@ -34,6 +34,7 @@ from action_assistant.runner.runs.history import RunHistory
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import Sent, SentSubgraph, read_sent, sent_of
+from action_assistant.runner.runs.shared_view import SharedRun, shared_run
 from action_assistant.schema.runner_tables import (
     expectation,
     robot,
@@ -145,6 +146,10 @@ class StoredRuns:
         sent = await self.sent(run_id)
         found, place = await self.known(run_id), await self.place(run_id)
         return views.whole_view(found, sent, place=place)
+
+    async def shared(self, run_id: str) -> SharedRun:
+        """Return a run that is over as a link shows it. Raise NotFound if there is no such run."""
+        return shared_run(await self.whole(run_id))
 
     async def followed(self, run_id: str, robots_too: bool) -> tuple[Run, int]:
         """Return a run and the seq of its last event. `robots_too`: with all of its visits, so that

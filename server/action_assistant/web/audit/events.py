@@ -48,6 +48,29 @@ class SessionEnded(msgspec.Struct, frozen=True, omit_defaults=True):
     own: bool = False
 
 
+class ViewLinkMade(msgspec.Struct, frozen=True):
+    """The author made a link that shows one thing. `what`: graph or run; `thing`: its id; `expires`:
+    microseconds UTC."""
+
+    kind: ClassVar[str] = "audit.view_link_made.v1"
+
+    link: str
+    what: Literal["graph", "run"]
+    thing: str
+    label: str
+    expires: int
+
+
+class ViewLinkRevoked(msgspec.Struct, frozen=True):
+    """The author revoked a link that showed one thing."""
+
+    kind: ClassVar[str] = "audit.view_link_revoked.v1"
+
+    link: str
+    what: Literal["graph", "run"]
+    thing: str
+
+
 class StartRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The author asked for a start, a change or a go-on that was refused, with the reason `why`.
     `engines`: the robots, or the simulator; `times`: how often within a minute."""

@@ -32,6 +32,8 @@ _EVENTS: Final = {
         events.EditingBegan,
         events.SignedIn,
         events.SessionEnded,
+        events.ViewLinkMade,
+        events.ViewLinkRevoked,
         events.StartRefused,
         events.StopPressed,
         events.StrangersRefused,
@@ -57,6 +59,18 @@ def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | No
         case events.SessionEnded(session=session, own=own):
             text = "signed out" if own else f"ended the session {session}"
             return Fact(kind="sessions", text=text)
+        case events.ViewLinkMade() | events.ViewLinkRevoked() as link:
+            is_made = isinstance(link, events.ViewLinkMade)
+            verb = (
+                f"made the link {link.link} to look at"
+                if is_made
+                else f"revoked the link {link.link} to"
+            )
+            if link.what == "run":
+                return Fact(kind="people", text=f"{verb} a run", run=link.thing)
+            name = graph_name(link.thing)
+            text = f"{verb} the graph {name}"
+            return Fact(kind="people", text=text, graph=link.thing, graph_name=name)
         case events.StartRefused() as refused:
             return _refused(refused)
         case events.StopPressed(robot=robot, run=run, times=times):

@@ -29,11 +29,14 @@ from action_assistant.web.audit.events import (
     StopPressed,
     StrangersRefused,
     Unlisted,
+    ViewLinkMade,
+    ViewLinkRevoked,
     draft_of,
 )
 from action_assistant.web.auth.caller import Origin, acting_for, network_address, origin_of
 from action_assistant.web.auth.keys import Session
 from action_assistant.web.auth.sessions import SignInMeans
+from action_assistant.web.auth.view_links import ViewRecord
 
 log: Final = logging.getLogger(__name__)
 
@@ -199,6 +202,15 @@ class AuditLog:
     def signed_out(self, session: Session) -> None:
         """Queue that the person of a session has ended it."""
         self.note(SessionEnded(session.id, own=True), session.person.id)
+
+    def view_link_made(self, link: ViewRecord, author: str) -> None:
+        """Queue that a person made a link that shows one thing."""
+        expires = int(link.expires.timestamp() * 1_000_000)
+        self.note(ViewLinkMade(link.id, link.kind, link.thing, link.label, expires), author)
+
+    def view_link_revoked(self, link: ViewRecord, author: str) -> None:
+        """Queue that a person revoked such a link."""
+        self.note(ViewLinkRevoked(link.id, link.kind, link.thing), author)
 
     def refused_stranger(self, address: str, what: str) -> None:
         """Count a refused request without valid credentials. `what`: its method and path."""

@@ -32,9 +32,12 @@ from action_assistant.web.auth.identity import (
     Credential,
     Identity,
     NoTokens,
+    NoViews,
     Standing,
     Token,
     Tokens,
+    View,
+    Views,
 )
 from action_assistant.web.auth.keys import Keys, Person, ScrapeToken, Session
 from action_assistant.web.auth.revocations import (
@@ -69,8 +72,8 @@ _HEADERS: Final = (
     (b"x-content-type-options", b"nosniff"),
     (b"referrer-policy", b"no-referrer"),
     (b"cross-origin-opener-policy", b"same-origin"),
-    (b"x-frame-options", b"DENY"),
 )
+_UNFRAMED: Final = (b"x-frame-options", b"DENY")
 #: Of a refused upgrade: who gets the same refusal without it is behind a proxy that passes none on.
 REFUSED_SOCKET: Final = (b"x-refused", b"websocket")
 
@@ -151,6 +154,18 @@ class PersonOnly(DeclaredRight):
             raise Forbidden("A program's token may not do this: it takes a person.")
 
 
+class OfLink(DeclaredRight):
+    """Declares a route for links that show one thing, and for nobody else. The thing is in the key
+    of the link, never in the path. Links reach no route that does not declare this."""
+
+    async def __call__(
+        self, connection: ASGIConnection[Any, Any, Any, Any], _: BaseRouteHandler
+    ) -> None:
+        """Raise Forbidden if a person or a program asks."""
+        if "view" not in connection.scope["state"]:
+            raise Forbidden("Only a link for looking at one thing opens this.")
+
+
 class Needs(DeclaredRight):
     """Declares a route for those who have a permission. Others are refused before their request
     is read."""
@@ -163,6 +178,12 @@ class Needs(DeclaredRight):
     ) -> None:
         """Raise Forbidden if the identity lacks the permission."""
         require(connection, self.permission)
+
+
+def view_of(connection: ASGIConnection[Any, Any, Any, Any]) -> View:
+    """Return the link by which somebody looks. Only routes that are `OfLink` may call this."""
+    view: View = connection.scope["state"]["view"]
+    return view
 
 
 def expired_session(connection: ASGIConnection[Any, Any, Any, Any]) -> Session | None:
@@ -207,9 +228,11 @@ def plain(connection: ASGIConnection[Any, Any, Any, Any]) -> Plain:
 class Access:
     """An ASGI middleware that authenticates each request and refuses strangers.
 
-    `is_open(path, accepts_html)` says which paths need no credentials; `policy(host)` returns the
-    Content-Security-Policy for a page asked for under that Host header. `tokens` knows the tokens
-    of programs. `standings`: knows what sessions and tokens are worth now; without it they are
+    `is_open(path, accepts_html)` says which paths need no credentials; `policy(host, path)` returns
+    the Content-Security-Policy for a page at this path under that Host header, and `is_framed(path)`
+    whether other sites may show it in a frame. `tokens` knows the tokens of programs, `views` the
+    links that show one thing; `is_of_link(path)` says which paths such a link may ask for: every
+    other one is refused. `standings`: knows what sessions and tokens are worth now; without it they are
     worth what they say themselves.
     """
 
@@ -221,16 +244,22 @@ class Access:
         addresses: Addresses,
         page_port: int,
         is_open: Callable[[str, bool], bool],
-        policy: Callable[[str], str],
+        policy: Callable[[str, str], str],
         revoked: Revocations,
+        is_of_link: Callable[[str], bool] = lambda _: False,
+        is_framed: Callable[[str], bool] = lambda _: False,
         scraped: ScrapeToken | None = None,
         tokens: Tokens | None = None,
+        views: Views | None = None,
         standings: Standings | None = None,
     ) -> None:
         self._app = app
         self._standings = standings
         self._scraped = scraped or ScrapeToken()
         self._tokens = tokens or NoTokens()
+        self._views = views or NoViews()
+        self._is_of_link = is_of_link
+        self._is_framed = is_framed
         self._keys = keys
         self._addresses = addresses
         self._cookie = cookie_name(page_port)
@@ -248,7 +277,7 @@ class Access:
             return
         headers = _headers(scope)
         scope.setdefault("state", {})["plain"] = Plain(receive, send)
-        send = self._dressed(headers, send)
+        send = self._dressed(headers, scope["path"], send)
         try:
             preflight = self._admit(scope, headers)
         except Refused as refused:
@@ -258,13 +287,16 @@ class Access:
         if identity is not None and identity.person is _SCRAPER:
             identity = None  # as nobody: there is nothing else to be found out
         asked = receive if scope["type"] == ScopeType.HTTP else None
+        view: View | None = scope["state"].get("view")
         if identity is not None:
             scope["state"].get(KNOWN, _nobody)(identity.person.id)
-        set_caller(None if identity is None else _caller(identity, asked))
+            set_caller(_caller(identity, asked))
+        else:  # who looks by a link waits for nobody but others with this link
+            set_caller(None if view is None else Caller(f"view-{view.id}", asked))
         if preflight:
             await _answer(send, 204, [(b"cache-control", b"no-store")], b"")
             return
-        credential = None if identity is None else identity.session or identity.token
+        credential = view if identity is None else identity.session or identity.token
         lasts = _lasts(scope, headers)
         del headers  # of a socket they would be kept for as long as it is open
         if credential is None or not lasts:
@@ -345,6 +377,12 @@ class Access:
         address = client_address(scope)
         scheme, _, text = headers.get("authorization", "").partition(" ")
         if scheme.lower() == "bearer":
+            view = self._views.opens(text.strip())
+            if view is not None:
+                if method != "GET" or not self._is_of_link(path):
+                    raise Forbidden("This link shows one thing, and opens nothing else.")
+                state["view"] = view
+                return
             found = self._program(text.strip(), method, path)
             if found is not None:
                 state["identity"] = replace(found, device=device, address=address)
@@ -413,7 +451,9 @@ class Access:
         return sealed_standing(credential)
 
     def _over(self, credential: Credential) -> Refused:
-        """Return the refusal for a session or token that has expired or was ended."""
+        """Return the refusal for a session, token or link that has expired or was ended."""
+        if isinstance(credential, View):
+            return over_view(is_revoked=self._revoked.view_ended(credential.id))
         if self._revoked.person_ended(credential.person.id):
             return Withdrawn("Your access was ended by an owner. Ask for a new link.")
         if isinstance(credential, Token):
@@ -445,16 +485,16 @@ class Access:
         )
         return next(lasting, genuine[0] if genuine else None)
 
-    def _dressed(self, headers: dict[str, str], send: Send) -> Send:
+    def _dressed(self, headers: dict[str, str], path: str, send: Send) -> Send:
         """Add the headers that every answer carries, also refusals."""
-        extra = list(_HEADERS)
+        extra = list(_HEADERS) if self._is_framed(path) else [*_HEADERS, _UNFRAMED]
         origin = headers.get("origin")
         if origin is not None and self._addresses.allows_origin(origin):
             extra += [
                 (b"access-control-allow-origin", origin.encode()),
                 (b"access-control-allow-credentials", b"true"),
                 (b"access-control-allow-methods", b"GET, POST, PATCH, PUT, DELETE"),
-                (b"access-control-allow-headers", b"content-type, last-event-id"),
+                (b"access-control-allow-headers", b"authorization, content-type, last-event-id"),
                 (b"access-control-expose-headers", b"location, x-request-id"),
                 (b"access-control-max-age", b"600"),
                 (b"vary", b"origin"),
@@ -462,7 +502,7 @@ class Access:
         name = request_id()
         if name is not None:
             extra.append((b"x-request-id", name.encode()))
-        policy = self._policy(headers.get("host", "")).encode("latin-1", "replace")
+        policy = self._policy(headers.get("host", ""), path).encode("latin-1", "replace")
 
         async def dressed(message: Message) -> None:
             if message["type"] in {"http.response.start", "websocket.http.response.start"}:
@@ -511,6 +551,13 @@ def _ended(session: Session | None, *, signed_out: bool = False, expired: bool =
     if expired:
         return Unauthenticated("Your session has ended: open the link that the server printed.")
     return Withdrawn("The link that you came in by was revoked. Ask for another one.")
+
+
+def over_view(*, is_revoked: bool) -> Refused:
+    """Return the refusal for a link to one thing that was revoked or has expired."""
+    if is_revoked:
+        return Withdrawn("This link was revoked. Ask for another one.")
+    return Unauthenticated("This link has expired. Ask for another one.")
 
 
 def _lasts(scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> bool:

@@ -4,7 +4,7 @@ Decision 115 says which credentials there are. This module knows nothing of HTTP
 """
 
 import time
-from typing import Literal, NamedTuple, Protocol, TypeAlias
+from typing import Final, Literal, NamedTuple, Protocol, TypeAlias
 
 import msgspec
 
@@ -35,8 +35,35 @@ class Token(msgspec.Struct, frozen=True):
         return self.expires is not None and time.time() >= self.expires
 
 
+#: The kinds of things that a link can show to people without a name.
+ViewKind: TypeAlias = Literal["graph", "run"]
+#: Stands for whoever looks by such a link. It is no person, and no `Identity` holds it.
+_NOBODY: Final = Person("view", "", "viewer")
+
+
+class View(msgspec.Struct, frozen=True):
+    """A link that shows one graph or run to people without a name, without its secret. `thing`: the
+    id of the graph or run; `expires`: seconds since 1970."""
+
+    id: str
+    kind: ViewKind
+    thing: str
+    expires: float
+    invitation: None = None
+
+    @property
+    def person(self) -> Person:
+        """Return a person who is nobody."""
+        return _NOBODY
+
+    @property
+    def expired(self) -> bool:
+        """Return whether the link has expired: it then shows nothing."""
+        return time.time() >= self.expires
+
+
 #: The credentials that somebody can end. The owner's token is none of them.
-Credential: TypeAlias = Session | Token
+Credential: TypeAlias = Session | Token | View
 
 
 class Standing(NamedTuple):
@@ -87,6 +114,22 @@ class Tokens(Protocol):
 
     def prove(self, token: str, challenge: str, address: str) -> str:
         """Return the proof that this process knows a token, as `token_text.proof` makes it."""
+
+
+class Views(Protocol):
+    """Knows the links that show one graph or run."""
+
+    def opens(self, text: str) -> View | None:
+        """Return the link with this key; None if the text is no key of such a link. Raise
+        Unauthenticated or Withdrawn if it is one that shows nothing. Called at each request."""
+
+
+class NoViews:
+    """Accepts no link: used where a process shows nothing to strangers."""
+
+    def opens(self, text: str) -> View | None:
+        """Return None for every text."""
+        return None
 
 
 class NoTokens:

@@ -163,6 +163,11 @@ class Keys:
         """Return the seal of a confirmation, which only a server with this token can make."""
         return _text(hmac.digest(self._seal, b"confirmation\0" + record, "sha256"))
 
+    def view_secret(self, link: bytes) -> str:
+        """Return the secret (256 bit) of a link that shows one thing. `link`: its id, thing and
+        end as bytes, which the secret seals."""
+        return _text(hmac.digest(self._seal, b"view\0" + link, "sha256"))
+
     def prove(self, challenge: str, address: str) -> ServerProof:
         """Prove to a client that this server knows the token, before the client shows it.
         `challenge`: the text that the client chose. `address`: the address (`HOST:PORT`) that

@@ -2,7 +2,8 @@
 open.
 
 `revoked/` in the data folder holds one empty file for each: `ID` for an invitation, `session-ID`,
-`person-ID` and `token-ID` for sessions, persons and tokens that were ended. It is made at once or not at all, never changed, and needs neither the other process nor a
+`person-ID`, `token-ID` and `view-ID` for sessions, persons, tokens and links to one thing that were
+ended. It is made at once or not at all, never changed, and needs neither the other process nor a
 database to be read. What this process was told itself it also keeps in mind, whatever becomes of the
 disk.
 """
@@ -20,7 +21,7 @@ from typing import Final
 
 from action_assistant.errors import Unavailable
 from action_assistant.kit.retrying_thread import RetryingThread
-from action_assistant.web.auth.identity import Credential, Standing, Token
+from action_assistant.web.auth.identity import Credential, Standing, Token, View
 from action_assistant.web.auth.keys import Session
 
 log: Final = logging.getLogger(__name__)
@@ -34,6 +35,7 @@ _ID: Final = re.compile(r"[A-Za-z0-9]{1,40}")
 _SESSION: Final = "session-"
 _PERSON: Final = "person-"
 _TOKEN: Final = "token-"
+_VIEW: Final = "view-"
 #: The form of the ids of sessions, persons and tokens.
 _MARKED_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 
@@ -76,8 +78,14 @@ class Revocations:
         """Return whether this token of a program was revoked."""
         return _MARKED_ID.fullmatch(token) is None or self._is_marked(_TOKEN + token)
 
+    def view_ended(self, view: str) -> bool:
+        """Return whether this link to one graph or run was revoked."""
+        return _MARKED_ID.fullmatch(view) is None or self._is_marked(_VIEW + view)
+
     def ends(self, credential: Credential) -> bool:
-        """Return whether a session or token may do nothing any more, not even Stop."""
+        """Return whether a session, token or link may do nothing any more, not even Stop."""
+        if isinstance(credential, View):
+            return self.view_ended(credential.id)
         if self.holds(credential.invitation):
             return True
         if isinstance(credential, Token):
@@ -115,9 +123,14 @@ class Revocations:
         does."""
         self._mark(_TOKEN + _checked(token, "a token"))
 
+    def end_view(self, view: str) -> None:
+        """Revoke a link to one graph or run, at once and durably. Raise ValueError or Unavailable
+        as `add` does."""
+        self._mark(_VIEW + _checked(view, "a link"))
+
     def write_again(self) -> None:
-        """Write to disk the marks of ended invitations, sessions, persons and tokens that could not
-        be written before. Raise Unavailable if they still cannot."""
+        """Write to disk the marks of all that was ended and whose mark could not be written
+        before. Raise Unavailable if they still cannot."""
         for mark in tuple(self._unwritten):
             self._mark(mark)
 
@@ -157,6 +170,9 @@ class Revocations:
         return True
 
     def _ends_in_mind(self, credential: Credential) -> bool:
+        if isinstance(credential, View):
+            is_id = _MARKED_ID.fullmatch(credential.id) is not None
+            return not is_id or _VIEW + credential.id in self._marks
         kind = _TOKEN if isinstance(credential, Token) else _SESSION
         if kind + credential.id in self._marks or _PERSON + credential.person.id in self._marks:
             return True

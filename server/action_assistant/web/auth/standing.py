@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Final
 
 from action_assistant.web.auth.confirmations import Confirmations
-from action_assistant.web.auth.identity import Credential, Standing, Token
+from action_assistant.web.auth.identity import Credential, Standing, Token, View
 from action_assistant.web.auth.keys import Person, Session
 from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.roles import Role, rank
@@ -37,7 +37,9 @@ class Standings:
         browsers.judge_by(lambda session: self.of(session).expired)
 
     def of(self, credential: Credential) -> Standing:
-        """Return the present standing of a session or token."""
+        """Return the present standing of a session, token or link."""
+        if isinstance(credential, View):
+            return Standing(credential.person, frozenset(), credential.expired)
         person = credential.person
         now = self._clock()
         over = credential.expired

@@ -15,8 +15,8 @@ from litestar.types import ASGIApp, ControllerRouterHandler, HTTPScope, Receive,
 
 from action_assistant.errors import CannotStart, NotFound
 from action_assistant.version import VERSION, commit
-from action_assistant.web.auth.access import Access, DeclaredRight, Needs, Open
-from action_assistant.web.auth.identity import NoTokens, Tokens
+from action_assistant.web.auth.access import Access, DeclaredRight, Needs, OfLink, Open
+from action_assistant.web.auth.identity import NoTokens, Tokens, Views
 from action_assistant.web.auth.keys import METRICS, Keys, ScrapeToken, ServerProof
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Permission
@@ -34,6 +34,8 @@ from action_assistant.web.server.proxy import MOUNT, Mounted, misrouted
 
 log: Final = logging.getLogger(__name__)
 
+#: The path of the page that shows one thing by a link: the only one that a frame may show.
+VIEW: Final = "/view"
 BODY_LIMIT: Final = 10_000_000  # bytes; a graph file of 10 MB is refused with 413
 
 
@@ -60,6 +62,8 @@ def application(
     monitoring: Monitoring | None = None,
     scraped: ScrapeToken | None = None,
     tokens: Tokens | None = None,
+    views: Views | None = None,
+    frames: Sequence[str] = (),
     standings: Standings | None = None,
     page: Path | None = None,
     help_site: Path | None = None,
@@ -73,7 +77,8 @@ def application(
     unless a route has its own limit. `page`, `help_site`, `runner_port`: only for the editor, which
     serves the built page and the documentation, and names the runner in the
     Content-Security-Policy. `mount`: the path at which a proxy serves this process. `scraped`: the
-    token that allows /metrics only. `tokens`: the tokens of programs. `standings`: knows what
+    token that allows /metrics only. `tokens`: the tokens of programs; `views`: the links that show
+    one thing, `frames`: the origins of sites that may show these in a frame. `standings`: knows what
     sessions and tokens are worth now. Raise CannotStart if a route declares no right.
     """
     handlers = [
@@ -99,10 +104,15 @@ def application(
         addresses=addresses,
         page_port=page_port,
         is_open=lambda path, html: path in rights.open_paths or is_public(path, html),
-        policy=lambda host: _policy(addresses, host, page_port, runner_port),
+        policy=lambda host, path: _policy(
+            addresses, host, page_port, runner_port, frames if path == VIEW else ()
+        ),
         revoked=revoked,
+        is_of_link=rights.link_paths.__contains__,
+        is_framed=lambda path: bool(frames) and path == VIEW,
         scraped=scraped,
         tokens=tokens,
+        views=views,
         standings=standings,
     )
     return _Described(Mounted(Requests(outer, _counts(monitoring)), mount), openapi)
@@ -159,18 +169,20 @@ def _host(scope: HTTPScope) -> str:
 
 
 class _Rights(NamedTuple):
-    """The declared rights of all routes: the permission by path and method, and the paths that
-    answer strangers."""
+    """The declared rights of all routes: the permission by path and method, the paths that answer
+    strangers, and those that answer a link that shows one thing."""
 
     needed: dict[tuple[str, str], Permission]
     open_paths: frozenset[str]
+    link_paths: frozenset[str]
 
 
 def _declared_rights(inner: Litestar) -> _Rights:
     """Return the rights that all routes declare. Raise CannotStart if an HTTP route or a socket
-    declares none, or if a path is open by one method only."""
+    declares none, or if a path is open, or for links, by one method only."""
     needed: dict[tuple[str, str], Permission] = {}
     paths: dict[bool, set[str]] = {True: set(), False: set()}
+    links: dict[bool, set[str]] = {True: set(), False: set()}
     for route in inner.routes:
         for method, handler in _methods(route):
             declared = [
@@ -179,11 +191,14 @@ def _declared_rights(inner: Litestar) -> _Rights:
             if not declared:
                 raise CannotStart(f"{method} {route.path_format} does not declare who may call it.")
             paths[isinstance(declared[-1], Open)].add(route.path_format)
+            links[isinstance(declared[-1], OfLink)].add(route.path_format)
             if isinstance(declared[-1], Needs):
                 needed[route.path_format, method.lower()] = declared[-1].permission
     for path in sorted(paths[True] & paths[False]):
         raise CannotStart(f"{path} is open to strangers by some of its methods only.")
-    return _Rights(needed, frozenset(paths[True]))
+    for path in sorted(links[True] & links[False]):
+        raise CannotStart(f"{path} is for links by some of its methods only.")
+    return _Rights(needed, frozenset(paths[True]), frozenset(links[True]))
 
 
 def _methods(route: BaseRoute) -> Iterator[tuple[str, BaseRouteHandler]]:
@@ -210,7 +225,9 @@ class _Described:
         await self._outer(scope, receive, send)
 
 
-def _policy(addresses: Addresses, host: str, page_port: int, runner_port: int | None) -> str:
+def _policy(
+    addresses: Addresses, host: str, page_port: int, runner_port: int | None, frames: Sequence[str]
+) -> str:
     connect = "'self'"
     public = addresses.public_at(host)
     if runner_port is not None and public is not None:
@@ -218,10 +235,11 @@ def _policy(addresses: Addresses, host: str, page_port: int, runner_port: int | 
     elif runner_port is not None and host_name(host):
         page, runner = (addresses.direct(host, port) for port in (page_port, runner_port))
         connect += f" {_socket(page)} {runner} {_socket(runner)}"
+    none = "'none'"
     return (
         "default-src 'self'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
         f"img-src 'self' data: blob:; font-src 'self'; connect-src {connect}; object-src 'none'; "
-        "base-uri 'none'; form-action 'self'; frame-ancestors 'none'"
+        f"base-uri 'none'; form-action 'self'; frame-ancestors {' '.join(frames) or none}"
     )
 
 
