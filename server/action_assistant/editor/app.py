@@ -19,6 +19,7 @@ from action_assistant.editor.api import (
     drawing,
     editor,
     folders,
+    graph_rights,
     graphs,
     history,
     invitations,
@@ -31,6 +32,7 @@ from action_assistant.editor.api import (
     versions,
     view,
 )
+from action_assistant.editor.api.graph_guard import guarded
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people import audit_facts
@@ -98,6 +100,7 @@ async def open_services(
                 settings, journal, people, epoch, revoked, workers, audit, people_files
             )
             try:
+                await services.rights.refresh()
                 async with (
                     services.invitations.opened(),
                     services.members.opened(),
@@ -209,9 +212,17 @@ def _routes(
     return [
         *invitations.routes(app_state, addresses, browsers),
         *members.routes(app_state, addresses, browsers),
+        *guarded(_graph_routes(app_state, addresses), app_state),
+        *audit_routes(lambda wanted: _audit(app_state.services, wanted)),
+    ]
+
+
+def _graph_routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRouterHandler]:
+    return [
         *editor.routes(app_state, addresses),
         *graphs.routes(app_state),
         *folders.routes(app_state),
+        *graph_rights.routes(app_state),
         *history.routes(app_state),
         *versions.routes(app_state),
         *subgraphs.routes(app_state),
@@ -220,7 +231,6 @@ def _routes(
         *packages.routes(app_state),
         *library.routes(app_state),
         *room.routes(app_state),
-        *audit_routes(lambda wanted: _audit(app_state.services, wanted)),
     ]
 
 

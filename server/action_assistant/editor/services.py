@@ -8,6 +8,7 @@ from action_assistant.editor.catalogue.catalogue import Catalogue
 from action_assistant.editor.catalogue.folders import Folders
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.graph_rights import GraphRights
 from action_assistant.editor.catalogue.versions import Versions
 from action_assistant.editor.history.blame import Blame
 from action_assistant.editor.history.change_index import ChangeIndex
@@ -30,6 +31,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import person_of
+from action_assistant.web.auth.graph_seals import RulesFile
 from action_assistant.web.auth.keys import Keys, Person
 from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.revocations import Revocations
@@ -50,6 +52,7 @@ class EditorServices:
         audit: AuditLog | None = None,
         people_files: PeopleFiles | None = None,
     ) -> None:
+        keys = Keys.of(settings.data)
         self.settings = settings
         self.audit = audit or AuditLog()
         self.journal = journal
@@ -61,17 +64,24 @@ class EditorServices:
         self.connection_limits = ConnectionLimits(limits=settings.limits)
         self.rate_limits = ByteRateLimits(limits=settings.limits)
         self.graph_reader = GraphReader(journal, self.rooms, workers.graphs)
-        self.graph_checks = GraphChecks(journal, self.rooms, self.graph_reader)
-        self.catalogue = Catalogue(
-            journal, self.rooms, self.graph_reader, self.graph_checks, workers.files
+        self.rights = GraphRights(journal, self.rooms, RulesFile(settings.data, keys), keys)
+        self.graph_checks = GraphChecks(
+            journal, self.rooms, self.graph_reader, self.rights.caller_sees
         )
-        self.folders = Folders(journal)
+        self.catalogue = Catalogue(
+            journal,
+            self.rooms,
+            self.graph_reader,
+            self.graph_checks,
+            workers.files,
+            self.rights.made,
+        )
+        self.folders = Folders(journal, self.rights)
         self.versions = Versions(journal, self.graph_reader, self.graph_checks)
-        self.library = Library(journal, self.graph_reader)
+        self.library = Library(journal, self.graph_reader, self.rights.caller_sight)
         self.library_edits = LibraryEdits(
             journal, self.rooms, self.graph_reader, self.catalogue, self.library, workers.files
         )
-        keys = Keys.of(settings.data)
         self.invitations = Invitations(journal, people, keys, revoked)
         self.members = Members(
             journal,

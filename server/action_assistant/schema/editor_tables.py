@@ -12,7 +12,8 @@ written_by: Final = written_by_table(EDITOR)
 #: A graph of the catalogue, or an action of the library (`kind`). `name` and `description` follow the
 #: document. A draft was made of the graph `draft_of` after its change `drafted_seq`; what both are compared
 #: with is `base_graph` after its change `base_seq`; `merged_seq` is the change up to which the draft was
-#: merged. `folder`: the folder in which the graph lies.
+#: merged. `folder`: the folder in which the graph lies. `rule`: who may see and edit it, as JSON; none where
+#: that of its folder counts.
 graph: Final = Table(
     "graph",
     EDITOR,
@@ -30,9 +31,10 @@ graph: Final = Table(
     Column("base_seq", BigInteger),
     Column("merged_seq", BigInteger),
     Column("folder", Text),
+    Column("rule", Text),
     Index(None, "draft_of"),
 )
-#: A folder of graphs. `parent`: the folder in which it lies.
+#: A folder of graphs. `parent`: the folder in which it lies. `rule`: as of a graph.
 folder: Final = Table(
     "folder",
     EDITOR,
@@ -41,6 +43,7 @@ folder: Final = Table(
     Column("parent", Text),
     Column("made_at", BigInteger, nullable=False),
     Column("made_by", Text, nullable=False),
+    Column("rule", Text),
 )
 #: A published version. Its UMRF stands in the body of the event `(stream, event_seq)`.
 version: Final = Table(

@@ -736,7 +736,8 @@ export interface EditorApi {
     /**
      * Folder
      * @description A folder of graphs. `parent`: the folder in which it lies, if any. `graphs`: how many graphs
-     *     lie in it, without those in the folders inside of it.
+     *     lie in it, without those in the folders inside of it. `restricted`: not everybody may see or
+     *     edit the graphs in it.
      */
     Folder: {
         id: string;
@@ -744,6 +745,8 @@ export interface EditorApi {
         parent?: string;
         /** @default 0 */
         graphs?: number;
+        /** @default false */
+        restricted?: boolean;
     };
     /**
      * GoneBack
@@ -806,7 +809,8 @@ export interface EditorApi {
      *     `damaged`: the first change that cannot be read; the graph stays in the state before it, and
      *     cannot be changed. `people`: who is in it now. `problems`: counts of the check; `wrong` and
      *     `to_fill_in`: counts for people, in which related problems count once. `drafts`: the number of
-     *     its drafts. `folder`: the id of the folder in which it lies.
+     *     its drafts. `folder`: the id of the folder in which it lies. `restricted`: not everybody may see
+     *     or edit it.
      */
     GraphView: {
         id: string;
@@ -838,6 +842,8 @@ export interface EditorApi {
         /** @default 0 */
         drafts?: number;
         folder?: string;
+        /** @default false */
+        restricted?: boolean;
     };
     /**
      * Group
@@ -1205,6 +1211,8 @@ export interface EditorApi {
         /** @default 0 */
         drafts?: number;
         folder?: string;
+        /** @default false */
+        restricted?: boolean;
         reading?: EditorApi["ImportReport"];
     };
     /**
@@ -1900,6 +1908,31 @@ export interface EditorApi {
         heard_at: string | null;
     };
     /**
+     * Rule
+     * @description Names those who may see a graph, and those who may also edit it as far as their role allows.
+     *     Editors may see it, too; with `editors` "all" everybody who may see it may edit it. Owners may do
+     *     both.
+     */
+    Rule: {
+        readers: "all" | string[];
+        editors: "all" | string[];
+    };
+    /**
+     * RuleView
+     * @description The own rule of a graph or folder, if any, and the rule that counts for it.
+     */
+    RuleView: {
+        own: EditorApi["Rule"] | null;
+        counts: EditorApi["Rule"];
+    };
+    /**
+     * Ruling
+     * @description A new rule; null: that of the folder around it counts.
+     */
+    Ruling: {
+        rule: EditorApi["Rule"] | null;
+    };
+    /**
      * Script
      * @description Behaviours of actions by key. A key has one behaviour for each call of the action; the last
      *     one repeats.
@@ -1954,6 +1987,22 @@ export interface EditorApi {
         proxied: boolean;
     };
     /**
+     * Sight
+     * @description The rules of a version at one time: a run of it is for those who may see all its graphs.
+     *
+     *     `digest`: the tree digest of the version, or its digest if it has none. `graphs`: the ids of the
+     *     graph and of all graphs inside. `rules`: the rule that counts for each of them, in their order.
+     *     `at`: microseconds since 1970.
+     */
+    Sight: {
+        version: string;
+        digest: string;
+        graphs: string[];
+        rules: EditorApi["Rule"][];
+        at: number;
+        seal: string;
+    };
+    /**
      * SignIn
      * @description The body of a sign-in: the token or an invitation, and optionally the person's name. A
      *     signed-in person may send only a new name.
@@ -1994,6 +2043,21 @@ export interface EditorApi {
         partings: EditorApi["CourseChange"][];
     };
     /**
+     * Statement
+     * @description The rules of all graphs at one time, also of deleted graphs, and of drafts, for which that of
+     *     their origin counts. `graphs`: the index in `rules` of the rule that counts, by the id of the
+     *     graph; graphs that are left out are open to everybody. `at`: microseconds since 1970; a later
+     *     statement has a greater one.
+     */
+    Statement: {
+        at: number;
+        rules: EditorApi["Rule"][];
+        graphs: {
+            [key: string]: number;
+        };
+        seal: string;
+    };
+    /**
      * StorageShown
      * @description Bytes: free space and size of the disk of the data folder, and what the database and folders
      *     take.
@@ -2026,10 +2090,10 @@ export interface EditorApi {
     /**
      * TakenFrom
      * @description The document whose parameters were taken over, "" for a file, its change then, and the name of
-     *     the action.
+     *     the action. `document`: null for a graph that the person who asks may not see.
      */
     TakenFrom: {
-        document: string;
+        document: string | null;
         seq: number;
         action: string;
     };
@@ -2357,6 +2421,17 @@ export interface EditorPaths {
     "/api/graphs/{graph_id}/folder": {
         put: EditorOperations["fileGraph"];
     };
+    "/api/graphs/{graph_id}/rule": {
+        get: EditorOperations["getGraphRule"];
+        put: EditorOperations["putGraphRule"];
+    };
+    "/api/folders/{folder_id}/rule": {
+        get: EditorOperations["getFolderRule"];
+        put: EditorOperations["putFolderRule"];
+    };
+    "/api/graph-rules": {
+        get: EditorOperations["getGraphRules"];
+    };
     "/api/graphs/{graph_id}/history": {
         get: EditorOperations["getHistory"];
     };
@@ -2397,6 +2472,9 @@ export interface EditorPaths {
     };
     "/api/versions/{version_id}": {
         get: EditorOperations["getVersion"];
+    };
+    "/api/versions/{version_id}/sight": {
+        get: EditorOperations["getSight"];
     };
     "/api/graphs/{graph_id}/flat": {
         get: EditorOperations["getFlatGraph"];
@@ -3176,6 +3254,81 @@ interface EditorOperations {
             };
         };
     };
+    getGraphRule: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["RuleView"];
+                };
+            };
+        };
+    };
+    putGraphRule: {
+        parameters: {
+            path: {
+                graph_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Ruling"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["RuleView"];
+                };
+            };
+        };
+    };
+    getFolderRule: {
+        parameters: {
+            path: {
+                folder_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["RuleView"];
+                };
+            };
+        };
+    };
+    putFolderRule: {
+        parameters: {
+            path: {
+                folder_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Ruling"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["RuleView"];
+                };
+            };
+        };
+    };
+    getGraphRules: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Statement"];
+                };
+            };
+        };
+    };
     getHistory: {
         parameters: {
             query?: {
@@ -3443,6 +3596,20 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["VersionView"];
+                };
+            };
+        };
+    };
+    getSight: {
+        parameters: {
+            path: {
+                version_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Sight"];
                 };
             };
         };

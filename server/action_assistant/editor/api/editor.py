@@ -18,7 +18,8 @@ from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.version import VERSION, commit
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, identity_of, person_of
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.openapi import answer
@@ -127,12 +128,14 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
             if not last.isdecimal():
                 raise BadInput("Last-Event-ID is the number of an event.")
             after = int(last)
-        return ServerSentEvent(_told(app_state, after))
+        return ServerSentEvent(_told(app_state, after, identity_of(request)))
 
     return [get_config, list_people, list_examples, follow_events]
 
 
-async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[ServerSentEventMessage]:
+async def _told(
+    app_state: EditorState, after: int | None, identity: Identity
+) -> AsyncIterator[ServerSentEventMessage]:
     """Yield, as events of an HTTP event stream, the stored events after the position `after` (None:
     no old ones), then new events as they are stored, without end. While none comes, yield a comment
     now and then."""
@@ -140,8 +143,11 @@ async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[Serv
     async with services.journal.follow() as events:
         done = await services.journal.position() if after is None else after
         while after is not None and (page := await services.journal.read_all(after=done)):
+            sees = await services.rights.sight(identity)
             for event in page:
-                yield _message(app_state, event)
+                graph = h.graph_of(event.stream)
+                if graph is None or sees(graph):
+                    yield _message(app_state, event)
             done = page[-1].position
         coming = asyncio.ensure_future(anext(events))
         try:
@@ -152,7 +158,9 @@ async def _told(app_state: EditorState, after: int | None) -> AsyncIterator[Serv
                     continue
                 event = coming.result()
                 coming = asyncio.ensure_future(anext(events))
-                if event.position > done:
+                graph = h.graph_of(event.stream)
+                hidden = graph is not None and not await services.rights.may_see(graph, identity)
+                if event.position > done and not hidden:
                     yield _message(app_state, event)
         except StopAsyncIteration:  # the journal is closed
             return

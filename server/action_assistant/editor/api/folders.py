@@ -8,8 +8,8 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.catalogue.folders import Folder
-from action_assistant.editor.services import EditorState
-from action_assistant.web.auth.access import Needs
+from action_assistant.editor.services import EditorServices, EditorState
+from action_assistant.web.auth.access import Needs, identity_of
 
 Asking = Request[Any, Any, Any]
 
@@ -39,6 +39,12 @@ class Filing(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     folder: str | None
 
 
+async def _check_target(services: EditorServices, folder: str | None, request: Asking) -> None:
+    """Raise NotFound or Forbidden if the person may not see or edit the folder that a body names."""
+    if folder is not None:
+        await services.rights.check("folder", folder, identity_of(request), edits=True)
+
+
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     """Return the routes of folders, and the one that moves a graph into a folder."""
 
@@ -48,8 +54,8 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="listFolders",
         guards=[Needs("see")],
     )
-    async def list_folders() -> list[Folder]:
-        return await app_state.services.folders.all()
+    async def list_folders(request: Asking) -> list[Folder]:
+        return await app_state.services.folders.seen_by(identity_of(request))
 
     @post(
         "/api/folders",
@@ -59,6 +65,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def make_folder(data: NewFolder, request: Asking) -> Response[Folder]:
         services, person = await app_state.acting(request)
+        await _check_target(services, data.parent, request)
         made = await services.folders.make(data.name, data.parent, person.id)
         return Response(made, status_code=201, headers={"location": f"/api/folders/{made.id}"})
 
@@ -80,6 +87,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def move_folder(folder_id: str, data: MovingFolder, request: Asking) -> Folder:
         services, person = await app_state.acting(request)
+        await _check_target(services, data.parent, request)
         return await services.folders.move(folder_id, data.parent, person.id)
 
     @delete(
@@ -100,6 +108,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def file_graph(graph_id: str, data: Filing, request: Asking) -> GraphView:
         services, person = await app_state.acting(request)
+        await _check_target(services, data.folder, request)
         await services.folders.file(graph_id, data.folder, person.id)
         return await services.catalogue.get(graph_id)
 

@@ -20,7 +20,8 @@ from action_assistant.errors import Conflict
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Problem
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, identity_of, person_of
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.server.application import BODY_LIMIT
 from action_assistant.web.server.openapi import answer, reads
 
@@ -72,11 +73,21 @@ def made_graph(made: GraphView, told: bytes | None) -> Response[MadeGraph]:
     return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
 
+def _in_sight(
+    services: EditorServices, view: GraphView, identity: Identity, *, restricted: bool
+) -> GraphView:
+    """Return a graph as an identity may see it: without the id of a folder that is out of its
+    sight. `restricted`: not everybody may see or edit the graph."""
+    sees_folder = services.rights.sees_folder(view.folder, identity)
+    folder = view.folder if sees_folder else None
+    return msgspec.structs.replace(view, folder=folder, restricted=restricted)
+
+
 async def _previewed(services: EditorServices, body: bytes) -> bytes:
     """Return the JSON of a `Preview` of a UMRF file (`body`), checked with the stored graphs that
     would be inside."""
     name, uses = await services.workers.files(importing.names, body)
-    inside = await services.graph_checks.inside_of(name, uses)
+    inside = await services.graph_checks.inside_of(name, uses, partly=True)
     return await services.workers.files(importing.preview, body, inside)
 
 
@@ -85,7 +96,7 @@ async def _inside_with(services: EditorServices, then: GraphAtSeq, text: bytes) 
     was edited from this graph; graphs that only the text uses are returned, too. Raise BadInput,
     NotUmrf or TooLarge if the text cannot be read."""
     _, uses = await services.workers.files(importing.names, text)
-    return await services.graph_checks.inside(then, more=uses)
+    return await services.graph_checks.inside(then, more=uses, partly=True)
 
 
 def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
@@ -95,8 +106,18 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="listGraphs",
         guards=[Needs("see")],
     )
-    async def list_graphs(deleted: bool = False) -> list[GraphView]:
-        return await app_state.services.catalogue.all(deleted=deleted)
+    async def list_graphs(request: Asking, deleted: bool = False) -> list[GraphView]:
+        services, identity = app_state.services, identity_of(request)
+        sees, is_restricted = (
+            await services.rights.sight(identity),
+            await services.rights.restrictions(),
+        )
+        listed = await services.catalogue.all(deleted=deleted)
+        return [
+            _in_sight(services, view, identity, restricted=is_restricted(view.id))
+            for view in listed
+            if sees(view.id)
+        ]
 
     @post(
         "/api/graphs",
@@ -119,6 +140,7 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
             return Response(encoded(Preview, found), status_code=200)
         services, person = await app_state.acting(request)
         if folder is not None:
+            await services.rights.check("folder", folder, identity_of(request), edits=True)
             await services.folders.require(folder)
         body = await request.body()
         made, told = await services.catalogue.create(body, person.id, folder=folder)
@@ -130,8 +152,11 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="getGraph",
         guards=[Needs("see")],
     )
-    async def get_graph(graph_id: str) -> GraphView:
-        return await app_state.services.catalogue.get(graph_id)
+    async def get_graph(graph_id: str, request: Asking) -> GraphView:
+        services, identity = app_state.services, identity_of(request)
+        view = await services.catalogue.get(graph_id)
+        restricted = await services.rights.is_restricted(graph_id)
+        return _in_sight(services, view, identity, restricted=restricted)
 
     @patch(
         "/api/graphs/{graph_id:str}",

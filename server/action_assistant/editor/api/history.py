@@ -11,14 +11,14 @@ from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.history import change_summaries
 from action_assistant.editor.history.blame import DocumentStep, FieldBlame, FieldValue
 from action_assistant.editor.history.course_search import AskingSince, SinceWhen
-from action_assistant.editor.history.graph_history import HistoryEntry
+from action_assistant.editor.history.graph_history import HistoryEntry, without_hidden
 from action_assistant.editor.history.restoring import EditsOfOne, GoneBack
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict
 from action_assistant.umrf.difference import Difference
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, identity_of, person_of
 from action_assistant.web.server.openapi import answer
 
 Asking = Request[Any, Any, Any]
@@ -72,13 +72,15 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def get_history(
         graph_id: str,
+        request: Asking,
         limit: Annotated[int, Parameter(ge=1, le=1000)] = 100,
         before: Seq | None = None,
     ) -> list[HistoryEntry]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         found = await services.history.of(graph_id, limit=limit, before=before)
-        return encoded(list[HistoryEntry], found)
+        sees = await services.rights.sight(identity_of(request))
+        return encoded(list[HistoryEntry], without_hidden(found, sees))
 
     @get(
         "/api/graphs/{graph_id:str}/document",

@@ -23,7 +23,7 @@ from action_assistant.errors import BadInput
 from action_assistant.umrf.action_updates import NO_RENAMES, Renames
 from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.json.text import JsonObject
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, identity_of, person_of
 from action_assistant.web.server.application import BODY_LIMIT
 from action_assistant.web.server.openapi import answer, reads
 
@@ -206,6 +206,8 @@ def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:
     ) -> list[UpdatedGraph]:
         services, person = app_state.services, person_of(request)
         await services.catalogue.require(action_id, "action")
+        for each in data.graphs:
+            await services.rights.check("graph", each.graph, identity_of(request), edits=True)
         await services.people.seen(person)
         return await services.library_edits.update_uses(
             action_id, data.seq, data.graphs, data.renames, person.id
@@ -220,6 +222,7 @@ def _uses(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def take_over(action_id: str, data: TakingOver, request: Asking) -> GraphView:
         services, person = await app_state.acting(request)
+        await services.rights.check("graph", data.graph, identity_of(request), edits=False)
         return await services.library_edits.take(action_id, data.graph, data.aid, person.id)
 
     return [list_uses, update_uses, take_over]

@@ -22,6 +22,7 @@ from action_assistant.errors import Refused
 from action_assistant.logs import about
 from action_assistant.web.auth.access import Needs, identity_of, person_of, plain, refuse
 from action_assistant.web.auth.caller import origin_of
+from action_assistant.web.auth.graph_rules import MAY_NOT_EDIT
 from action_assistant.web.auth.rights import Allowed, may
 from action_assistant.web.server.direct import DirectSocket, direct_socket
 
@@ -243,20 +244,29 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
                     stream
                 ):  # asking the tables is a fifth of the cost of a connection
                     await services.catalogue.require(graph_id)
+                identity = identity_of(socket)
+                await services.rights.check("graph", graph_id, identity, edits=False)
                 await services.people.seen(person)
                 async with services.rooms.enter(stream) as found:
                     await socket.accept()
                     if _has_other_history(socket, services.epoch, found):
                         await _refuse_history(socket, services.epoch)
                         return
-                    edits = may(identity_of(socket), "edit", now=time.time()) == Allowed()
+                    edits = may(identity, "edit", now=time.time()) == Allowed()
                     acks = _wants_acks(socket)
                     with services.colours.held(person.id) as colour:
                         origin = origin_of(person.id)
                         member = Member(
-                            person, edits=edits, acks=acks, colour=colour, origin=origin
+                            person,
+                            edits=edits and await services.rights.admit(graph_id, identity),
+                            acks=acks,
+                            colour=colour,
+                            origin=origin,
+                            identity=identity,
                         )
                         member.post_epoch(services.epoch)
+                        if edits and not member.edits:
+                            member.post_read_only(MAY_NOT_EDIT)
                         if services.rooms.is_deleted(stream):  # while this socket was let in
                             member.close(messages.NO_SUCH_GRAPH)
                         connection = RoomConnection(found, member, services.rate_limits)

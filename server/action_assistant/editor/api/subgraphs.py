@@ -27,7 +27,7 @@ from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
 from action_assistant.errors import Conflict, NotFound
 from action_assistant.umrf.model import Key, Position
-from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.access import Needs, identity_of, person_of
 
 
 class Extracting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -88,9 +88,8 @@ async def _chosen(
     request for a sub-graph of its chosen actions."""
     await services.catalogue.require(graph, "graph")
     name, _ = fit(data.name, "")
-    names = services.graph_checks.names
-    await names.refresh()
-    chosen = ChosenActions(data.actions, name, names.is_taken(name), data.otherwise)
+    taken = await services.graph_checks.is_taken(name)
+    chosen = ChosenActions(data.actions, name, taken, data.otherwise)
     return await services.graph_reader.moment(graph, data.seq), chosen
 
 
@@ -127,11 +126,13 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         async with making:
             chosen = await _chosen(services, graph_id, data)
             found = await services.workers.files(subgraph_file, *chosen)
+            folder = await services.catalogue.folder_of(graph_id)
             made, _ = await services.catalogue.bring(
                 found.umrf,
                 person.id,
                 keys=found.keys,
-                folder=await services.catalogue.folder_of(graph_id),
+                folder=folder,
+                rule=await services.rights.rule_for_copy([graph_id], folder, person.id),
             )
         body = MadeSubGraph(made, encoded(tuple[KeyChange, ...], found.changes))
         return Response(body, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
@@ -149,8 +150,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.catalogue.require(graph_id, "graph")
         sight = await services.graph_reader.moment(graph_id, data.seq)
         name = await services.graph_reader.ask(name_of_action, sight, data.action)
-        await services.graph_checks.names.refresh()
-        known = services.graph_checks.names.graph(name)
+        known = await services.graph_checks.named(name)
         if known is None or known.graph == graph_id:
             raise NotFound(f"“{name}” stands for no graph.")
         inside = await services.graph_reader.now(known.graph)
@@ -171,6 +171,8 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     ) -> CalledUses:
         services, person = await app_state.acting(request)
         await services.catalogue.require(graph_id, "graph")
+        for graph in data.graphs:
+            await services.rights.check("graph", graph, identity_of(request), edits=True)
         return CalledUses(
             await services.catalogue.call_uses(data.graphs, data.before, data.name, person.id)
         )
@@ -219,7 +221,13 @@ def _flat(app_state: EditorState) -> list[ControllerRouterHandler]:
         await services.people.seen(person)
         text = await services.graph_reader.ask(flat_text, *whole, data.name)
         folder = await services.catalogue.folder_of(graph_id)
-        made, _ = await services.catalogue.create(text, person.id, folder=folder)
+        parts = [graph_id, *(part.graph for _, part in whole[1].graphs)]
+        made, _ = await services.catalogue.create(
+            text,
+            person.id,
+            folder=folder,
+            rule=await services.rights.rule_for_copy(parts, folder, person.id),
+        )
         return Response(made, status_code=201, headers={"location": f"/api/graphs/{made.id}"})
 
     return [get_flat, make_flat]

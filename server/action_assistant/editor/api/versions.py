@@ -11,6 +11,7 @@ from action_assistant.editor.catalogue.versions import InsideView, VersionView
 from action_assistant.editor.interchange.subgraphs import zipped
 from action_assistant.editor.services import EditorState
 from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.auth.graph_seals import Sight
 from action_assistant.web.server.openapi import FileBytes, answer
 
 
@@ -102,4 +103,18 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def get_version(version_id: str) -> VersionView:
         return await app_state.services.versions.get(version_id)
 
-    return [list_versions, publish_version, get_subgraphs, download_subgraphs, get_version]
+    @get(
+        "/api/versions/{version_id:str}/sight",
+        summary="Who may see runs of a version, sealed for a start of it",
+        operation_id="getSight",
+        guards=[Needs("see")],
+    )
+    async def get_sight(version_id: str) -> Sight:
+        services = app_state.services
+        digest, graphs = await services.versions.graphs_in(version_id)
+        return await services.rights.sight_of(version_id, digest, graphs)
+
+    return [
+        *(list_versions, publish_version, get_subgraphs, download_subgraphs),
+        *(get_version, get_sight),
+    ]

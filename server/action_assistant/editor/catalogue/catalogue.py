@@ -1,6 +1,6 @@
 """Makes, imports, lists, renames, deletes and recovers graphs, and makes the documents of library actions."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Awaitable, Callable, Collection, Sequence
 from datetime import datetime
 from typing import Any, Final
 
@@ -22,6 +22,7 @@ from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.check import check
 from action_assistant.umrf.model import Action, Graph, Key
+from action_assistant.web.auth.graph_rules import Rule
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.http.plain_texts import require_plain
 from action_assistant.web.workers.lanes import RunInWorker, run_here
@@ -47,7 +48,8 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     `damaged`: the first change that cannot be read; the graph stays in the state before it, and
     cannot be changed. `people`: who is in it now. `problems`: counts of the check; `wrong` and
     `to_fill_in`: counts for people, in which related problems count once. `drafts`: the number of
-    its drafts. `folder`: the id of the folder in which it lies.
+    its drafts. `folder`: the id of the folder in which it lies. `restricted`: not everybody may see
+    or edit it.
     """
 
     id: str
@@ -69,6 +71,7 @@ class GraphView(msgspec.Struct, frozen=True, omit_defaults=True):
     draft_of: DraftOf | None = None
     drafts: int = 0
     folder: str | None = None
+    restricted: bool = False
 
 
 class NewGraph(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -90,7 +93,9 @@ class Catalogue:
         graph_reader: GraphReader,
         checks: GraphChecks,
         run_in_worker: RunInWorker = run_here,
+        on_made: Callable[[], Awaitable[None]] | None = None,
     ) -> None:
+        self._on_made = on_made or _do_nothing
         self._journal = journal
         self._run_in_worker = run_in_worker
         self._checks = checks
@@ -127,22 +132,27 @@ class Catalogue:
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
     async def create(
-        self, body: bytes, author: str, *, folder: str | None = None
+        self,
+        body: bytes,
+        author: str,
+        *,
+        folder: str | None = None,
+        rule: Rule | None = None,
     ) -> tuple[GraphView, bytes | None]:
-        """Make a graph in the folder with this id, if any. `body` is either an object with a name
+        """Make a graph in the folder with this id, if any, with its own `rule`, if any. `body` is either an object with a name
         and a description, for an empty graph, or a UMRF file. Return the graph, and the JSON of an
         `ImportReport` if a file was read, else None. Raise BadInput, NotUmrf or TooLarge, with the
         place in the file, if the file cannot be read; then nothing is stored."""
         try:
             wanted = msgspec.json.decode(body, type=NewGraph)
         except (msgspec.DecodeError, RecursionError, UnicodeDecodeError):
-            return await self.bring(body, author, folder=folder)
+            return await self.bring(body, author, folder=folder, rule=rule)
         require_plain(body)
         name, description = fit(wanted.name, wanted.description)
         graph = Graph(name=name, description=description, direction="right")
         made = h.draft(h.CREATED, author, h.GraphCreated(name, description))
         about = info_of(graph, check(graph))
-        drafts = [made, *_filed(folder, author)]
+        drafts = [made, *_placed(folder, rule, author)]
         return await self._add(document_edits.first(graph), about, drafts, author), None
 
     async def bring(
@@ -152,10 +162,11 @@ class Catalogue:
         *,
         keys: tuple[Key, ...] = (),
         folder: str | None = None,
+        rule: Rule | None = None,
         run_in_worker: RunInWorker | None = None,
     ) -> tuple[GraphView, bytes]:
         """Make a graph from a UMRF file (`body`), which the log stores unchanged, in the folder
-        with this id, if any. `keys`: the keys of its actions in order; without them actions get new
+        with this id, if any, with its own `rule`, if any. `keys`: the keys of its actions in order; without them actions get new
         ones. Return the graph and the JSON of an `ImportReport`. Raise BadInput, NotUmrf or
         TooLarge if the file cannot be read."""
         found = await (run_in_worker or self._run_in_worker)(importing.imported, body, keys)
@@ -166,7 +177,7 @@ class Catalogue:
             h.GraphCreated(about.name, about.description, found.dialect, found.notes),
         )
         file = Draft(h.IMPORTED, author, body)
-        drafts = [made, *_filed(folder, author)]
+        drafts = [made, *_placed(folder, rule, author)]
         return await self._add(found.update, about, drafts, author, file), found.reading
 
     async def folder_of(self, graph: str) -> str | None:
@@ -287,6 +298,7 @@ class Catalogue:
             ]
         )
         self._checks.made(made, update, of)
+        await self._on_made()
         return await self.get(made)
 
     async def _row(
@@ -332,10 +344,15 @@ class Catalogue:
         )
 
 
-def _filed(folder: str | None, author: str) -> list[Draft]:
-    """Return, as a list, the event that puts a new graph into a folder; an empty list without a
-    folder."""
-    return [] if folder is None else [h.draft(h.FILED, author, h.GraphFiled(folder))]
+async def _do_nothing() -> None:
+    return
+
+
+def _placed(folder: str | None, rule: Rule | None, author: str) -> list[Draft]:
+    """Return the events that put a new graph into a folder, if any, and give it its own rule, if
+    any."""
+    filed = [] if folder is None else [h.draft(h.FILED, author, h.GraphFiled(folder))]
+    return filed + ([] if rule is None else [h.draft(h.RULED, author, h.GraphRuled(rule))])
 
 
 def _there(

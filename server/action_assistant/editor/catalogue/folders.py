@@ -6,18 +6,21 @@ A folder is no more than a place. Removing one moves its contents into the folde
 import asyncio
 from collections import Counter
 from collections.abc import Mapping
-from typing import Final
+from typing import Final, Literal
 
 import msgspec
 from msgspec.structs import replace
 from sqlalchemy import func, select
 
+from action_assistant.editor.catalogue.graph_rights import GraphRights
 from action_assistant.editor.log import graph_events as h
-from action_assistant.errors import BadInput, Conflict, NotFound
+from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.schema import editor_tables
+from action_assistant.web.auth.graph_rules import OPEN
+from action_assistant.web.auth.identity import Identity
 
 NAME_LIMIT: Final = 100  # characters
 DEPTH_LIMIT: Final = 8  # folders in one another
@@ -26,19 +29,22 @@ COUNT_LIMIT: Final = 1_000
 
 class Folder(msgspec.Struct, frozen=True, omit_defaults=True):
     """A folder of graphs. `parent`: the folder in which it lies, if any. `graphs`: how many graphs
-    lie in it, without those in the folders inside of it."""
+    lie in it, without those in the folders inside of it. `restricted`: not everybody may see or
+    edit the graphs in it."""
 
     id: str
     name: str
     parent: str | None = None
     graphs: int = 0
+    restricted: bool = False
 
 
 class Folders:
     """All folders of graphs. Its methods raise NotFound for an id that is unknown."""
 
-    def __init__(self, journal: Journal) -> None:
+    def __init__(self, journal: Journal, rights: GraphRights) -> None:
         self._journal = journal
+        self._rights = rights
         self._changing = asyncio.Lock()  # two moves at once could make a circle
 
     async def all(self) -> list[Folder]:
@@ -54,6 +60,26 @@ class Folders:
         found = [Folder(row.id, row.name, row.parent, inside.get(row.id, 0)) for row in rows]
         return sorted(found, key=lambda each: (each.name.casefold(), each.name, each.id))
 
+    async def seen_by(self, identity: Identity) -> list[Folder]:
+        """Return the folders that an identity may see, with the counts of the graphs that it may
+        see. A folder in one that it may not see is shown as in none."""
+        sees = await self._rights.sight(identity)
+        graph = editor_tables.graph.c
+        listed = graph.deleted_at.is_(None), graph.draft_of.is_(None), graph.folder.is_not(None)
+        rows = await self._journal.query(select(graph.id, graph.folder).where(*listed))
+        counts = Counter(row.folder for row in rows if sees(row.id))
+        shown = [each for each in await self.all() if self._rights.sees_folder(each.id, identity)]
+        ids = {each.id for each in shown}
+        return [
+            replace(
+                each,
+                graphs=counts[each.id],
+                parent=each.parent if each.parent in ids else None,
+                restricted=self._rights.rule_in(each.id) != OPEN,
+            )
+            for each in shown
+        ]
+
     async def require(self, folder: str) -> None:
         """Raise NotFound unless there is a folder with this id."""
         _one(await self._known(), folder)
@@ -68,7 +94,7 @@ class Folders:
             if len(known) >= COUNT_LIMIT:
                 raise Conflict(f"There are {COUNT_LIMIT} folders already.")
             made = Folder(random_id(), name, parent)
-            _check_place(known, made)
+            self._check_place(known, made)
             await self._append(h.FOLDER_MADE, author, h.FolderState(made.id, name, parent))
         return made
 
@@ -86,12 +112,15 @@ class Folders:
         there."""
         async with self._changing:
             known = await self._known()
-            return await self._change(known, replace(_one(known, folder), parent=parent), author)
+            moved = replace(_one(known, folder), parent=parent)
+            await self._check_rule("folder", folder, parent, keeps=True)
+            return await self._change(known, moved, author)
 
     async def remove(self, folder: str, author: str) -> None:
         """Remove a folder. Its graphs and folders move into the folder around it."""
         async with self._changing:
             gone = _one(await self._known(), folder)
+            await self._check_rule("folder", folder, gone.parent)
             body = h.FolderRemoved(gone.id, gone.parent)
             await self._append(h.FOLDER_REMOVED, author, body)
 
@@ -111,13 +140,42 @@ class Folders:
             if folder is not None:
                 await self.require(folder)
             if rows[0].folder != folder:
+                await self._check_rule("graph", graph, folder, keeps=True)
                 filed = h.draft(h.FILED, author, h.GraphFiled(folder))
                 await self._journal.append(h.about_stream(graph), [filed])
+                await self._rights.refresh()
+
+    async def _check_rule(
+        self, kind: Literal["graph", "folder"], thing: str, into: str | None, *, keeps: bool = False
+    ) -> None:
+        """Raise Forbidden if a change of place would change who may see or edit something, since
+        only owners decide that. `into`: the folder into which a thing, or the contents of a folder,
+        go. `keeps`: the thing keeps its own rule, if it has one."""
+        own, counts = await self._rights.rules_of(kind, thing)
+        after = self._rights.rule_in(into, own if keeps else None)
+        if after != counts and not self._rights.caller_is_owner():
+            raise Forbidden("Other people would then see or edit it. Ask an owner to do this.")
+
+    def _check_place(self, known: Mapping[str, Folder], now: Folder) -> None:
+        """Check that a folder may have this name and place. Raise NotFound if its parent does not
+        exist, Conflict if it would lie in itself or too deep, or if a folder beside it that the
+        person sees is called alike."""
+        above = _way(known, now.parent)
+        if now.id in above:
+            raise Conflict("A folder cannot lie in itself.")
+        if len(above) + _height(known, now.id) > DEPTH_LIMIT:
+            raise Conflict(f"At most {DEPTH_LIMIT} folders lie in one another.")
+        beside = (
+            each for each in known.values() if each.parent == now.parent and each.id != now.id
+        )
+        alike = (each for each in beside if each.name.casefold() == now.name.casefold())
+        if any(self._rights.caller_sees_folder(each.id) for each in alike):
+            raise Conflict("A folder of this name is there already.", where={"path": "/name"})
 
     async def _change(self, known: Mapping[str, Folder], now: Folder, author: str) -> Folder:
         """Store the new name or place of a folder (`now`), if it differs from the present one;
         return the folder. `known`: all folders by id."""
-        _check_place(known, now)
+        self._check_place(known, now)
         if known[now.id] != now:
             body = h.FolderState(now.id, now.name, now.parent)
             await self._append(h.FOLDER_CHANGED, author, body)
@@ -128,6 +186,7 @@ class Folders:
 
     async def _append(self, kind: str, author: str, body: msgspec.Struct) -> None:
         await self._journal.append(h.FOLDERS, [h.draft(kind, author, body)])
+        await self._rights.refresh()
 
 
 def fit_name(name: str) -> str:
@@ -147,20 +206,6 @@ def _one(known: Mapping[str, Folder], folder: str) -> Folder:
     if folder not in known:
         raise NotFound(f"There is no folder {folder!r}.")
     return known[folder]
-
-
-def _check_place(known: Mapping[str, Folder], now: Folder) -> None:
-    """Raise NotFound if the parent of the folder `now` does not exist, Conflict if the folder would
-    lie in itself or too deep, or if a folder beside it has the same name. `known`: all folders by
-    id."""
-    above = _way(known, now.parent)
-    if now.id in above:
-        raise Conflict("A folder cannot lie in itself.")
-    if len(above) + _height(known, now.id) > DEPTH_LIMIT:
-        raise Conflict(f"At most {DEPTH_LIMIT} folders lie in one another.")
-    beside = (each for each in known.values() if each.parent == now.parent and each.id != now.id)
-    if any(each.name.casefold() == now.name.casefold() for each in beside):
-        raise Conflict("A folder of this name is there already.", where={"path": "/name"})
 
 
 def _way(known: Mapping[str, Folder], folder: str | None) -> list[str]:

@@ -2,19 +2,19 @@
 
 import logging
 import sys
-from collections.abc import Iterable
+from collections.abc import Awaitable, Callable, Iterable
 from hashlib import sha256
 from typing import Final
 
 import msgspec
 
-from action_assistant.editor.catalogue.graph_names import GraphNames
+from action_assistant.editor.catalogue.graph_names import GraphNames, NamedGraph
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents, document
 from action_assistant.editor.documents.contents import Counts, GraphAtSeq, GraphInfo, Inside
 from action_assistant.editor.log.graph_events import DocumentKind, graph_stream
 from action_assistant.editor.rooms.open_rooms import Rooms
-from action_assistant.errors import NotFound, Refused
+from action_assistant.errors import Forbidden, NotFound, Refused
 from action_assistant.journal.journal import Journal
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.umrf.problem_kinds import ProblemCounts
@@ -71,26 +71,44 @@ class _Member(msgspec.Struct, frozen=True):
 class NamedInside(msgspec.Struct, frozen=True):
     """The graphs inside of a graph, by name, on which a check depends, too. `several`: names that
     several graphs have; `cut`: more graphs are inside than listed; `hidden`: names that an
-    action of the library has, too."""
+    action of the library has, too; `unseen`: graphs are left out that the person may not see."""
 
     members: tuple[_Member, ...] = ()
     several: tuple[str, ...] = ()
     cut: bool = False
     hidden: tuple[str, ...] = ()
+    unseen: bool = False
 
     def __bool__(self) -> bool:
         """Return whether a result depends on any graph inside."""
-        return bool(self.members or self.hidden)
+        return bool(self.members or self.hidden or self.unseen)
 
     def key(self) -> bytes:
         """Return a digest that is equal for equal graphs after equal changes; empty without any."""
         return sha256(msgspec.msgpack.encode(self)).digest() if self else b""
 
 
+HIDDEN_INSIDE: Final = (
+    "An action of this graph stands for a graph that you may not see. Ask somebody who may see it."
+)
+
+
+async def sees_every_graph(_: str) -> bool:
+    """Return that the caller may see a graph, whichever it is."""
+    return True
+
+
 class GraphChecks:
     """Checks graphs, with the graphs inside of them. All that it stores is a cache."""
 
-    def __init__(self, journal: Journal, rooms: Rooms, reader: GraphReader) -> None:
+    def __init__(
+        self,
+        journal: Journal,
+        rooms: Rooms,
+        reader: GraphReader,
+        caller_sees: Callable[[str], Awaitable[bool]] = sees_every_graph,
+    ) -> None:
+        self.caller_sees: Final = caller_sees
         self._rooms = rooms
         self._reader = reader
         self.names: Final = GraphNames(journal, self._name)
@@ -109,31 +127,51 @@ class GraphChecks:
         key = sight.graph, sight.seq, named.key()
         found = self._problems.get(key)
         if found is None:
-            inside = await self._seen(named)
+            inside = await self._seen(named, partly=True)
             found = await self._reader.ask(contents.problems, sight, inside)
             self._problems.put(key, found)
         return found
 
-    async def inside(self, *moments: GraphAtSeq, more: Iterable[str] = ()) -> Inside:
+    async def inside(
+        self, *moments: GraphAtSeq, more: Iterable[str] = (), partly: bool = False
+    ) -> Inside:
         """Return the graphs inside of a graph, in their present state. The names of its actions are
-        read from the graph at each of `moments`, and the names in `more` are added."""
+        read from the graph at each of `moments`, and the names in `more` are added. Raise Forbidden
+        if the person may not see one of the graphs; with `partly` these are left out."""
         await self.names.refresh()
         known = [await self._names_at(each) for each in moments]
         uses = [name for _, each in known for name in each]
-        return await self._seen(await self._resolved(known[0][0], (*uses, *more)))
+        named = await self._resolved(known[0][0], (*uses, *more))
+        return await self._seen(named, partly=partly)
 
-    async def inside_of(self, graph: str, uses: Iterable[str]) -> Inside:
+    async def inside_of(self, graph: str, uses: Iterable[str], *, partly: bool = False) -> Inside:
         """Return the graphs inside of a graph with the name `graph`, whose actions have the names
-        `uses`."""
+        `uses`. Raise Forbidden as `inside` does."""
         await self.names.refresh()
-        return await self._seen(await self._resolved(graph, uses))
+        return await self._seen(await self._resolved(graph, uses), partly=partly)
+
+    async def is_taken(self, name: str) -> bool:
+        """Return whether an action of the library, or a graph that the person may see, has this
+        name."""
+        await self.names.refresh()
+        graphs = self.names.called(name)
+        if not graphs or self.names.is_hidden(name):
+            return self.names.is_taken(name)
+        return any([await self.caller_sees(graph) for graph in graphs])
+
+    async def named(self, name: str) -> NamedGraph | None:
+        """Return the graph that an action of this name stands for; None if there is none that the
+        person may see."""
+        await self.names.refresh()
+        known = self.names.graph(name)
+        return known if known is not None and await self.caller_sees(known.graph) else None
 
     async def digest(self, name: str) -> str | None:
         """Return the digest of the graph that an action of this name stands for now. Return None if
         the name stands for no graph, or if the graph cannot be read."""
         await self.names.refresh()
         known = await self._standing_for(name)
-        if known is None:
+        if known is None or not await self.caller_sees(known[0].graph):
             return None
         key = known[0].graph, known[0].seq
         found = self._digests.get(key)
@@ -180,7 +218,7 @@ class GraphChecks:
     ) -> tuple[Counts, ProblemCounts]:
         key, known = named.key(), self._counts.get(graph)
         if known is None or known[:2] != (seq, key):
-            sight, inside = await self._sight(graph, seq), await self._seen(named)
+            sight, inside = await self._sight(graph, seq), await self._seen(named, partly=True)
             found = await self._reader.ask(contents.counted, sight, inside)
             known = self._counts.put(graph, (seq, key, *found))
         return known[2:]
@@ -234,7 +272,7 @@ class GraphChecks:
         ordinary action, since no engine runs a graph inside itself."""
         found: dict[str, _Member] = {}
         hidden: set[str] = set()
-        level, actions, cut = [(own, uses)], 0, False
+        level, actions, cut, unseen = [(own, uses)], 0, False, False
         while level:
             below: list[tuple[str, Iterable[str]]] = []
             for graph, names in level:
@@ -246,6 +284,9 @@ class GraphChecks:
                     about = await self._standing_for(name)
                     if about is None:
                         continue
+                    if not await self.caller_sees(about[0].graph):
+                        unseen = True
+                        continue
                     if len(found) >= _INSIDE or actions + about[1].actions > BUDGET:
                         cut = True
                         continue
@@ -255,7 +296,7 @@ class GraphChecks:
             level = below
         members = tuple(found[name] for name in sorted(found))
         several = tuple(each.name for each in members if self.names.is_ambiguous(each.name))
-        return NamedInside(members, several, cut, tuple(sorted(hidden)))
+        return NamedInside(members, several, cut, tuple(sorted(hidden)), unseen)
 
     async def _standing_for(self, name: str) -> tuple[_Member, GraphInfo] | None:
         known = self.names.graph(name)
@@ -269,9 +310,11 @@ class GraphChecks:
             return None
         return _Member(name, known.graph, about.seq), about.info
 
-    async def _seen(self, named: NamedInside) -> Inside:
+    async def _seen(self, named: NamedInside, *, partly: bool = False) -> Inside:
+        if named.unseen and not partly:
+            raise Forbidden(HIDDEN_INSIDE)
         graphs = [(each.name, await self._sight(each.graph, each.seq)) for each in named.members]
-        return Inside(tuple(graphs), named.several, named.cut, named.hidden)
+        return Inside(tuple(graphs), named.several, named.cut, named.hidden, named.unseen)
 
     async def _sight(self, graph: str, seq: int) -> GraphAtSeq:
         """Return a graph after its change `seq`, or in its newest readable state if its history is

@@ -85,6 +85,10 @@ class GraphNames:
         """Return whether a graph has this name and an action of the library too; then the action counts."""
         return bool(self._actions[name]) and name in self._graphs
 
+    def called(self, name: str) -> list[str]:
+        """Return the ids of the graphs with this name, the oldest first."""
+        return [graph for _, graph in self._graphs.get(name, ())]
+
     def is_taken(self, name: str) -> bool:
         """Return whether a graph or an action of the library has this name."""
         return name in self._graphs or bool(self._actions[name])

@@ -6,11 +6,11 @@ from typing import Any, Final
 import msgspec
 from sqlalchemy import Connection, Row, Select, select
 
-from action_assistant.editor.catalogue.graph_checks import GraphChecks
+from action_assistant.editor.catalogue.graph_checks import HIDDEN_INSIDE, GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents
 from action_assistant.editor.log import graph_events as h
-from action_assistant.errors import BadInput, NotFound, TooLarge
+from action_assistant.errors import BadInput, Forbidden, NotFound, TooLarge
 from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
@@ -126,6 +126,13 @@ class Versions:
         )
         return await self.get(made), True
 
+    async def graphs_in(self, version: str) -> tuple[str, tuple[str, ...]]:
+        """Return the digest of a version with all graphs inside, and the ids of its graph and of
+        these. Raise NotFound for an unknown version."""
+        row, published = await self._published(version)
+        inside = (each.graph for each in published.subgraphs)
+        return row.tree_digest or row.digest, tuple(dict.fromkeys((row.graph, *inside)))
+
     async def inside(self, graph: str, seq: int | None) -> InsideView:
         """Return the graphs that publishing a graph at its change `seq` (None: the newest) would
         include. Raise NotFound for an unknown graph, Conflict for an unknown change, Unavailable if
@@ -144,6 +151,13 @@ class Versions:
     async def get(self, version: str) -> VersionView:
         """Return one version with its UMRF and its pinned sub-graphs. Raise NotFound if there is
         none with this id."""
+        row, published = await self._published(version)
+        subgraphs = tuple([await self._shown(each) for each in published.subgraphs])
+        return msgspec.structs.replace(_view(row), umrf=published.umrf, subgraphs=subgraphs)
+
+    async def _published(self, version: str) -> tuple[Row[Any], h.VersionPublished]:
+        """Return the row of a version and its event. Raise NotFound if there is none with this id,
+        Forbidden if the person may not see a graph inside."""
         chosen = select(editor_tables.version).where(editor_tables.version.c.id == version)
         rows = await self._journal.query(chosen)
         if not rows:
@@ -151,8 +165,9 @@ class Versions:
         row = rows[0]
         (event,) = await self._journal.read(row.stream, after=row.event_seq - 1, upto=row.event_seq)
         published = msgspec.json.decode(event.body, type=h.VersionPublished)
-        subgraphs = tuple([await self._shown(each) for each in published.subgraphs])
-        return msgspec.structs.replace(_view(row), umrf=published.umrf, subgraphs=subgraphs)
+        if not all([await self._checks.caller_sees(each.graph) for each in published.subgraphs]):
+            raise Forbidden(HIDDEN_INSIDE)
+        return row, published
 
     async def of(self, graph: str) -> list[VersionView]:
         """Return the versions of a graph, newest first, without their UMRF."""

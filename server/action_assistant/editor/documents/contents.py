@@ -40,12 +40,13 @@ class Inside(msgspec.Struct, frozen=True):
     """The graphs inside of a graph, by the names of the actions that stand for them, each at one
     seq (docs/decisions/070-one-truth-for-sub-graphs.md). `several`: names that several graphs
     have; `cut`: more graphs are inside than listed; `hidden`: names that an action of the
-    library has, too."""
+    library has, too; `unseen`: graphs are left out that the person may not see."""
 
     graphs: tuple[tuple[str, GraphAtSeq], ...] = ()
     several: tuple[str, ...] = ()
     cut: bool = False
     hidden: tuple[str, ...] = ()
+    unseen: bool = False
 
     @property
     def key(self) -> tuple[object, ...]:

@@ -110,9 +110,9 @@ _WHOLE: Final[Mapping[str, Kind]] = {
 
 class TakenFrom(msgspec.Struct, frozen=True):
     """The document whose parameters were taken over, "" for a file, its change then, and the name of
-    the action."""
+    the action. `document`: null for a graph that the person who asks may not see."""
 
-    document: str
+    document: str | None
     seq: int
     action: str
 
@@ -177,6 +177,18 @@ class GraphHistory:
         if last := await self._index.value(last_edit_of, graph, limit, before):
             await self._index.upto(graph, last)
         return await self._index.text(history_of, graph, limit, before)
+
+
+def without_hidden(entries: bytes, sees: Callable[[str], bool]) -> bytes:
+    """Return entries of a history (JSON) without the ids of graphs to which `sees` says no."""
+    if b'"adapted":' not in entries:
+        return entries
+    found: list[dict[str, Any]] = msgspec.json.decode(entries)
+    sources = [entry["adapted"] for entry in found if "adapted" in entry]
+    for source in sources:
+        if source["document"] and not sees(source["document"]):
+            source["document"] = None
+    return msgspec.json.encode(found)
 
 
 def history_of(

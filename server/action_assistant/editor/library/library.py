@@ -3,7 +3,7 @@
 Actions are made, imported, updated from graphs, and graphs updated from them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 from typing import Any, Final
 
@@ -14,6 +14,7 @@ from sqlalchemy import select
 
 from action_assistant.editor.catalogue.catalogue import Catalogue, GraphView, fit
 from action_assistant.editor.catalogue.graph_reader import GraphReader
+from action_assistant.editor.catalogue.graph_rights import Sees, sight_of_everything
 from action_assistant.editor.documents.contents import GraphAtSeq
 from action_assistant.editor.documents.document import new_aid
 from action_assistant.editor.library import library_updates
@@ -46,7 +47,13 @@ class Library:
     """Lists the actions of the library and of graphs. A document is read again only when it has
     changed."""
 
-    def __init__(self, journal: Journal, graph_reader: GraphReader) -> None:
+    def __init__(
+        self,
+        journal: Journal,
+        graph_reader: GraphReader,
+        caller_sight: Callable[[], Awaitable[Sees]] = sight_of_everything,
+    ) -> None:
+        self._caller_sight = caller_sight
         self._journal = journal
         self._graph_reader = graph_reader
         self._read: dict[str, tuple[int, bytes]] = {}
@@ -54,18 +61,22 @@ class Library:
         self._shown: dict[_Listing, tuple[dict[str, int], bytes]] = {}
 
     async def all(self) -> bytes:
-        """Return all actions, sorted by name: the JSON of a list of `LibraryAction`. Documents that
-        cannot be read are skipped."""
+        """Return all actions, sorted by name: the JSON of a list of `LibraryAction`, of the
+        documents that the person may see. Documents that cannot be read are skipped."""
         return await self._listed(merged)
 
     async def graphs(self) -> bytes:
-        """Return every graph as the action that stands for it: the JSON of a list of
-        `GraphAsAction`."""
+        """Return every graph that the person may see as the action that stands for it: the JSON of a
+        list of `GraphAsAction`."""
         return await self._listed(as_actions)
 
     async def _listed(self, listing: _Listing) -> bytes:
+        sees = await self._caller_sight()
         async with self._reading:  # what one request reads the next one has
-            sources = await self._sources()
+            every = await self._sources()
+            sources = [each for each in every if sees(each[0].document)]
+            if len(sources) < len(every):
+                return await self._graph_reader.ask(listing, sources)
             seqs = {source.document: source.seq for source, _ in sources}
             before = self._shown.get(listing)
             if before is None or before[0] != seqs:
@@ -167,7 +178,8 @@ class LibraryEdits:
         self._making = anyio.Lock()
 
     async def create(self, body: bytes, author: str) -> tuple[GraphView, bytes | None]:
-        """Create the document of an action from a `NewAction` or from a file (`body`). Return it
+        """Create the document of an action from a `NewAction` or from a file (`body`). Only graphs
+        that the person sees are used for its parameters. Return it
         and, for a file, the JSON of an `ImportReport`, else None. Raise BadInput, NotUmrf or
         TooLarge, with the place, for a bad file; Conflict for a taken name; NotFound if no graph
         uses the action."""
@@ -213,7 +225,7 @@ class LibraryEdits:
 
     async def uses(self, action: str, renames: Renames) -> tuple[int, bytes]:
         """Return the number of the action's last change, and the JSON of a list of `ActionUse` for
-        it. `renames`: parameters that were renamed."""
+        it, of the graphs that the person sees. `renames`: parameters that were renamed."""
         sight = await self._graph_reader.now(action)
         name = (await self._catalogue.get(action)).name
         graphs = await self._using(name)
@@ -331,8 +343,8 @@ class LibraryEdits:
         return UpdatedGraph(document, seq, seq > before)
 
     async def _using(self, name: str) -> list[GraphAtSeq]:
-        """Return the graphs that use the action of this name, in their present state, the last
-        changed first."""
+        """Return the graphs that use the action of this name and that the person sees, in their
+        present state, the last changed first."""
         known = msgspec.json.decode(await self._library.all(), type=list[LibraryAction])
         used_in = {graph for each in known if each.name == name for graph in each.used_in}
         views = [view for view in await self._catalogue.all() if view.id in used_in]

@@ -18,6 +18,7 @@ from action_assistant.journal.events import Draft, Event
 from action_assistant.kit.moments import moment
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth.caller import stamped
+from action_assistant.web.auth.graph_rules import Rule
 from action_assistant.web.auth.roles import Role
 
 UPDATED: Final = "graph.updated.v1"  # the body is the Yjs update as it came
@@ -55,6 +56,8 @@ FILED: Final = "graph.filed.v1"
 FOLDER_MADE: Final = "folder.made.v1"
 FOLDER_CHANGED: Final = "folder.changed.v1"
 FOLDER_REMOVED: Final = "folder.removed.v1"
+RULED: Final = "graph.ruled.v1"
+FOLDER_RULED: Final = "folder.ruled.v1"
 
 PEOPLE: Final = "people"
 INVITATIONS: Final = "invitations"
@@ -223,6 +226,20 @@ class FolderRemoved(msgspec.Struct, frozen=True):
     into: str | None
 
 
+class GraphRuled(msgspec.Struct, frozen=True):
+    """An owner said who may see and edit the graph; None: as its folder says."""
+
+    rule: Rule | None
+
+
+class FolderRuled(msgspec.Struct, frozen=True):
+    """An owner said who may see and edit the graphs in the folder `id`; None: as the folder around
+    it says."""
+
+    id: str
+    rule: Rule | None
+
+
 class PersonNamed(msgspec.Struct, frozen=True):
     """The author of the event has this name from now on."""
 
@@ -327,6 +344,9 @@ def _folder(event: Event) -> Sequence[Executable]:
             now = _read(event, FolderState)
             this = update(folder).where(folder.c.id == now.id)
             return [this.values(name=now.name, parent=_existing(now.parent))]
+        case "folder.ruled.v1":
+            ruled = _read(event, FolderRuled)
+            return [update(folder).where(folder.c.id == ruled.id).values(rule=_text(ruled.rule))]
         case "folder.removed.v1":
             gone = _read(event, FolderRemoved)
             into = _existing(gone.into)
@@ -337,6 +357,10 @@ def _folder(event: Event) -> Sequence[Executable]:
             ]
         case _:
             return ()
+
+
+def _text(rule: Rule | None) -> str | None:
+    return None if rule is None else msgspec.json.encode(rule).decode()
 
 
 def _existing(folder: str | None) -> ScalarSelect[str]:
@@ -406,6 +430,8 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
             return [this.values(**of, **base, drafted_seq=drafted.seq)]
         case "graph.filed.v1":
             return [this.values(folder=_existing(_read(event, GraphFiled).folder))]
+        case "graph.ruled.v1":
+            return [this.values(rule=_text(_read(event, GraphRuled).rule))]
         case "graph.merged.v1":
             return _merged(_read(event, GraphMerged))
         case "graph.deleted.v1":

@@ -11,6 +11,7 @@ from action_assistant.editor.crdt import messages
 from action_assistant.editor.rooms.presence import NOBODYS, PresenceNews, PresenceOwner
 from action_assistant.kit.token_bucket import Clock, TokenBucket, TokenBuckets
 from action_assistant.web.auth.caller import Origin
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.server.direct import framed
 
@@ -66,8 +67,10 @@ class Member:
         acks: bool = False,
         colour: str = NOBODYS,
         origin: Origin | None = None,
+        identity: Identity | None = None,
     ) -> None:
         self.person: Final = person
+        self.identity: Final = identity  # asked again when rights on the graph change
         self.origin: Final = origin
         self.presence_owner: Final = PresenceOwner(person, colour)
         self.edits = edits

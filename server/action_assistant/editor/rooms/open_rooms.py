@@ -1,7 +1,7 @@
 """The rooms that are open. Each is loaded once, kept while somebody uses it, and unloaded some seconds later."""
 
 import asyncio
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Final
 
@@ -12,6 +12,7 @@ from action_assistant.editor.rooms.room import Room, RoomMetrics
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
 from action_assistant.web.auth.caller import outlive_connection
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 LINGER: Final = 5.0  # seconds that a room stays after the last one left
@@ -100,6 +101,23 @@ class Rooms:
         room = self._rooms.get(stream)
         for member in list(room.members) if room is not None else []:
             member.close(messages.NO_SUCH_GRAPH)
+
+    def put_out(
+        self,
+        stream: str,
+        may_see: Callable[[Identity], bool],
+        may_edit: Callable[[Identity], bool],
+    ) -> None:
+        """Close the sockets of those who may no longer see the graph with this stream. The sockets
+        of those who may no longer edit it are closed so that they come back as viewers."""
+        room = self._rooms.get(stream)
+        for member in list(room.members) if room is not None else []:
+            if member.identity is None:
+                continue
+            if not may_see(member.identity):
+                member.close(messages.NO_SUCH_GRAPH)
+            elif member.edits and not may_edit(member.identity):
+                member.close(messages.RESTARTING)
 
     def readmit(self, stream: str) -> None:
         """Admit sockets to the graph of this stream again, since it was recovered."""

@@ -64,6 +64,7 @@ _CALLS: Final = frozenset({"http", "websocket"})
 _SAFE: Final = frozenset({"GET", "HEAD", "OPTIONS"})
 _STOPS: Final = re.compile(r"/api/stop|/api/(runs|robots)/[^/]+/stop")
 _LIVE: Final = "/api/live"
+_EVENTS: Final = "/api/events"
 _GOODBYE: Final = 1.0  # seconds that a close frame gets
 _POLICY: Final = b"content-security-policy"
 #: Stands for the program with the token for scraping, which reads the metrics only.
@@ -321,7 +322,11 @@ class Access:
             over = message["type"] == "websocket.close" or message.get("more_body") is False
             await send(message)
 
-        with self._leashes.hold(credential, outlives=scope["path"] == _LIVE) as leash:
+        # What is shown for long shows only what the person may still see; a request goes on.
+        is_stream = scope["type"] == ScopeType.WEBSOCKET or scope["path"] == _EVENTS
+        with self._leashes.hold(
+            credential, outlives=scope["path"] == _LIVE, follows_groups=is_stream
+        ) as leash:
             try:
                 await self._app(scope, receive, sent)
                 if not leash.is_cut:
@@ -526,7 +531,7 @@ def _caller(identity: Identity, receive: Receive | None) -> Caller:
         token=own if token is None else token.id,
         address=identity.address,
     )
-    return Caller(identity.person.id, receive, identity.device, origin)
+    return Caller(identity.person.id, receive, identity.device, origin, identity)
 
 
 def client_address(scope: HTTPScope | WebSocketScope) -> str:

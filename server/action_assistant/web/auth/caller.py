@@ -19,6 +19,8 @@ from action_assistant.errors import Refused
 if TYPE_CHECKING:
     from litestar.types import Receive
 
+    from action_assistant.web.auth.identity import Identity
+
 
 #: The field of an event's body that holds its `Origin`.
 _FIELD: Final = "from"
@@ -69,6 +71,7 @@ class Caller(NamedTuple):
     receive: "Receive | None" = None  # a socket's messages are not ours to read
     device: str = ""
     origin: Origin | None = None
+    identity: "Identity | None" = None  # None for work of the server itself
 
     async def gone(self) -> None:
         """Wait until the client has disconnected. Call it only after the request body was read."""

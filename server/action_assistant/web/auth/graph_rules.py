@@ -1,11 +1,12 @@
 """Rules that say who may see and who may edit graphs, and how folders pass them on. Pure."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
 
 import msgspec
 
 from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.keys import Person
 from action_assistant.web.auth.roles import OWNER
 
 _Id: TypeAlias = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z0-9_-]{1,40}$")]
@@ -26,6 +27,8 @@ class Rule(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 #: The rule of a graph for which nobody has made one, itself or by a folder.
 OPEN: Final = Rule("all", "all")
+#: The rule of what cannot be judged: for owners only.
+CLOSED: Final = Rule((), ())
 
 
 class RuledFolder(NamedTuple):
@@ -57,6 +60,45 @@ def rule_at(own: Rule | None, folder: str | None, folders: Mapping[str, RuledFol
         passed.add(folder)
         folder, own = folders[folder]
     return OPEN if own is None else own
+
+
+def combined(rules: Iterable[Rule]) -> Rule:
+    """Return a rule for what is made of several graphs with these rules: whoever it names may see,
+    or edit, all of them."""
+    every = tuple(rules)
+    readers = _common(_all_readers(rule) for rule in every)
+    editors = _common(
+        _all_readers(rule) if rule.editors == "all" else rule.editors for rule in every
+    )
+    return Rule(readers, "all" if editors == readers else editors)
+
+
+def with_person(rule: Rule, person: str) -> Rule:
+    """Return a rule by which this person may edit, too."""
+    named = Identity(Person(person, "", "editor"))
+    if may_edit(rule, named) or rule.editors == "all" == rule.readers:
+        return rule
+    editors = rule.readers if rule.editors == "all" else rule.editors
+    return Rule(rule.readers, (*(() if editors == "all" else editors), person))
+
+
+def _all_readers(rule: Rule) -> Who:
+    """Return everybody who may see a graph with this rule, beside owners."""
+    if rule.readers == "all" or rule.editors == "all":
+        return rule.readers
+    return tuple(dict.fromkeys((*rule.readers, *rule.editors)))
+
+
+def _common(whos: Iterable[Who]) -> Who:
+    """Return who stands in all of these; not more, where a person stands in one and their group in
+    another."""
+    found: Who = "all"
+    for who in whos:
+        if found == "all":
+            found = who
+        elif who != "all":
+            found = tuple(each for each in found if each in who)
+    return found
 
 
 def _names(who: Who, identity: Identity) -> bool:

@@ -212,7 +212,8 @@ def _checked(text: str, kind: str) -> str:
 
 
 class SessionGuard:
-    """Guards one open socket or stream of a session or token; cancels it when that ends."""
+    """Guards one request, socket or stream of a session or token; cancels it when that ends, or when
+    the rights of its person change."""
 
     def __init__(
         self,
@@ -221,26 +222,33 @@ class SessionGuard:
         standing: Callable[[Credential], Standing],
         *,
         outlives: bool,
+        follows_groups: bool,
     ) -> None:
         self.is_cut = False
         self._standing = standing
-        self._role = standing(credential).person.role
+        self._first = standing(credential)
+        self._follows_groups = follows_groups
         self._looks = 0
         self._credential = credential
         self._task = task
         self._outlives = outlives
 
     def look(self, ends: Callable[[Credential], bool]) -> None:
-        """Cut it if the session or token has ended, or its person has another role by now: with
-        that one the client comes back at once."""
+        """Cut it if the session or token has ended, or its person has other rights by now: with
+        these the client comes back at once."""
         over = ends(self._credential)
         self._looks += 1
         if not over and self._looks % _STANDING_EACH == 0:
             standing = self._standing(self._credential)
-            over = (standing.expired and not self._outlives) or standing.person.role != self._role
+            over = (standing.expired and not self._outlives) or self._has_other_rights(standing)
         if over and not self.is_cut:
             self.is_cut = True
             self._task.cancel()
+
+    def _has_other_rights(self, now: Standing) -> bool:
+        if now.person.role != self._first.person.role:
+            return True
+        return self._follows_groups and now.groups != self._first.groups
 
     def let_go(self) -> None:
         """Undo the cancellation of the task by this guard, so that the task can go on."""
@@ -260,13 +268,22 @@ class SessionGuards:
         self._watch: asyncio.Task[None] | None = None
 
     @contextmanager
-    def hold(self, credential: Credential, *, outlives: bool = False) -> Iterator[SessionGuard]:
-        """Cancel the current task when the session or token ends. `outlives`: not when it merely
-        expires."""
+    def hold(
+        self, credential: Credential, *, outlives: bool = False, follows_groups: bool = False
+    ) -> Iterator[SessionGuard]:
+        """Cancel the current task when the session or token ends, or its person has another role.
+        `outlives`: not when it merely expires; `follows_groups`: also when the person has other
+        groups."""
         task = asyncio.current_task()
         if task is None:
             raise RuntimeError("only a task can be cancelled")
-        leash = SessionGuard(credential, task, self._standing, outlives=outlives)
+        leash = SessionGuard(
+            credential,
+            task,
+            self._standing,
+            outlives=outlives,
+            follows_groups=follows_groups,
+        )
         self._held.add(leash)
         if self._watch is None or self._watch.done():
             self._watch = asyncio.create_task(self._looking(), name="leashes")
