@@ -51,6 +51,15 @@ VARIABLES: Final[Mapping[str, str]] = {
     "`owner=12h/7d,operator=3d/30d` (owner=7d/30d, operator=14d/30d, others 30d/30d)",
     "ACTION_ASSISTANT_FRAME_ORIGINS": "sites that may show links to one graph or run in a frame, such as "
     "`https://wiki.lab.example`, comma separated (none)",
+    "ACTION_ASSISTANT_OIDC_ISSUER": "the OpenID Connect provider by which people may sign in, such as "
+    "https://login.example.org/realms/lab",
+    "ACTION_ASSISTANT_OIDC_CLIENT_ID": "the name of this program at that provider",
+    "ACTION_ASSISTANT_OIDC_CLIENT_SECRET": "its secret there, unless it is a public client",
+    "ACTION_ASSISTANT_OIDC_CLIENT_SECRET_FILE": "a file with that secret",
+    "ACTION_ASSISTANT_OIDC_GROUPS": "the roles of the provider's groups, such as "
+    "`robot-admins=owner,lab=operator,*=viewer`; `*` is everybody. Nobody else comes in",
+    "ACTION_ASSISTANT_OIDC_GROUPS_CLAIM": "the claim with the groups of a person (groups)",
+    "ACTION_ASSISTANT_OIDC_NAME": "the provider's name on the button (the host of the issuer)",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
     "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
     "direct one fail",
@@ -61,10 +70,12 @@ _FILES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_TOKEN_FILE": "ACTION_ASSISTANT_TOKEN",
     "ACTION_ASSISTANT_DATABASE_FILE": "ACTION_ASSISTANT_DATABASE",
     "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "ACTION_ASSISTANT_METRICS_TOKEN",
+    "ACTION_ASSISTANT_OIDC_CLIENT_SECRET_FILE": "ACTION_ASSISTANT_OIDC_CLIENT_SECRET",
     "ACTION_ASSISTANT_DATABASE_PASSWORD_FILE": "PGPASSWORD",
 }
 #: An origin as `frame-ancestors` takes it; the first part of its host may be an asterisk.
 _ORIGIN: Final = re.compile(r"https?://((\*\.)?[A-Za-z0-9.-]+|\[[0-9a-fA-F:]+\])(:\d{1,5})?")
+_OIDC: Final = "ACTION_ASSISTANT_OIDC_"
 _SECRET: Final = 65_536  # characters of such a file
 #: The folder of archives, inside the data folder.
 ARCHIVE: Final = "archive"
@@ -92,7 +103,8 @@ class Reachability(msgspec.Struct, frozen=True):
 class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     """The settings of the editor process. `database` is a URL such as `sqlite:////data/editor.db`.
     `sessions`: when sessions expire, as in ACTION_ASSISTANT_SESSIONS; `frames`: the origins of sites
-    that may show links to one thing in a frame."""
+    that may show links to one thing in a frame; `oidc`: the values of the variables
+    ACTION_ASSISTANT_OIDC_…"""
 
     data: Path
     database: str
@@ -109,6 +121,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     sessions: str = ""
     token_days: float = TOKEN_DAYS
     frames: tuple[str, ...] = ()
+    oidc: Mapping[str, str] = {}
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -331,6 +344,14 @@ def _days(name: str, environ: Mapping[str, str]) -> float | None:
     if not 0 <= days < 1e6:
         raise CannotStart(f"{name} is a number of days, not {text!r}.")
     return days
+
+
+def oidc(environ: Mapping[str, str] = os.environ) -> dict[str, str]:
+    """Return the settings of the OpenID Connect provider that are not empty, by the part of their names
+    after ACTION_ASSISTANT_OIDC_; `web/auth/provider_settings.py` reads them."""
+    names = [name for name in VARIABLES if name.startswith(_OIDC) and name not in _FILES]
+    given = {name.removeprefix(_OIDC): environ.get(name, "").strip() for name in names}
+    return {name: text for name, text in given.items() if text}
 
 
 def index_folders(

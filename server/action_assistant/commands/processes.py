@@ -220,7 +220,8 @@ def _log(process: str, options: argparse.Namespace, *secrets: str) -> None:
 def _secrets(data: Path) -> tuple[str, ...]:
     from action_assistant.web.auth.keys import Keys
 
-    return Keys.of(data).token, settings.metrics_token() or ""
+    secret = settings.oidc().get("CLIENT_SECRET", "")
+    return Keys.of(data).token, settings.metrics_token() or "", secret
 
 
 def _editor_settings(options: argparse.Namespace, data: Path) -> settings.EditorSettings:
@@ -240,6 +241,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         sessions=settings.sessions(),
         token_days=settings.token_days(),
         frames=settings.frame_origins(),
+        oidc=settings.oidc(),
     )
 
 

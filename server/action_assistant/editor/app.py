@@ -26,6 +26,7 @@ from action_assistant.editor.api import (
     library,
     members,
     packages,
+    provider,
     room,
     subgraphs,
     tokens,
@@ -36,6 +37,7 @@ from action_assistant.editor.api.graph_guard import guarded
 from action_assistant.editor.log import database_location, epochs
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.people import audit_facts
+from action_assistant.editor.people.identity_provider import IdentityProvider
 from action_assistant.editor.people.people import People
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import EditorWorkers
@@ -50,10 +52,11 @@ from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.device_codes import DeviceCodes
 from action_assistant.web.auth.keys import Keys, ScrapeToken, Session
 from action_assistant.web.auth.people_files import PeopleFiles
+from action_assistant.web.auth.provider_settings import provider_of
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.session_limits import limits_of
-from action_assistant.web.auth.sessions import session_routes
+from action_assistant.web.auth.sessions import Sessions, session_routes
 from action_assistant.web.auth.standing import Standings
 from action_assistant.web.auth.tokens import TokenFiles
 from action_assistant.web.auth.view_links import ViewLinks
@@ -154,21 +157,34 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         members = app_state.services.members
         await members.device_added(session.person.id, session.id, browser, address)
 
-    signing_in = session_routes(
+    sessions = Sessions(
         keys,
         settings.port,
+        lambda: app_state.services.reception,
+        revoked,
+        standings,
         addresses=addresses,
         limits=settings.limits,
-        reception=lambda: app_state.services.reception,
-        revoked=revoked,
-        standings=standings,
-        codes=codes,
-        device_added=device_added,
         audit=audit,
+    )
+    signing_in = session_routes(
+        sessions, revoked=revoked, standings=standings, codes=codes, device_added=device_added
+    )
+    known_at = provider_of(settings.oidc)
+    by_provider = provider.ProviderSignIn(
+        None if known_at is None else IdentityProvider(known_at),
+        app_state,
+        sessions,
+        keys,
+        settings.port,
+        addresses,
+        browsers,
+        lambda session: confirmations.confirm(session, "oidc"),
     )
     return application(
         [
             *signing_in,
+            *provider.routes(by_provider),
             *_routes(app_state, addresses, browsers),
             *devices.routes(codes, browsers, addresses, audit),
             *tokens.routes(app_state, token_files, limits=settings.limits),

@@ -135,8 +135,9 @@ key_change_head: Final = Table(
     Column("document", LargeBinary, nullable=False),
     Column("form", BigInteger),
 )
-#: A person for whom an owner has made a personal link. `groups`: ids of groups, as JSON. `until`: when the
-#: right to do more than Stop ends.
+#: A person for whom an owner has made a personal link, or who came by a provider. `groups`: ids of groups,
+#: as JSON. `until`: when the right to do more than Stop ends. `provider`: as whom the provider knows them,
+#: as JSON.
 member: Final = Table(
     "member",
     EDITOR,
@@ -149,6 +150,7 @@ member: Final = Table(
     Column("made_by", Text, nullable=False),
     Column("ended_at", BigInteger),
     Column("ended_by", Text),
+    Column("provider", Text),
 )
 #: A personal link, which lets one browser in, once, before `expires`; and by which browser it was used.
 personal_link: Final = Table(

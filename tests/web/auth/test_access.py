@@ -25,7 +25,7 @@ from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role
 from action_assistant.web.auth.session_files import SessionFiles
-from action_assistant.web.auth.sessions import Invited, session_routes
+from action_assistant.web.auth.sessions import Invited, Sessions, session_routes
 from action_assistant.web.auth.standing import Standings
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.application import application
@@ -91,9 +91,7 @@ def served(folder: Path) -> Iterator[int]:
     browsers = SessionFiles(folder, revoked)
     standings = Standings(PeopleFiles(folder), browsers)
     sessions = session_routes(
-        KEYS,
-        port,
-        reception=Nobody,
+        Sessions(KEYS, port, Nobody, revoked, standings),
         revoked=revoked,
         standings=standings,
         codes=DeviceCodes(),

@@ -234,6 +234,16 @@ export interface EditorApi {
         errors: EditorApi["BuildFault"][];
     };
     /**
+     * ByProvider
+     * @description The provider by which a person signs in, and the role that its groups give there: owners may
+     *     give a lower one.
+     */
+    ByProvider: {
+        issuer: string;
+        /** @enum {string} */
+        role: "editor" | "operator" | "owner" | "viewer";
+    };
+    /**
      * CalledUses
      * @description The graphs in which actions were renamed, each by one edit.
      */
@@ -1247,7 +1257,7 @@ export interface EditorApi {
      * Member
      * @description A person as owners see them. `groups`: ids. `until`: when the right to do more than Stop ends.
      *     `links`: the newest first, for owners only. `unrecorded`: that the person is ended is not in
-     *     the log yet.
+     *     the log yet. `provider`: null for a person who comes by personal links only.
      */
     Member: {
         id: string;
@@ -1265,6 +1275,7 @@ export interface EditorApi {
         unrecorded?: boolean;
         /** @default [] */
         links?: EditorApi["PersonalLink"][];
+        provider?: EditorApi["ByProvider"];
     };
     /**
      * MemberChange
@@ -1783,6 +1794,56 @@ export interface EditorApi {
     Proposing: {
         /** @default  */
         note?: string;
+    };
+    /**
+     * ProviderAnswer
+     * @description The parameters with which the provider sent the browser back, as they stand in the address.
+     */
+    ProviderAnswer: {
+        state: string;
+        /** @default null */
+        code?: string | null;
+        /** @default null */
+        iss?: string | null;
+        /** @default null */
+        error?: string | null;
+        /** @default null */
+        error_description?: string | null;
+    };
+    /**
+     * ProviderBegin
+     * @description The request to sign in by the provider. `goal`: the path of the page to be shown afterwards.
+     *     `again`: the person is signed in, and proves that it is they.
+     */
+    ProviderBegin: {
+        /** @default / */
+        goal?: string;
+        /** @default false */
+        again?: boolean;
+    };
+    /**
+     * ProviderOffer
+     * @description The provider by which people may sign in from the address that they came to. `name`: null where
+     *     there is none.
+     */
+    ProviderOffer: {
+        name: string | null;
+    };
+    /**
+     * ProviderResult
+     * @description The end of a sign-in. `goal`: the path of the page to be shown now. `signed_in`: null if a person
+     *     who was signed in has only proved that it is they.
+     */
+    ProviderResult: {
+        goal: string;
+        signed_in: EditorApi["SignedIn"] | null;
+    };
+    /**
+     * ProviderVisit
+     * @description The address of the provider to which the browser has to go now.
+     */
+    ProviderVisit: {
+        url: string;
     };
     /**
      * Publishing
@@ -2331,6 +2392,13 @@ export interface EditorPaths {
     "/api/session/device/answer": {
         post: EditorOperations["collectDevice"];
     };
+    "/api/session/provider": {
+        get: EditorOperations["getProvider"];
+        post: EditorOperations["beginProvider"];
+    };
+    "/api/session/provider/answer": {
+        post: EditorOperations["answerProvider"];
+    };
     "/api/invitations": {
         get: EditorOperations["listInvitations"];
         post: EditorOperations["invite"];
@@ -2710,6 +2778,43 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["DeviceAnswer"];
+                };
+            };
+        };
+    };
+    getProvider: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ProviderOffer"];
+                };
+            };
+        };
+    };
+    beginProvider: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["ProviderBegin"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ProviderVisit"];
+                };
+            };
+        };
+    };
+    answerProvider: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["ProviderAnswer"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ProviderResult"];
                 };
             };
         };

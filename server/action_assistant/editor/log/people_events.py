@@ -15,6 +15,8 @@ from action_assistant.web.auth.roles import Role
 
 ADDED: Final = "member.added.v1"
 CHANGED: Final = "member.changed.v1"
+CAME: Final = "member.came.v1"
+RENEWED: Final = "member.renewed.v1"
 ENDED: Final = "member.ended.v1"
 LINKED: Final = "link.made.v1"
 LINK_USED: Final = "link.used.v1"
@@ -27,15 +29,29 @@ GROUP_REMOVED: Final = "group.removed.v1"
 T = TypeVar("T")
 
 
+class ProviderRecord(msgspec.Struct, frozen=True):
+    """The person as their OpenID Connect provider called them at their last sign-in: the name, the
+    role that its groups give there, and the groups here (ids) that they give. `lowered`: the role
+    that an owner gave instead, which is lower and stays so; None where none did."""
+
+    issuer: str
+    subject: str
+    name: str
+    role: Role
+    groups: tuple[str, ...] = ()
+    lowered: Role | None = None
+
+
 class MemberState(msgspec.Struct, frozen=True):
     """A person was added, or has this name, role and groups from now on. `until`: microseconds
-    since 1970."""
+    since 1970. `provider`: None for a person who came by a personal link only."""
 
     id: str
     name: str
     role: Role
     groups: tuple[str, ...] = ()
     until: int | None = None
+    provider: ProviderRecord | None = None
 
 
 class MemberEnded(msgspec.Struct, frozen=True):
@@ -91,7 +107,13 @@ def fold(event: Event, read: Callable[[Event, type[Any]], Any]) -> Sequence[Exec
     """Return the statements by which an event about persons, links or groups changes the tables;
     none for events of other kinds. `read` decodes the body of an event."""
     match event.kind:
-        case "member.added.v1" | "member.changed.v1" | "member.ended.v1":
+        case (
+            "member.added.v1"
+            | "member.changed.v1"
+            | "member.came.v1"
+            | "member.renewed.v1"
+            | "member.ended.v1"
+        ):
             return _member(event, read)
         case "link.made.v1" | "link.used.v1" | "link.withdrawn.v1":
             return _link(event, read)
@@ -107,13 +129,16 @@ def _member(event: Event, read: Callable[[Event, type[Any]], Any]) -> Sequence[E
         gone = update(table).where(table.c.id == read(event, MemberEnded).id)
         return [gone.values(ended_at=event.at, ended_by=event.author)]
     state: MemberState = read(event, MemberState)
+    known = state.provider
+    provider = None if known is None else msgspec.json.encode(known).decode()
     row: dict[str, Any] = {
         "name": state.name,
         "role": state.role,
         "groups": msgspec.json.encode(state.groups).decode(),
         "until": state.until,
+        "provider": provider,
     }
-    if event.kind == ADDED:
+    if event.kind in {ADDED, CAME}:
         new = {"id": state.id, "made_at": event.at, "made_by": event.author}
         return [insert(table).values(row | new)]
     return [update(table).where(table.c.id == state.id).values(row)]

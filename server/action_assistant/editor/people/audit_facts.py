@@ -68,6 +68,8 @@ _PEOPLE: Final[Mapping[str, tuple[AuditKind, str]]] = {
     h.REVOKED: ("people", "revoked the link {id}"),
     e.ADDED: ("people", "added the person {name} as {role}"),
     e.CHANGED: ("people", "set name, role and groups of {name} ({role})"),
+    e.CAME: ("people", "came in by the identity provider for the first time, as {role}"),
+    e.RENEWED: ("people", "got name, role and groups anew from the identity provider ({role})"),
     e.ENDED: ("people", "ended the person {who} everywhere"),
     e.LINKED: ("people", "made a personal link for {who}"),
     e.LINK_USED: ("people", "came in by a personal link with {browser}"),

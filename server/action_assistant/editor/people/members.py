@@ -1,4 +1,4 @@
-"""Persons with personal links: added, changed and ended by owners; and groups of persons.
+"""Persons: added by owners, or come by a provider; changed and ended by owners; and their groups.
 
 The truth is the log. What both processes verify by are the files of `PeopleFiles` and the marks of
 `Revocations`: a person is ended by a mark before the log has it, also on a full disk.
@@ -46,7 +46,7 @@ from action_assistant.web.auth import people_files
 from action_assistant.web.auth.keys import Keys, PersonRef
 from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
-from action_assistant.web.auth.roles import Role
+from action_assistant.web.auth.roles import Role, rank
 from action_assistant.web.auth.sessions import Invited
 
 log: Final = logging.getLogger(__name__)
@@ -81,10 +81,18 @@ class Group(msgspec.Struct, frozen=True):
     name: str
 
 
+class ByProvider(msgspec.Struct, frozen=True):
+    """The provider by which a person signs in, and the role that its groups give there: owners may
+    give a lower one."""
+
+    issuer: str
+    role: Role
+
+
 class Member(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A person as owners see them. `groups`: ids. `until`: when the right to do more than Stop ends.
     `links`: the newest first, for owners only. `unrecorded`: that the person is ended is not in
-    the log yet."""
+    the log yet. `provider`: None for a person who comes by personal links only."""
 
     id: str
     name: str
@@ -97,6 +105,7 @@ class Member(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     ended_by: PersonRef | None = None
     unrecorded: bool = False
     links: tuple[PersonalLink, ...] = ()
+    provider: ByProvider | None = None
 
 
 class OfflineLink(msgspec.Struct, frozen=True):
@@ -130,8 +139,9 @@ class Members:
         self._members: dict[str, Member] = {}
         self._owner_of: dict[str, str] = {}  # link -> person
         self._groups: dict[str, Group] = {}
+        self._records: dict[str, e.ProviderRecord] = {}  # by person
         self._late = LateRecords("the end of persons")
-        self._turn = asyncio.Lock()  # of what changes persons and groups
+        self.turn: Final = asyncio.Lock()  # of what changes persons and groups
 
     @asynccontextmanager
     async def opened(self) -> AsyncIterator[None]:
@@ -185,9 +195,8 @@ class Members:
             random_id(), self._name(name), role, self._known(groups), _us(_later(until))
         )
         made = _link_for(state.id, hours)
-        async with self._turn:
-            if sum(each.ended_at is None for each in self._members.values()) >= _MOST:
-                raise Conflict(f"There are {_MOST} persons already; end some.")
+        async with self.turn:
+            self.refuse_more()
             self._refuse_twice(state.name)
             await self._append([h.draft(e.ADDED, author, state), h.draft(e.LINKED, author, made)])
             await self._read(state.id)
@@ -205,7 +214,7 @@ class Members:
         until: datetime | msgspec.UnsetType | None = msgspec.UNSET,
     ) -> Member:
         """Change a person, everywhere at once. Raise BadInput, Conflict, NotFound or Unavailable."""
-        async with self._turn:
+        async with self.turn:
             now = self._present(person)
             new = now if until is msgspec.UNSET else replace(now, until=_later(until))
             if name is not None and (given := self._name(name)) != now.name:
@@ -216,21 +225,58 @@ class Members:
                 role=now.role if role is None else role,
                 groups=now.groups if groups is None else self._known(groups),
             )
-            if new != now:
-                await self._append([h.draft(e.CHANGED, author, _state(new))])
-                self._members[person] = replace(
-                    self._members[person],
-                    name=new.name,
-                    role=new.role,
-                    groups=new.groups,
-                    until=new.until,
-                )
-                await self._write(person)
+            record = self._records.get(person)
+            if record is not None and role is not None:
+                record = _lowered(record, role, now.role)
+            await self.store(e.CHANGED, author, new, record)
         return self.get(person)
+
+    def known(self, person: str) -> tuple[Member | None, e.ProviderRecord | None]:
+        """Return a person and as whom a provider knows them; None for what there is not."""
+        return self._members.get(person), self._records.get(person)
+
+    def refuse_ended(self, person: str) -> None:
+        """Raise Withdrawn if an owner has ended a person, for good."""
+        known = self._members.get(person)
+        if self._revoked.person_ended(person) or (known is not None and known.ended_at is not None):
+            raise Withdrawn("Your access was ended by an owner. Ask them to add you anew.")
+
+    def refuse_more(self) -> None:
+        """Raise Conflict if there are too many persons."""
+        if sum(each.ended_at is None for each in self._members.values()) >= _MOST:
+            raise Conflict(f"There are {_MOST} persons already; end some.")
+
+    def has_name(self, name: str, *, but: str) -> bool:
+        """Return whether somebody who is not ended has this name, other than the person `but`."""
+        return any(
+            each.ended_at is None and each.id != but and each.name.casefold() == name.casefold()
+            for each in self._members.values()
+        )
+
+    async def store(
+        self, kind: str, author: str, new: Member, record: e.ProviderRecord | None
+    ) -> PersonFile:
+        """Store the name, role, groups and last day of a person, and as whom a provider knows them, by
+        an event of this kind if that is anything new; in `turn` only. Return the person. Raise
+        Unavailable if the log cannot be written."""
+        if self.known(new.id) == (new, record):
+            return _file_of(new)
+        await self._append([h.draft(kind, author, _state(new, record))])
+        self._members[new.id] = replace(  # who may have been ended, or come in, meanwhile
+            self._members.get(new.id, new),
+            name=new.name,
+            role=new.role,
+            groups=new.groups,
+            until=new.until,
+        )
+        if record is not None:
+            self._records[new.id] = record
+        await self._write(new.id)
+        return _file_of(self._members[new.id])
 
     async def link(self, person: str, author: str, hours: float = LINK_HOURS) -> Member:
         """Make a new link for a person; earlier ones that were not used open nothing any more."""
-        async with self._turn:
+        async with self.turn:
             member = self._present(person)
             drafts = [
                 h.draft(e.LINK_WITHDRAWN, author, e.LinkWithdrawn(each.id))
@@ -262,7 +308,7 @@ class Members:
 
     async def make_group(self, name: str, author: str) -> Group:
         """Make a group. Raise BadInput, Conflict or Unavailable."""
-        async with self._turn:
+        async with self.turn:
             if len(self._groups) >= _MOST_GROUPS:
                 raise Conflict(f"There are {_MOST_GROUPS} groups already.")
             group = Group(random_id(), self._group_name(name))
@@ -273,7 +319,7 @@ class Members:
 
     async def rename_group(self, group: str, name: str, author: str) -> Group:
         """Rename a group. Raise BadInput, Conflict, NotFound or Unavailable."""
-        async with self._turn:
+        async with self.turn:
             now = self._group(group)
             new = Group(group, now.name if name == now.name else self._group_name(name))
             await self._append([h.draft(e.GROUP_RENAMED, author, e.GroupState(group, new.name))])
@@ -283,7 +329,7 @@ class Members:
 
     async def remove_group(self, group: str, author: str) -> None:
         """Remove a group, also from all its persons. Raise NotFound or Unavailable."""
-        async with self._turn:
+        async with self.turn:
             self._group(group)
             left = {
                 each.id: tuple(other for other in each.groups if other != group)
@@ -291,7 +337,13 @@ class Members:
                 if group in each.groups
             }
             changes = [
-                h.draft(e.CHANGED, author, _state(replace(self._members[person], groups=groups)))
+                h.draft(
+                    e.CHANGED,
+                    author,
+                    _state(
+                        replace(self._members[person], groups=groups), self._records.get(person)
+                    ),
+                )
                 for person, groups in left.items()
             ]
             gone = h.draft(e.GROUP_REMOVED, author, e.GroupRemoved(group))
@@ -358,7 +410,7 @@ class Members:
 
     async def _take_over(self, path: Path) -> None:
         """Store a link of the command line in the log, and its person if they are new there."""
-        async with self._turn:
+        async with self.turn:
             try:
                 content = await asyncio.to_thread(path.read_bytes)
                 offline = msgspec.json.decode(content, type=OfflineLink)
@@ -372,6 +424,7 @@ class Members:
                 )
                 known = person.id in self._members
                 kind = e.CHANGED if known else e.ADDED
+                state = replace(state, provider=self._records.get(person.id))
                 made = e.LinkMade(offline.id, person.id, int(offline.expires * 1e6))
                 drafts = [h.draft(kind, h.SERVER, state), h.draft(e.LINKED, h.SERVER, made)]
                 await self._append(drafts)
@@ -425,9 +478,8 @@ class Members:
         return name
 
     def _refuse_twice(self, name: str) -> None:
-        for each in self._members.values():
-            if each.ended_at is None and each.name.casefold() == name.casefold():
-                raise Conflict(f"There is a person {name!r} already: make a new link for them.")
+        if self.has_name(name, but=""):
+            raise Conflict(f"There is a person {name!r} already: make a new link for them.")
 
     def _known(self, groups: tuple[str, ...]) -> tuple[str, ...]:
         for each in groups:
@@ -505,11 +557,15 @@ class Members:
                 ended_by=PersonRef(row.ended_by, "") if over else None,
                 links=tuple(theirs.get(row.id, ())),
             )
+            if row.provider is not None:
+                self._records[row.id] = msgspec.json.decode(row.provider, type=e.ProviderRecord)
             self._members[row.id] = _with_news(stored, self._members.get(row.id))
 
     def _view(self, member: Member, *, with_links: bool) -> Member:
+        record = self._records.get(member.id)
         return replace(
             member,
+            provider=None if record is None else ByProvider(record.issuer, record.role),
             made_by=self._people.person(member.made_by.id),
             ended_by=None if member.ended_by is None else self._people.person(member.ended_by.id),
             links=tuple(map(self._shown, member.links)) if with_links else (),
@@ -589,8 +645,19 @@ def _file_of(member: Member) -> PersonFile:
     return PersonFile(member.id, member.name, member.role, member.groups, until)
 
 
-def _state(member: Member) -> e.MemberState:
-    return e.MemberState(member.id, member.name, member.role, member.groups, _us(member.until))
+def _state(member: Member, provider: e.ProviderRecord | None) -> e.MemberState:
+    until = _us(member.until)
+    return e.MemberState(member.id, member.name, member.role, member.groups, until, provider)
+
+
+def _lowered(record: e.ProviderRecord, role: Role, now: Role) -> e.ProviderRecord:
+    """Return the record of a person to whom an owner gives a role. Raise Conflict if the groups of the
+    provider give less."""
+    if rank(role) > rank(record.role) and role != now:
+        raise Conflict(
+            f"The groups of {record.issuer} make this person {record.role}: give a higher role there."
+        )
+    return replace(record, lowered=role if rank(role) < rank(record.role) else None)
 
 
 def _later(until: datetime | None) -> datetime | None:

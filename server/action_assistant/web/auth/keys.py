@@ -214,6 +214,22 @@ class Keys:
         payload = _text(msgspec.json.encode(fields))
         return f"{payload}.{_text(self._sign(payload))}"
 
+    def sealed_question(self, question: bytes) -> str:
+        """Return the value of the cookie that holds a sign-in by a provider while it goes on."""
+        payload = _text(question)
+        return f"{payload}.{self._question_seal(payload)}"
+
+    def question(self, cookie: str) -> bytes | None:
+        """Return the content of a cookie of `sealed_question`; None if this server did not seal it."""
+        payload, _, seal = cookie.partition(".")
+        expected = self._question_seal(payload)
+        if not hmac.compare_digest(expected.encode(), seal.encode(errors="replace")):
+            return None
+        return base64.urlsafe_b64decode(payload + "=" * (-len(payload) % 4))
+
+    def _question_seal(self, payload: str) -> str:
+        return _text(self._sign(f"provider\0{payload}"))
+
     def new_device(self) -> str:
         """Return a new cookie that identifies a browser, whoever signs in."""
         made = random_id()

@@ -126,7 +126,7 @@ class InvitationRegistry(Protocol):
 
 
 #: The means by which somebody signs in.
-SignInMeans: TypeAlias = Literal["token", "link", "personal", "device"]
+SignInMeans: TypeAlias = Literal["token", "link", "personal", "device", "oidc"]
 
 
 class SessionAudit(Protocol):
@@ -150,7 +150,7 @@ class NoAudit:
 
 
 class Sessions:
-    """Trades tokens and invitations for sessions."""
+    """Trades tokens and invitations for sessions. `audit` keeps who signed in and out."""
 
     def __init__(
         self,
@@ -160,11 +160,11 @@ class Sessions:
         revoked: Revocations,
         standings: Standings,
         *,
-        addresses: Addresses | None,
-        limits: bool,
-        audit: SessionAudit,
+        addresses: Addresses | None = None,
+        limits: bool = True,
+        audit: SessionAudit | None = None,
     ) -> None:
-        self._audit = audit
+        self._audit: SessionAudit = audit or NoAudit()
         self._keys = keys
         self._revoked = revoked
         self._standings = standings
@@ -248,15 +248,25 @@ class Sessions:
         return session
 
     async def _came(self, link: str, request: _Asking) -> Session:
-        """Return the session of the person of a personal link. The session that this browser had
-        ends, since its person changes."""
+        """Return the session of the person of a personal link."""
         browser = browser_of(request)
         person = await self._reception().come_in(link, browser, client_address(request.scope))
-        await self.leave(request)
+        return await self.begin(person, request)
+
+    async def begin(
+        self, person: PersonFile, request: _Asking, *, goes_on: bool = False
+    ) -> Session:
+        """Return a new session of a person with rights of their own. The session that this browser
+        had ends; if `goes_on` and it is of the same person, it goes on instead."""
+        now = session_of(request)
+        same = goes_on and now is not None and now.personal and now.person.id == person.id
+        if not same:
+            await self.leave(request)
         return self._keys.new_session(
             person.name,
             role=person.role,
             person_id=person.id,
+            session_id=now.id if same and now is not None else None,
             personal=True,
             seconds=self._standings.limits[person.role].longest,
         )
@@ -288,7 +298,7 @@ class Sessions:
 
     def answer(self, session: Session, request: _Asking, content: Any = None) -> Response[Any]:
         """Return the answer that sets the cookie of a session; by default it says whose that is."""
-        secure, path = self._jar(request)
+        secure, path = self.jar(request)
         cookie = Cookie(
             key=self._cookie,
             value=self._keys.sealed(session),
@@ -300,7 +310,7 @@ class Sessions:
             path=path,
         )
         return Response(
-            content if content is not None else _signed_in(session),
+            content if content is not None else signed_in(session),
             status_code=200,
             cookies=[cookie, *self._device_cookie(request)],
         )
@@ -309,7 +319,7 @@ class Sessions:
         """Return a new cookie that identifies this browser; an empty list if it has one."""
         if device_of(request):
             return []
-        secure, path = self._jar(request)
+        secure, path = self.jar(request)
         made = Cookie(
             key=self._device,
             value=self._keys.new_device(),
@@ -330,10 +340,10 @@ class Sessions:
             status_code=204 if unwritten is None else unwritten.status,
             media_type=None if unwritten is None else PROBLEM_JSON,
         )
-        response.delete_cookie(self._cookie, path=self._jar(request)[1])
+        response.delete_cookie(self._cookie, path=self.jar(request)[1])
         return response
 
-    def _jar(self, request: _Asking) -> tuple[bool, str]:
+    def jar(self, request: _Asking) -> tuple[bool, str]:
         """Return whether the client's cookie is `Secure`, and its path."""
         if self._addresses is None:
             return False, "/"
@@ -347,30 +357,15 @@ class Sessions:
 
 
 def session_routes(
-    keys: Keys,
-    page_port: int,
+    sessions: Sessions,
     *,
-    reception: Callable[[], InvitationRegistry],
     revoked: Revocations,
     standings: Standings,
     codes: DeviceCodes,
     device_added: Callable[[Session, str, str], Awaitable[None]] | None = None,
-    addresses: Addresses | None = None,
-    limits: bool = True,
-    audit: SessionAudit | None = None,
 ) -> list[ControllerRouterHandler]:
     """Return the routes under `/api/session`. `device_added` stores that a device was added, with
-    its session, browser and address; `audit` keeps who signed in and out."""
-    sessions = Sessions(
-        keys,
-        page_port,
-        reception,
-        revoked,
-        standings,
-        addresses=addresses,
-        limits=limits,
-        audit=audit or NoAudit(),
-    )
+    its session, browser and address."""
     return [
         *_own_session(sessions, revoked, standings),
         *_new_device(sessions, standings, codes, device_added or _added),
@@ -420,7 +415,7 @@ def _new_device(
         await to_thread.run_sync(
             standings.browsers.note, session, confirmed.browser, confirmed.address
         )
-        return sessions.answer(session, request, DeviceAnswer(_signed_in(session)))
+        return sessions.answer(session, request, DeviceAnswer(signed_in(session)))
 
     return [send, collect]
 
@@ -442,7 +437,7 @@ def _own_session(
     async def who(request: _Asking) -> SignedIn:
         session = live_session(request)
         await note(session, request)
-        return _signed_in(replace(session, person=identity_of(request).person))
+        return signed_in(replace(session, person=identity_of(request).person))
 
     @post(
         "/api/session",
@@ -575,7 +570,8 @@ def note_sign_out(audit: SessionAudit, request: _Asking) -> None:
             audit.signed_out(session)
 
 
-def _signed_in(session: Session) -> SignedIn:
+def signed_in(session: Session) -> SignedIn:
+    """Return the answer that says whose a session is."""
     return SignedIn(session.person, bool(session.person.name), session.personal)
 
 
