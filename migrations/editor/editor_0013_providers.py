@@ -5,8 +5,8 @@ from collections.abc import Sequence
 import sqlalchemy as sa
 from alembic import op
 
-revision: str = "editor_0012"
-down_revision: str | None = "editor_0011"
+revision: str = "editor_0013"
+down_revision: str | None = "editor_0012"
 branch_labels: Sequence[str] | None = None
 depends_on: Sequence[str] | None = None
 
