@@ -111,10 +111,19 @@ export function useEndMember(runner: string | undefined) {
 export function useEndSession(runner: string | undefined) {
   return usePeopleMutation(async ({ session, own }: { session: string; own: boolean }) => {
     const path = { session };
-    await (own
-      ? editor.post("/api/devices/{session}/end", { path })
-      : editor.post("/api/sessions/{session}/end", { path }));
-    if (runner === undefined || own) return;
+    if (own) {
+      // The runner does not know whose session it is: the editor's seal says so.
+      const { sessions, ends } = await editor.get("/api/devices", {});
+      await editor.post("/api/devices/{session}/end", { path });
+      const person = sessions.find((each) => each.id === session)?.person.id;
+      const seal = ends[session];
+      if (runner === undefined || person === undefined || seal === undefined) return;
+      const body = { session, person, seal };
+      await runnerAt(runner).post("/api/sessions/ended", { body });
+      return;
+    }
+    await editor.post("/api/sessions/{session}/end", { path });
+    if (runner === undefined) return;
     await runnerAt(runner).post("/api/revocations", { body: { session } });
   });
 }

@@ -186,7 +186,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
             *signing_in,
             *provider.routes(by_provider),
             *_routes(app_state, addresses, browsers),
-            *devices.routes(codes, browsers, addresses, audit),
+            *devices.routes(codes, browsers, addresses, audit, keys),
             *tokens.routes(app_state, token_files, limits=settings.limits),
             *view.routes(app_state, view_links, addresses, audit, settings.frames),
             *doctor.routes(settings),

@@ -60,7 +60,7 @@ from action_assistant.web.auth.session_limits import limits_of
 from action_assistant.web.auth.sessions import revocation
 from action_assistant.web.auth.standing import Standings
 from action_assistant.web.auth.token_routes import adoption, shared_token_routes
-from action_assistant.web.auth.tokens import TokenFiles
+from action_assistant.web.auth.tokens import TokenFiles, TokenRecord
 from action_assistant.web.auth.view_links import ViewLinks
 from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import addresses_of
@@ -141,6 +141,10 @@ def _identity_now(
         groups=standing.groups,
         confirmed_at=standing.confirmed_at,
     )
+
+
+async def _note_token(audit: AuditLog, record: TokenRecord, person: str) -> None:
+    audit.ended_here("token", record.id, person)
 
 
 def _note_idle_stop(audit: AuditLog, author: Author, robot: str, run: str) -> None:
@@ -276,8 +280,8 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         [
             *routes(services),
             *view.routes(services, view_links),
-            *revocation(revoked, people_files, services.audit),
-            *shared_token_routes(tokens),
+            *revocation(keys, revoked, people_files, services.audit, limits=settings.limits),
+            *shared_token_routes(tokens, revoked=partial(_note_token, services.audit)),
             *adoption(tokens, limits=settings.limits),
         ],
         title="TeMoto Action Assistant: runner",

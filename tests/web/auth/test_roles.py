@@ -101,7 +101,9 @@ def test_every_route_says_who_may_call_it_and_means_it(product: Product, process
         for method, path, permission in found:
             if permission is None:
                 open_to_strangers = "/healthz|/readyz|/api/server|/api/session"
-                by_programs = "/api/logins(/claim|/cancel)?$|/api/tokens/records$"
+                by_programs = (
+                    "/api/logins(/claim|/cancel)?$|/api/tokens/records$|/api/sessions/ended$"
+                )
                 of_all_signed_in = "/api/tokens/{token}/revoke$"
                 of_links = "/api/view$|/api/view/(graph|run)(/events)?$"
                 known = f"{open_to_strangers}|{by_programs}|{of_all_signed_in}|{of_links}"

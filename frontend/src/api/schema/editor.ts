@@ -1541,12 +1541,16 @@ export interface EditorApi {
     /**
      * OwnDevices
      * @description The open sessions of the person; `this`: the id of the one that asks. `origins`: the
-     *     addresses of the page for other devices, the likeliest first.
+     *     addresses of the page for other devices, the likeliest first. `ends`: by session the seal with
+     *     which a runner that has a data folder of its own is told of its end.
      */
     OwnDevices: {
         sessions: EditorApi["OpenSession"][];
         this: string;
         origins: string[];
+        ends: {
+            [key: string]: string;
+        };
     };
     /**
      * PackageContents

@@ -1863,6 +1863,15 @@ export interface RunnerApi {
         token_proof: string;
     };
     /**
+     * SessionEnd
+     * @description The end of a session by its person. `seal`: from the editor's list of their devices.
+     */
+    SessionEnd: {
+        session: string;
+        person: string;
+        seal: string;
+    };
+    /**
      * SharedBeat
      * @description Sent once a second while the run goes on. `seen`: when its engine showed it last; null if it
      *     never did.
@@ -2455,6 +2464,9 @@ export interface RunnerPaths {
     };
     "/api/session": {
         delete: RunnerOperations["signOut"];
+    };
+    "/api/sessions/ended": {
+        post: RunnerOperations["tellEndedSession"];
     };
     "/api/tokens": {
         get: RunnerOperations["listTokens"];
@@ -3553,6 +3565,17 @@ interface RunnerOperations {
         };
     };
     signOut: {
+        responses: {
+            204: {
+            };
+        };
+    };
+    tellEndedSession: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["SessionEnd"];
+            };
+        };
         responses: {
             204: {
             };

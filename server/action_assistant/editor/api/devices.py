@@ -13,6 +13,7 @@ from action_assistant.web.audit.events import SessionEnded
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import Needs, PersonOnly, live_session
 from action_assistant.web.auth.device_codes import DeviceAsking, DeviceCode, DeviceCodes
+from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.session_files import OpenSession, SessionFiles
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.openapi import answer
@@ -22,11 +23,13 @@ _Asking = Request[Any, Any, Any]
 
 class OwnDevices(msgspec.Struct, frozen=True):
     """The open sessions of the person; `this`: the id of the one that asks. `origins`: the
-    addresses of the page for other devices, the likeliest first."""
+    addresses of the page for other devices, the likeliest first. `ends`: by session the seal with
+    which a runner that has a data folder of its own is told of its end."""
 
     sessions: list[OpenSession]
     this: str
     origins: tuple[str, ...]
+    ends: dict[str, str]
 
 
 class DeviceIsMine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -36,15 +39,19 @@ class DeviceIsMine(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def routes(
-    codes: DeviceCodes, browsers: SessionFiles, addresses: Addresses, audit: AuditLog
+    codes: DeviceCodes,
+    browsers: SessionFiles,
+    addresses: Addresses,
+    audit: AuditLog,
+    keys: Keys,
 ) -> list[ControllerRouterHandler]:
     """Return the routes under `/api/devices`. They are for browsers: a token has no devices.
-    `audit` keeps which sessions were ended."""
-    return [*_own(browsers, addresses, audit), *_adding(codes, addresses)]
+    `audit` keeps which sessions were ended; `keys` seal their ends."""
+    return [*_own(browsers, addresses, audit, keys), *_adding(codes, browsers, addresses)]
 
 
 def _own(
-    browsers: SessionFiles, addresses: Addresses, audit: AuditLog
+    browsers: SessionFiles, addresses: Addresses, audit: AuditLog, keys: Keys
 ) -> list[ControllerRouterHandler]:
     def own(person: str) -> list[OpenSession]:
         return [each for each in browsers.every() if each.person.id == person]
@@ -58,7 +65,9 @@ def _own(
     async def list_devices(request: _Asking) -> OwnDevices:
         session = live_session(request)
         found = await to_thread.run_sync(own, session.person.id)
-        return OwnDevices(found, session.id, addresses.origins())
+        person = session.person.id
+        ends = {each.id: keys.end_seal(each.id, person) for each in found}
+        return OwnDevices(found, session.id, addresses.origins(), ends)
 
     @post(
         "/api/devices/{session:str}/end",
@@ -83,16 +92,18 @@ def _own(
     )
     async def end_others(request: _Asking) -> None:
         session = live_session(request)
-        mine = await to_thread.run_sync(own, session.person.id)
-        await to_thread.run_sync(lambda: browsers.end_all_of(session.person.id, but=session.id))
-        for each in mine:
-            if each.id != session.id:
-                audit.note(SessionEnded(each.id), session.person.id)
+        ended = await to_thread.run_sync(
+            lambda: browsers.end_all_of(session.person.id, but=session.id)
+        )
+        for each in ended:
+            audit.note(SessionEnded(each), session.person.id)
 
     return [list_devices, end, end_others]
 
 
-def _adding(codes: DeviceCodes, addresses: Addresses) -> list[ControllerRouterHandler]:
+def _adding(
+    codes: DeviceCodes, browsers: SessionFiles, addresses: Addresses
+) -> list[ControllerRouterHandler]:
     @post(
         "/api/devices/codes",
         summary="Make a code with which another device of one's own signs in, valid for 2 minutes",
@@ -100,7 +111,9 @@ def _adding(codes: DeviceCodes, addresses: Addresses) -> list[ControllerRouterHa
         guards=[PersonOnly(), Needs("see")],
     )
     async def make(request: _Asking) -> DeviceCode:
-        return codes.open(live_session(request))
+        session = live_session(request)
+        await to_thread.run_sync(browsers.require_room, session.person.id)
+        return codes.open(session)
 
     @get(
         "/api/devices/codes/{code:str}",

@@ -12,6 +12,7 @@ from action_assistant.editor.api.qr_codes import qr_code
 from action_assistant.editor.people.members import LINK_HOURS, Group, Member
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput, Conflict
+from action_assistant.web.audit.events import SessionEnded
 from action_assistant.web.auth.access import Needs, identity_of, person_of
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.auth.rights import Allowed, may
@@ -190,8 +191,11 @@ def _ends(app_state: EditorState, browsers: SessionFiles) -> list[ControllerRout
         operation_id="endSessionsOf",
         guards=[Needs("share")],
     )
-    async def sign_out(person: str) -> EndedSessions:
-        return EndedSessions(await to_thread.run_sync(browsers.end_all_of, person))
+    async def sign_out(person: str, request: _Asking) -> EndedSessions:
+        ended = await to_thread.run_sync(browsers.end_all_of, person)
+        for session in ended:
+            app_state.services.audit.note(SessionEnded(session), person_of(request).id)
+        return EndedSessions(len(ended))
 
     return [end, sign_out]
 

@@ -21,7 +21,7 @@ from action_assistant.editor.services import EditorState
 from action_assistant.errors import Refused
 from action_assistant.logs import about
 from action_assistant.web.auth.access import Needs, identity_of, person_of, plain, refuse
-from action_assistant.web.auth.caller import origin_of
+from action_assistant.web.auth.caller import client_network, origin_of
 from action_assistant.web.auth.graph_rules import MAY_NOT_EDIT
 from action_assistant.web.auth.rights import Allowed, may
 from action_assistant.web.server.direct import DirectSocket, direct_socket
@@ -237,9 +237,8 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
     async def room(socket: Socket, graph_id: str) -> None:
         services, person = app_state.services, person_of(socket)
         stream = h.graph_stream(graph_id)
-        address = socket.client.host if socket.client is not None else ""
         try:
-            with services.connection_limits.admitted(person.id, address):
+            with services.connection_limits.admitted(person.id, client_network(socket)):
                 if not services.rooms.is_joined(
                     stream
                 ):  # asking the tables is a fifth of the cost of a connection

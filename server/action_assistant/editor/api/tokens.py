@@ -13,6 +13,7 @@ from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput, TooMany
 from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.web.auth.access import Needs, Open, PersonOnly, client_address, identity_of
+from action_assistant.web.auth.caller import client_network
 from action_assistant.web.auth.identity import Scope
 from action_assistant.web.auth.login_codes import (
     Claimed,
@@ -120,8 +121,7 @@ def _of_programs(
     asked = TokenBuckets(_ASKED_AT_ONCE, _ASKED_PER_MINUTE / 60)
 
     def admit(pace: TokenBuckets, request: _Asking) -> None:
-        address = request.client.host if request.client is not None else ""
-        if limits and not pace.of(address).take():
+        if limits and not pace.of(client_network(request)).take():
             raise TooMany("Too many tries from your address; wait a minute.")
 
     @post(
@@ -136,7 +136,9 @@ def _of_programs(
         admit(begun, request)
         tokens.check(data.name, data.days)
         wanted = tuple(sorted(completed(data.scopes)))
-        answer = codes.begin(data.name, wanted, data.days, client_address(request.scope))
+        answer = codes.begin(
+            data.name, wanted, data.days, client_address(request.scope), client_network(request)
+        )
         return Response(answer, headers={"cache-control": "no-store"})
 
     @post(

@@ -12,6 +12,7 @@ from action_assistant.editor.log import people_events as e
 from action_assistant.editor.people.people import stored_people
 from action_assistant.journal.databases import ask_from_worker
 from action_assistant.journal.events import Event
+from action_assistant.kit.moments import moment
 from action_assistant.schema import editor_tables
 from action_assistant.web.audit import events as audit
 from action_assistant.web.audit.facts import described
@@ -41,6 +42,7 @@ class _Body(msgspec.Struct, frozen=True):
     person: str = ""
     browser: str = ""
     address: str | None = None
+    until: int | None = None
 
 
 #: What the events of one graph say, after the name of the person; fields of the body in braces.
@@ -66,8 +68,8 @@ _PEOPLE: Final[Mapping[str, tuple[AuditKind, str]]] = {
     h.INVITED: ("people", "made a link for the role {role}"),
     h.ACCEPTED: ("people", "came in by the link {id}"),
     h.REVOKED: ("people", "revoked the link {id}"),
-    e.ADDED: ("people", "added the person {name} as {role}"),
-    e.CHANGED: ("people", "set name, role and groups of {name} ({role})"),
+    e.ADDED: ("people", "added the person {name} as {role}{ends}"),
+    e.CHANGED: ("people", "set name, role and groups of {name} ({role}{ends})"),
     e.CAME: ("people", "came in by the identity provider for the first time, as {role}"),
     e.RENEWED: ("people", "got name, role and groups anew from the identity provider ({role})"),
     e.ENDED: ("people", "ended the person {who} everywhere"),
@@ -120,7 +122,10 @@ class EditorFacts:
             return None
         kind, sentence = known
         about = body.person or body.id
-        words = {**_words(body), "who": self._person(about).name or about}
+        ends = (
+            f", who may start until {moment(body.until):%Y-%m-%d %H:%M} UTC" if body.until else ""
+        )
+        words = {**_words(body), "who": self._person(about).name or about, "ends": ends}
         told = None if body.address is None else Origin(address=body.address)
         return Fact(kind=kind, text=sentence.format_map(words), origin=told)
 

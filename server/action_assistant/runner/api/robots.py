@@ -410,6 +410,8 @@ def _index(services: RunnerServices) -> ControllerRouterHandler:
     async def write_into_index(name: str, request: _Asking) -> IndexWriteAnswer:
         async with body_of(request, services.body_limit) as body:
             write_request = read_index_write(body)
+            # Nothing moves by it, so a robot out of service may be prepared, and nobody need watch.
+            services.control.rights.require([name], identity_of(request), only=("right", "baton"))
             return await services.index_writer.write(name, write_request, author_of(request))
 
     return write_into_index

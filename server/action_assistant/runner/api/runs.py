@@ -62,6 +62,7 @@ from action_assistant.web.auth.access import (
     refuse,
     require,
 )
+from action_assistant.web.auth.caller import client_network
 from action_assistant.web.server.openapi import answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once
@@ -365,9 +366,8 @@ def _live(services: RunnerServices) -> ControllerRouterHandler:
         guards=[Needs("see")],
     )
     async def live(socket: WebSocket[Any, Any, Any]) -> None:
-        address = socket.client.host if socket.client is not None else ""
         try:
-            with services.connection_limits.admitted(person_of(socket).id, address):
+            with services.connection_limits.admitted(person_of(socket).id, client_network(socket)):
                 await attend(socket, services.hub)
         except TooMany as refused:
             await refuse(socket.scope, socket.receive, socket.send, refused)

@@ -8,7 +8,7 @@ be stored nobody knows who would hold the baton after a restart, so nobody holds
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, Final
 
@@ -149,12 +149,22 @@ class RightsRegistry:
         return None
 
     def require(
-        self, robots: Iterable[str], identity: Identity, claim: Claim | None = None
+        self,
+        robots: Iterable[str],
+        identity: Identity,
+        claim: Claim | None = None,
+        *,
+        only: Collection[str] | None = None,
     ) -> None:
         """Raise Forbidden or Conflict, with the sentences of all robots, if an identity may not start
-        on one of them. `claim`: as for `refusals`."""
+        on one of them. `claim`: as for `refusals`; `only`: codes of refusals that count, None for
+        all."""
         found = {name: self.refusals(name, identity, claim) for name in robots if name != SIMULATOR}
-        reasons = {name: refused for name, refused in found.items() if refused}
+        counted = {
+            name: [each for each in refused if only is None or each.code in only]
+            for name, refused in found.items()
+        }
+        reasons = {name: refused for name, refused in counted.items() if refused}
         if not reasons:
             return
         every = [each for refused in reasons.values() for each in refused]

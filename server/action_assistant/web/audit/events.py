@@ -71,6 +71,28 @@ class ViewLinkRevoked(msgspec.Struct, frozen=True):
     thing: str
 
 
+class EndedHere(msgspec.Struct, frozen=True):
+    """The author told this process that an invitation, session, person or token has ended, with its
+    `id`. The editor's log has the end itself."""
+
+    kind: ClassVar[str] = "audit.ended_here.v1"
+
+    what: Literal["invitation", "session", "person", "token"]
+    id: str
+
+
+class PersonStored(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The author told this process the present state of a person. `until`: seconds since 1970."""
+
+    kind: ClassVar[str] = "audit.person_stored.v1"
+
+    id: str
+    name: str
+    role: str
+    groups: tuple[str, ...] = ()
+    until: float | None = None
+
+
 class StartRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The author asked for a start, a change or a go-on that was refused, with the reason `why`.
     `engines`: the robots, or the simulator; `times`: how often within a minute."""

@@ -34,6 +34,8 @@ _EVENTS: Final = {
         events.SessionEnded,
         events.ViewLinkMade,
         events.ViewLinkRevoked,
+        events.EndedHere,
+        events.PersonStored,
         events.StartRefused,
         events.StopPressed,
         events.StrangersRefused,
@@ -71,6 +73,11 @@ def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | No
             name = graph_name(link.thing)
             text = f"{verb} the graph {name}"
             return Fact(kind="people", text=text, graph=link.thing, graph_name=name)
+        case events.EndedHere() as end:
+            text = f"told this process that the {end.what} {end.id} has ended"
+            return Fact(kind="sessions" if end.what == "session" else "people", text=text)
+        case events.PersonStored(name=name, role=role):
+            return Fact(kind="people", text=f"told this process that {name} is here as {role}")
         case events.StartRefused() as refused:
             return _refused(refused)
         case events.StopPressed(robot=robot, run=run, times=times):

@@ -23,6 +23,8 @@ from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.audit.events import (
     STREAM,
     AuditEvent,
+    EndedHere,
+    PersonStored,
     SessionEnded,
     SignedIn,
     StartRefused,
@@ -33,9 +35,16 @@ from action_assistant.web.audit.events import (
     ViewLinkRevoked,
     draft_of,
 )
-from action_assistant.web.auth.caller import Origin, acting_for, network_address, origin_of
+from action_assistant.web.auth.caller import (
+    Origin,
+    acting_for,
+    network_address,
+    network_of,
+    origin_of,
+)
 from action_assistant.web.auth.keys import Session
-from action_assistant.web.auth.sessions import SignInMeans
+from action_assistant.web.auth.people_files import PersonFile
+from action_assistant.web.auth.sessions import EndableKind, SignInMeans
 from action_assistant.web.auth.view_links import ViewRecord
 
 log: Final = logging.getLogger(__name__)
@@ -212,9 +221,18 @@ class AuditLog:
         """Queue that a person revoked such a link."""
         self.note(ViewLinkRevoked(link.id, link.kind, link.thing), author)
 
+    def ended_here(self, what: EndableKind, id_: str, author: str) -> None:
+        """Queue that a person told this process of the end of something."""
+        self.note(EndedHere(what, id_), author)
+
+    def person_stored(self, person: PersonFile, author: str) -> None:
+        """Queue that a person told this process the state of somebody."""
+        stored = PersonStored(person.id, person.name, person.role, person.groups, person.until)
+        self.note(stored, author)
+
     def refused_stranger(self, address: str, what: str) -> None:
         """Count a refused request without valid credentials. `what`: its method and path."""
-        self._strangers.count(network_address(address), what)
+        self._strangers.count(network_of(network_address(address)), what)
 
     def note_repeated(self, event: Repeated, author: str) -> None:
         """Queue a fact that a program may repeat. The same fact within a minute is counted instead."""

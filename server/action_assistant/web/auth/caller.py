@@ -8,7 +8,7 @@ from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
-from typing import TYPE_CHECKING, Final, NamedTuple, TypeVarTuple, Unpack
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVarTuple, Unpack
 
 import anyio
 import msgspec
@@ -17,6 +17,7 @@ from anyio.abc import TaskGroup
 from action_assistant.errors import Refused
 
 if TYPE_CHECKING:
+    from litestar.connection import ASGIConnection
     from litestar.types import Receive
 
     from action_assistant.web.auth.identity import Identity
@@ -52,6 +53,25 @@ def network_address(host: str) -> str:
     except ValueError:
         return ""
     return "" if address.is_loopback else str(address)
+
+
+def client_network(connection: "ASGIConnection[Any, Any, Any, Any]") -> str:
+    """Return the network of a client, which limits count as one."""
+    return network_of(connection.client.host if connection.client is not None else "")
+
+
+def network_of(host: str) -> str:
+    """Return the network of an address: an IPv4 address itself, the /64 of an IPv6 address, all of
+    which one client may have. Text that is no address is its own network."""
+    try:
+        address = ipaddress.ip_address(host.partition("%")[0])
+    except ValueError:
+        return host
+    if isinstance(address, ipaddress.IPv4Address):
+        return host
+    if address.ipv4_mapped is not None:
+        return str(address.ipv4_mapped)
+    return host if address.is_loopback else str(ipaddress.ip_network((address, 64), strict=False))
 
 
 @lru_cache(1024)

@@ -168,6 +168,12 @@ class Keys:
         end as bytes, which the secret seals."""
         return _text(hmac.digest(self._seal, b"view\0" + link, "sha256"))
 
+    def end_seal(self, session: str, person: str) -> str:
+        """Return the seal by which a person ends one of their sessions at a process that does not
+        know whose it is. It proves nothing else."""
+        told = b"end of session\0" + f"{session}\0{person}".encode(errors="replace")
+        return _text(hmac.digest(self._seal, told, "sha256"))
+
     def prove(self, challenge: str, address: str) -> ServerProof:
         """Prove to a client that this server knows the token, before the client shows it.
         `challenge`: the text that the client chose. `address`: the address (`HOST:PORT`) that

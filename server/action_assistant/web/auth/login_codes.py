@@ -70,8 +70,15 @@ class _Login:
     """One code and its state."""
 
     def __init__(
-        self, code: str, name: str, scopes: tuple[Scope, ...], days: float | None, address: str
+        self,
+        code: str,
+        name: str,
+        scopes: tuple[Scope, ...],
+        days: float | None,
+        address: str,
+        network: str,
     ) -> None:
+        self.network: Final = network
         self.code: Final = code
         self.name: Final = name
         self.scopes: Final = scopes
@@ -106,18 +113,25 @@ class LoginCodes:
         return len(self._logins)
 
     def begin(
-        self, name: str, scopes: tuple[Scope, ...], days: float | None, address: str
+        self,
+        name: str,
+        scopes: tuple[Scope, ...],
+        days: float | None,
+        address: str,
+        network: str = "",
     ) -> LoginBegun:
-        """Begin a login. Raise TooMany if too many wait, of this address or of all."""
+        """Begin a login. `network`: of the address, "" for the address itself. Raise TooMany if too
+        many wait, of this network or of all."""
+        network = network or address
         self._forget()
-        of_address = sum(each.address == address for each in self._logins.values())
-        if len(self._logins) >= _MOST or of_address >= _MOST_OF_ADDRESS:
+        of_network = sum(each.network == network for each in self._logins.values())
+        if len(self._logins) >= _MOST or of_network >= _MOST_OF_ADDRESS:
             raise TooMany("Too many logins wait to be confirmed; try again in some minutes.")
         taken = {each.code for each in self._logins.values()}
         while (code := "".join(secrets.choice(_LETTERS) for _ in range(_CODE))) in taken:
             pass
         secret = secrets.token_urlsafe(32)
-        login = _Login(code, name, scopes, days, address)
+        login = _Login(code, name, scopes, days, address, network)
         login.ends_at = self._clock() + _LIFE_S
         self._logins[_hash(secret)] = login
         return LoginBegun(shown(code), secret, _INTERVAL_S, int(_LIFE_S))

@@ -29,7 +29,7 @@ log: Final = logging.getLogger(__name__)
 FOLDER: Final = "revoked"
 SESSION_ENDED: Final = 4401  # close code of sockets
 _LOOK_S: Final = 0.2
-_STANDING_EACH: Final = 5  # at each fifth look also at what a credential is worth: it reads files
+_STANDING_EACH: Final = 4  # at each fourth look also at what a credential is worth: it reads files
 _SETTLED_NS: Final = 3_000_000_000  # until a folder's time has changed with its next entry for sure
 _ID: Final = re.compile(r"[A-Za-z0-9]{1,40}")
 _SESSION: Final = "session-"
@@ -248,7 +248,9 @@ class SessionGuard:
     def _has_other_rights(self, now: Standing) -> bool:
         if now.person.role != self._first.person.role:
             return True
-        return self._follows_groups and now.groups != self._first.groups
+        first = self._first
+        is_changed = now.groups != first.groups or now.person.name != first.person.name
+        return self._follows_groups and is_changed
 
     def let_go(self) -> None:
         """Undo the cancellation of the task by this guard, so that the task can go on."""

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import msgspec
 
-from action_assistant.errors import NotFound
+from action_assistant.errors import Conflict, NotFound
 from action_assistant.private_files import replace_file
 from action_assistant.web.auth.keys import SESSION_SECONDS, Person, Session
 from action_assistant.web.auth.revocations import Revocations
@@ -26,6 +26,8 @@ log: Final = logging.getLogger(__name__)
 
 FOLDER: Final = "sessions"
 _MOST: Final = 5000  # that one process notes: somebody may sign in again and again
+#: Sessions of one person with which further devices are added.
+MOST_DEVICES: Final = 30
 _USE_S: Final = 60.0  # between two notes of the use of one session
 
 
@@ -130,14 +132,21 @@ class SessionFiles:
         self._revoked.end(session)
         self._forget(self._path(session))
 
-    def end_all_of(self, person: str, *, but: str | None = None) -> int:
-        """End the open sessions of a person, except the one with the id `but`; return how many.
+    def end_all_of(self, person: str, *, but: str | None = None) -> list[str]:
+        """End the open sessions of a person, except the one with the id `but`; return their ids.
         Raise Unavailable if the folder cannot store that."""
         theirs = [each.id for each in self.every() if each.person.id == person and each.id != but]
         for each in theirs:
             self._revoked.end(each)
             self._forget(self._path(each))
-        return len(theirs)
+        return theirs
+
+    def require_room(self, person: str) -> None:
+        """Raise Conflict if a person is signed in on as many devices as one may have."""
+        if sum(each.person.id == person for each in self.every()) >= MOST_DEVICES:
+            raise Conflict(
+                f"You are signed in on {MOST_DEVICES} devices; sign one of them out first."
+            )
 
     def _path(self, session: str) -> Path:
         return self._folder / f"{session}.json"

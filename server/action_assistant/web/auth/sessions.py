@@ -1,6 +1,7 @@
 """Sign-in: a token or an invitation is traded for a cookie that either process can verify."""
 
 import contextlib
+import hmac
 import time
 from collections.abc import Awaitable, Callable
 from typing import Annotated, Any, Final, Literal, Protocol, TypeAlias
@@ -28,7 +29,7 @@ from action_assistant.web.auth.access import (
     session_of,
 )
 from action_assistant.web.auth.browser_names import browser_name
-from action_assistant.web.auth.caller import Origin, acting_for
+from action_assistant.web.auth.caller import Origin, acting_for, client_network
 from action_assistant.web.auth.device_codes import DeviceCodes, WaitingDevice
 from action_assistant.web.auth.keys import SESSION_SECONDS, Keys, Person, PersonRef, Session
 from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
@@ -111,6 +112,14 @@ class Revocation(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     token: str | None = None
 
 
+class SessionEnd(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The end of a session by its person. `seal`: from the editor's list of their devices."""
+
+    session: Annotated[str, msgspec.Meta(max_length=40)]
+    person: Annotated[str, msgspec.Meta(max_length=40)]
+    seal: Annotated[str, msgspec.Meta(max_length=100)]
+
+
 class InvitationRegistry(Protocol):
     """Knows the links, and the people who came in by them."""
 
@@ -129,6 +138,10 @@ class InvitationRegistry(Protocol):
 SignInMeans: TypeAlias = Literal["token", "link", "personal", "device", "oidc"]
 
 
+#: What can be ended for a process that has no people of its own.
+EndableKind: TypeAlias = Literal["invitation", "session", "person", "token"]
+
+
 class SessionAudit(Protocol):
     """Keeps who signed in and out."""
 
@@ -137,6 +150,16 @@ class SessionAudit(Protocol):
 
     def signed_out(self, session: Session) -> None:
         """Keep that the person of a session has ended it."""
+
+
+class ToldAudit(SessionAudit, Protocol):
+    """Keeps what people told a process without people of its own."""
+
+    def ended_here(self, what: EndableKind, id_: str, author: str) -> None:
+        """Keep that a person told this process of the end of something."""
+
+    def person_stored(self, person: PersonFile, author: str) -> None:
+        """Keep that a person told this process the state of somebody."""
 
 
 class NoAudit:
@@ -211,7 +234,7 @@ class Sessions:
                     raise Unauthenticated("This is not the token of this server.")
                 # The link again, in a browser that is or was signed in: the same person, since what
                 # older tabs have written belongs to them.
-                return self._begun(name, request)
+                return await self._begun(name, request)
             case SignIn(token=None, invitation=str(proof)):
                 self.admit(request)
                 return await self._invited(proof, name, request)
@@ -242,7 +265,7 @@ class Sessions:
         now = session_of(request)
         if now is not None and rank(identity_of(request).person.role) >= rank(invited.role):
             return _renamed(self._keys, now, name)
-        session = self._begun(name, request, role=invited.role, invitation=invited.id)
+        session = await self._begun(name, request, role=invited.role, invitation=invited.id)
         with acting_for(session.person.id, connection_of(session, request)):
             await self._reception().welcome(invited.id, session.person)
         return session
@@ -271,7 +294,7 @@ class Sessions:
             seconds=self._standings.limits[person.role].longest,
         )
 
-    def _begun(
+    async def _begun(
         self,
         name: str,
         request: _Asking,
@@ -281,11 +304,15 @@ class Sessions:
     ) -> Session:
         """Return a session by the token or a group link: of the person of this browser, under a
         new id where that is a new person. A person with a personal link stays who they are only by
-        that."""
+        that. A session whose role rises gets a new id, and the old one ends: somebody who has put a
+        cookie of their own into this browser shares nothing with it from then on."""
         now = session_of(request)
         session = now or expired_session(request)
         if session is not None and session.personal:
             now = session = None
+        if now is not None and rank(role) > rank(identity_of(request).person.role):
+            await self.leave(request)
+            now = None
         known = None if session is None else session.person
         return self._keys.new_session(
             name or _name(known),
@@ -351,8 +378,7 @@ class Sessions:
 
     def admit(self, request: _Asking) -> None:
         """Raise TooMany if this address tries too often."""
-        address = request.client.host if request.client is not None else ""
-        if self._pace is not None and not self._pace.of(address).take():
+        if self._pace is not None and not self._pace.of(client_network(request)).take():
             raise TooMany("Too many tries from your address; wait a minute.")
 
 
@@ -406,6 +432,7 @@ def _new_device(
         confirmed = codes.confirmed(data.claim)
         if confirmed is None:
             return Response(DeviceAnswer(), status_code=200)
+        await to_thread.run_sync(standings.browsers.require_room, confirmed.session.person.id)
         session = sessions.follow(confirmed.session)
         codes.collected(data.claim)
         with acting_for(session.person.id, connection_of(session, request)):
@@ -485,10 +512,12 @@ def _own_session(
 
 
 def revocation(
-    revoked: Revocations, people: PeopleFiles, audit: SessionAudit
+    keys: Keys, revoked: Revocations, people: PeopleFiles, audit: ToldAudit, *, limits: bool
 ) -> list[ControllerRouterHandler]:
     """Return the routes by which owners end sessions and change persons in a process without
-    people of its own: the runner, which may be on another computer. `audit` keeps who signed out."""
+    people of its own: the runner, which may be on another computer. `audit` keeps who signed out;
+    with `limits` each network ends so many sessions of its own."""
+    pace = TokenBuckets(_TRIES_AT_ONCE, _TRIES_PER_MINUTE / 60) if limits else None
 
     @put(
         "/api/members/{person:str}",
@@ -497,13 +526,16 @@ def revocation(
         operation_id="storeMember",
         guards=[Needs("share")],
     )
-    async def store(person: FromPath[str], data: JSONBody[PersonFile]) -> None:
+    async def store(person: FromPath[str], data: JSONBody[PersonFile], request: _Asking) -> None:
         if person != data.id:
             raise BadInput("The path names another person than the body.", where={"path": "/id"})
         try:
             await to_thread.run_sync(people.write, data)
         except ValueError as error:
             raise BadInput(f"{error}.", where={"path": "/id"}) from error
+        finally:
+            if people.get(data.id) == data:  # also if only this process holds it
+                audit.person_stored(data, identity_of(request).person.id)
 
     @post(
         "/api/revocations",
@@ -512,14 +544,16 @@ def revocation(
         operation_id="revokeSessions",
         guards=[Needs("share")],
     )
-    async def revoke(data: JSONBody[Revocation]) -> None:
-        enders = {
+    async def revoke(data: JSONBody[Revocation], request: _Asking) -> None:
+        enders: dict[EndableKind, Callable[[str], None]] = {
             "invitation": revoked.add,
             "session": revoked.end,
             "person": revoked.end_person,
             "token": revoked.end_token,
         }
-        named = {kind: id_ for kind in enders if (id_ := getattr(data, kind)) is not None}
+        named: dict[EndableKind, str] = {
+            kind: id_ for kind in enders if (id_ := getattr(data, kind)) is not None
+        }
         if len(named) != 1:
             raise BadInput("Name one invitation, session, person or token.")
         ((kind, id_),) = named.items()
@@ -527,6 +561,10 @@ def revocation(
             await to_thread.run_sync(enders[kind], id_)
         except ValueError as error:
             raise BadInput(f"{error}.", where={"path": f"/{kind}"}) from error
+        except Unavailable:  # it holds here
+            audit.ended_here(kind, id_, identity_of(request).person.id)
+            raise
+        audit.ended_here(kind, id_, identity_of(request).person.id)
 
     @delete(
         "/api/session",
@@ -539,7 +577,27 @@ def revocation(
         note_sign_out(audit, request)
         await _end(revoked, request)
 
-    return [store, revoke, sign_out]
+    @post(
+        "/api/sessions/ended",
+        status_code=204,
+        summary="Tell this process that a person has ended one of their own sessions",
+        operation_id="tellEndedSession",
+        request_max_body_size=_BODY,
+        guards=[Open()],
+    )
+    async def end_own(data: JSONBody[SessionEnd], request: _Asking) -> None:
+        if pace is not None and not pace.of(client_network(request)).take():
+            raise TooMany("Too many sessions ended from your address; wait a minute.")
+        expected = keys.end_seal(data.session, data.person)
+        if not hmac.compare_digest(expected.encode(), data.seal.encode()):
+            raise BadInput("This server did not seal the end of this session.")
+        try:
+            await to_thread.run_sync(revoked.end, data.session)
+        finally:
+            with acting_for(data.person, Origin(address=client_address(request.scope))):
+                audit.ended_here("session", data.session, data.person)
+
+    return [store, revoke, sign_out, end_own]
 
 
 async def _end(revoked: Revocations, request: _Asking) -> None:

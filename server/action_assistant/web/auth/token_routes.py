@@ -12,6 +12,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import Forbidden, TooMany
 from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.web.auth.access import Needs, Open, PersonOnly, SignedIn, identity_of
+from action_assistant.web.auth.caller import client_network
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.roles import allowed
 from action_assistant.web.auth.tokens import TokenFiles, TokenList, TokenRecord
@@ -79,8 +80,7 @@ def adoption(tokens: TokenFiles, *, limits: bool) -> list[ControllerRouterHandle
         guards=[Open()],
     )
     async def adopt(data: JSONBody[Adopted], request: _Asking) -> None:
-        address = request.client.host if request.client is not None else ""
-        if pace is not None and not pace.of(address).take():
+        if pace is not None and not pace.of(client_network(request)).take():
             raise TooMany("Too many tokens from your address; wait a minute.")
         await to_thread.run_sync(tokens.adopt, data.record)
 
