@@ -77,6 +77,9 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "folders": CommandEntry("folders", "folders of graphs: list, new, rename, move, remove, put"),
     "drafts": CommandEntry("drafts", "drafts of a graph: list, new, merge", described=True),
     "runs": CommandEntry("runs", "list the runs, newest first", described=True),
+    "release": CommandEntry(
+        "remote", "release a version, or withdraw that: robots may take no other"
+    ),
     "run": CommandEntry(
         "remote",
         "publish a graph as it is now, start it and wait for its end; exit 1 if it does not "

@@ -45,6 +45,17 @@ def test_rights_a_baton_and_locks_are_set_and_shown(capfd: pytest.CaptureFixture
     assert "is no date" in said("rights", "David", "--operator", "abc=soon", code=1)
     assert "not both" in said("rights", "David", "--all", "--operator", "abc", code=1)
     assert "every operator may" in said("rights", "David", "--all", "--baton", "off")
+    rules = ("--watched", "on", "--drill-days", "30", "--released-only", "on")
+    shown = said("rights", "David", *rules)
+    for words in ("says who watches it", "only released versions start", "counts for 30 days"):
+        assert words in shown
+    shown = said("rights", "David", "--watched", "off", "--drill-days", "0", "--baton", "on")
+    assert ("watches it" in shown, "30 days" in shown, "released" in shown) == (False, False, True)
+    assert "released" not in said("rights", "David", "--released-only", "off", "--baton", "off")
+    assert main(["robots", "drill", "David"]) == 1  # none was ever made
+    assert "There is no such run" in said(
+        *("drill", "David", "--run", "x", "--saw-it-stop", "yes", "--hardware-stop", "no"), code=1
+    )
     assert "Say why it is out of service" in said("lock", "David", "--reason", " ", code=1)
     assert "was not stopped" in said("lock", "David", "--reason", "It leaks oil.")
     assert "OUT OF SERVICE" in said("list")
@@ -74,3 +85,31 @@ def test_only_an_owner_switches_off_that_a_second_person_is_asked(product: Produ
             assert refused.status_code == 403, refused.text
         assert runner.patch("/api/robots/Carol", json={"domain": 185}, headers=headers).is_success
         assert runner.patch("/api/robots/Carol", json={"profile": {}}).is_success
+
+
+def test_a_version_is_released_and_withdrawn_in_both_processes(
+    product: Product, capfd: pytest.CaptureFixture[str]
+) -> None:
+    def said(*words: str) -> str:
+        assert main(["release", *words]) == 0
+        return capfd.readouterr().out
+
+    with product.editor() as editor:
+        graph = editor.post("/api/graphs", json={"name": "crossing"}).json()["id"]
+        made = editor.post(f"/api/graphs/{graph}/versions", json={"label": "tested"}).json()
+        released = product.data / "released" / f"{made['digest']}-{made['id']}.json"
+        assert said("crossing@tested") == "tested is released\n"
+        (listed,) = editor.get(f"/api/graphs/{graph}/versions").json()
+        assert listed["released"]["by"]["id"] == "local"
+        assert released.exists()
+        assert said(graph) == "tested is released\n"  # again: it stays
+        assert said(f"crossing@{made['id']}", "--withdraw") == "tested is not released any more\n"
+        assert "released" not in editor.get(f"/api/versions/{made['id']}").json()
+        assert not released.exists()
+        draft = editor.post(f"/api/graphs/{graph}/drafts", json={"name": "try"}).json()
+        version = editor.post(f"/api/graphs/{draft['id']}/versions", json={}).json()
+        refused = editor.put(f"/api/versions/{version['id']}/release")
+        assert (refused.status_code, "can never be released" in refused.text) == (409, True)
+        assert editor.put("/api/versions/none/release").status_code == 404
+        kinds = [each["text"] for each in editor.get("/api/audit").json()["rows"]]
+        assert any(each.startswith("released version") for each in kinds)

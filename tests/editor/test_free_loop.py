@@ -251,6 +251,8 @@ ASKED: Final[dict[str, tuple[str, str, Any] | None]] = {
     "listVersions": ("GET", "/api/graphs/{g}/versions", None),
     "publishVersion": ("POST", "/api/graphs/{g}/versions", {"label": "one"}),
     "getVersion": ("GET", "/api/versions/{v}", None),
+    "releaseVersion": ("PUT", "/api/versions/{v}/release", None),
+    "withdrawRelease": ("DELETE", "/api/versions/{v}/release", None),
     "getSubgraphs": ("GET", "/api/graphs/{g}/subgraphs", None),
     "downloadSubgraphs": ("GET", "/api/graphs/{g}/subgraphs.zip", None),
     "getFlatGraph": ("GET", "/api/graphs/{g}/flat", None),

@@ -110,7 +110,13 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
     setBusy(true);
     try {
       const operators = all ? ("all" as const) : [...chosen];
-      await setRights(runner ?? "", robot.name, { operators, baton, watched: robot.watched });
+      await setRights(runner ?? "", robot.name, {
+        operators,
+        baton,
+        watched: robot.watched,
+        drill_days: robot.drill_days,
+        released_only: robot.released_only,
+      });
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
     } catch (problem) {

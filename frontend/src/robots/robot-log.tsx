@@ -86,12 +86,14 @@ function robotLogText(told: RobotLogLine): string {
       return `${isolated(told.sender)} put it out of service: ${told.why}`;
     case "unlocked":
       return `${isolated(told.sender)} took the lock of ${isolated(told.was)} off`;
+    case "drilled":
+      return `${isolated(told.sender)} made a Stop drill with run ${told.number}: ${told.why === "" ? "it passed" : `it failed: ${told.why}`}`;
   }
 }
 
 /** Shows the effect of a foreign command on a run from here. */
 function Effect({ told }: { told: RobotLogLine }) {
-  if (told.run === null) return null;
+  if (told.run === null || told.kind === "drilled") return null;
   const stopped = told.command === "start" || told.command === "stop";
   return (
     <Link to={`/runs/${told.run}`} className="ink-error weight-600">

@@ -73,6 +73,16 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         metavar=("CODE,…", "REASON"),
         help="start despite these problems, and why: 'two-at-once' 'They share no space.'",
     )
+    run.add_argument(
+        "--watching",
+        action="append",
+        default=[],
+        metavar="ROBOT",
+        help="you watch this robot, with its hardware stop within reach; again for each",
+    )
+    run.add_argument(
+        "--drill", action="store_true", help="it is for a Stop drill: press Stop while it moves"
+    )
     run.add_argument("--script", type=Path, metavar="S.json", help="what simulated actions do")
     run.add_argument("--label", default="", help="of the version")
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
@@ -91,6 +101,45 @@ def _robots(text: str) -> dict[str, str]:
     return robots
 
 
+def _add_release(release: argparse.ArgumentParser) -> None:
+    add_server(release, "patrol@tested")
+    release.add_argument(
+        "version", metavar="GRAPH[@VERSION]", help="its newest version, or one by label or id"
+    )
+    release.add_argument("--withdraw", action="store_true", help="withdraw its release")
+    release.set_defaults(handler=_release)
+
+
+def _release(options: argparse.Namespace) -> int:
+    """Run the command that releases a version or withdraws that, and tells the runner, which may be
+    on another computer. Return the exit code."""
+    method = "DELETE" if options.withdraw else "PUT"
+    with running(options) as server:
+        id_ = _version_id(server, options.version)
+        version = server.editor(method, f"/api/versions/{id_}/release").json()
+        release = {
+            "version": id_,
+            "digest": version.get("tree_digest") or version["digest"],
+            **version.get("released", {}),
+        }
+        body = {} if options.withdraw else {"json": release}
+        server.runner(method, f"/api/releases/{id_}", **body)
+    name = version["label"] or id_
+    print(one_line(f"{name} is {'not released any more' if options.withdraw else 'released'}"))
+    return 0
+
+
+def _version_id(server: Server, asked: str) -> str:
+    """Return the id of the version that GRAPH[@VERSION] names, the newest of several. Raise
+    RequestRefused if there is none."""
+    graph, at, wanted = asked.rpartition("@") if "@" in asked else (asked, "", "")
+    versions = server.editor("GET", f"/api/graphs/{server.graph_id(graph)}/versions").json()
+    for each in versions:
+        if not at or wanted in {each["id"], each["label"]}:
+            return str(each["id"])
+    raise RequestRefused(f"{asked!r} is no version of a graph: publish one first.")
+
+
 def _add_stop(stop: argparse.ArgumentParser) -> None:
     add_server(stop, "--all")
     which = stop.add_mutually_exclusive_group(required=True)
@@ -103,6 +152,7 @@ def _add_stop(stop: argparse.ArgumentParser) -> None:
 COMMANDS: Final = {
     "export": _add_export,
     "graphs": _add_graphs,
+    "release": _add_release,
     "run": _add_run,
     "stop": _add_stop,
 }
@@ -161,6 +211,10 @@ def _run(options: argparse.Namespace) -> int:
             order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
         if options.robots is not None:
             order |= {"engine": "conducted", "robots": options.robots, "lost": options.lost}
+        if options.watching:
+            order["watching"] = dict.fromkeys(options.watching, True)
+        if options.drill:
+            order["drill"] = True
         if options.accept is not None:
             codes, reason = options.accept
             order["override"] = {"codes": codes.split(","), "reason": reason}

@@ -63,6 +63,7 @@ def _add_robots(robots: argparse.ArgumentParser) -> None:
     remove.add_argument("name", metavar="NAME")
     remove.set_defaults(handler=_remove)
     _add_rights(words)
+    _add_drill(words)
     _add_baton(words)
     _add_service(words)
 
@@ -86,7 +87,35 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     rights.add_argument(
         "--baton", choices=["on", "off"], help="only the person who holds its baton may start there"
     )
+    rights.add_argument(
+        "--watched", choices=["on", "off"], help="each start says who watches the robot"
+    )
+    rights.add_argument(
+        "--drill-days",
+        type=int,
+        metavar="N",
+        help="its last Stop drill passed, and is so many days old at most; 0: nobody asks for one",
+    )
+    rights.add_argument(
+        "--released-only",
+        choices=["on", "off"],
+        help="only versions start there that an owner has released",
+    )
     rights.set_defaults(handler=_rights)
+
+
+def _add_drill(words: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
+    drill = command(
+        words,
+        "drill",
+        "record a Stop drill with a run that was stopped, and what you saw; without --run, list them",
+        "David --run RUN --saw-it-stop yes --hardware-stop yes",
+    )
+    drill.add_argument("name", metavar="NAME")
+    drill.add_argument("--run", metavar="RUN", help="id of the run")
+    drill.add_argument("--saw-it-stop", choices=["yes", "no"], help="you saw the robot stop")
+    drill.add_argument("--hardware-stop", choices=["yes", "no"], help="you tried its hardware stop")
+    drill.set_defaults(handler=_drill)
 
 
 def _add_baton(words: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -186,7 +215,8 @@ def _rights(options: argparse.Namespace) -> int:
         robot = _robot(server, options.name)
         if options.all and options.operator:
             raise RequestRefused("Say --all or --operator, not both.")
-        if options.all or options.operator or options.baton:
+        rules = (options.baton, options.watched, options.released_only, options.drill_days)
+        if options.all or options.operator or any(each is not None for each in rules):
             operators: Any = robot.operators
             if options.all:
                 operators = "all"
@@ -194,13 +224,65 @@ def _rights(options: argparse.Namespace) -> int:
                 operators = [_operator(each, server) for each in options.operator]
             wanted = {
                 "operators": operators,
-                "baton": robot.baton if options.baton is None else options.baton == "on",
+                "baton": _switched(options.baton, robot.baton),
+                "watched": _switched(options.watched, robot.watched),
+                "released_only": _switched(options.released_only, robot.released_only),
+                "drill_days": robot.drill_days
+                if options.drill_days is None
+                else options.drill_days or None,
             }
             body = msgspec.to_builtins(wanted)
             robot = _changed(server, "PUT", f"{_path(options)}/rights", body)
     print(one_line(f"{robot.name}: {_operators_text(robot)}"))
     print(one_line(_baton_text(robot)))
+    for said in _rules_texts(robot):
+        print(one_line(said))
     return 0
+
+
+def _switched(asked: str | None, before: bool) -> bool:
+    return before if asked is None else asked == "on"
+
+
+def _rules_texts(robot: "Robot") -> list[str]:
+    """Return a sentence for each further rule of a robot about starts."""
+    said = []
+    if robot.watched:
+        said.append(f"each start on {robot.name} says who watches it")
+    if robot.released_only:
+        said.append(f"only released versions start on {robot.name}")
+    if robot.drill_days is not None:
+        said.append(f"a Stop drill of {robot.name} counts for {robot.drill_days} days")
+    return said
+
+
+def _drill(options: argparse.Namespace) -> int:
+    """Record a Stop drill of a robot, or list those that were made. Return 1 if the last one failed
+    or was never made."""
+    with running(options) as server:
+        if options.run is not None:
+            if options.saw_it_stop is None or options.hardware_stop is None:
+                raise RequestRefused(
+                    "Say what you saw: --saw-it-stop and --hardware-stop, yes or no."
+                )
+            body = {
+                "run": options.run,
+                "saw_it_stop": options.saw_it_stop == "yes",
+                "hardware_stop": options.hardware_stop == "yes",
+            }
+            _changed(server, "POST", f"{_path(options)}/drills", body)
+        from action_assistant.runner.robots.registration import DrillShown
+
+        drills = decoded(server.runner("GET", f"{_path(options)}/drills"), list[DrillShown])
+    for each in drills:
+        how = (
+            f"failed: {each.failure}"
+            if each.failure
+            else f"passed, proven after {each.proof_ms} ms"
+        )
+        when = each.stopped_at.astimezone()
+        print(one_line(f"{when:%Y-%m-%d %H:%M}  run {each.number}  {each.by.name}  {how}"))
+    return 0 if drills and not drills[0].failure else 1
 
 
 def _operator(asked: str, server: Server) -> dict[str, Any]:

@@ -58,6 +58,13 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
         more, "go-on", "let a held run go on: its robots may begin to move at once", "RUN"
     )
     goes_on.add_argument("run", metavar="RUN", help="id of the run")
+    goes_on.add_argument(
+        "--watching",
+        action="append",
+        default=[],
+        metavar="ROBOT",
+        help="you watch this robot, with its hardware stop within reach; again for each",
+    )
     goes_on.set_defaults(handler=_go_on)
     _add_archives(more)
     _add_copy(more)
@@ -92,12 +99,15 @@ def _go_on(options: argparse.Namespace) -> int:
         held = server.runner("GET", path).json()["held"]
         if held is None:
             raise RequestRefused("The run is not held; it goes on already.")
-        press(server, f"{path}/go_on", {"since": held["since"]})
+        asked: dict[str, Any] = {"since": held["since"]}
+        if options.watching:
+            asked["watching"] = dict.fromkeys(options.watching, True)
+        press(server, f"{path}/go_on", asked)
     print(one_line(f"it goes on; it was held: {held['why']}"))
     return 0
 
 
-def press(server: Server, path: str, body: dict[str, str]) -> None:
+def press(server: Server, path: str, body: dict[str, Any]) -> None:
     """Send an order that may move robots (POST of `body` to `path`), and wait for the answer. If no
     answer comes, send it once more with the same request id, so that the two count once. Raise
     CannotStart if there is no answer then either."""

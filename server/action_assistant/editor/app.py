@@ -112,6 +112,7 @@ async def open_services(
                     services.graph_checks.names.read_ahead(),
                     services.audit.writing(journal),
                 ):
+                    await services.versions.write_releases()
                     if new:
                         await _greet(services, paths.examples())
                     yield services

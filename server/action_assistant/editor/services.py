@@ -34,6 +34,7 @@ from action_assistant.web.auth.access import person_of
 from action_assistant.web.auth.graph_seals import RulesFile
 from action_assistant.web.auth.keys import Keys, Person
 from action_assistant.web.auth.people_files import PeopleFiles
+from action_assistant.web.auth.released_versions import ReleasedVersions
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.network.connection_limits import ConnectionLimits
 
@@ -77,7 +78,9 @@ class EditorServices:
             self.rights.made,
         )
         self.folders = Folders(journal, self.rights)
-        self.versions = Versions(journal, self.graph_reader, self.graph_checks)
+        self.versions = Versions(
+            journal, self.graph_reader, self.graph_checks, ReleasedVersions(settings.data)
+        )
         self.library = Library(journal, self.graph_reader, self.rights.caller_sight)
         self.library_edits = LibraryEdits(
             journal, self.rooms, self.graph_reader, self.catalogue, self.library, workers.files

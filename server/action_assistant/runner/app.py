@@ -54,6 +54,7 @@ from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, ScrapeToken
 from action_assistant.web.auth.people_files import PeopleFiles
+from action_assistant.web.auth.released_versions import ReleasedVersions
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.session_limits import limits_of
@@ -180,6 +181,7 @@ async def _executing(
                     services.behaviours,
                     lambda *args: for_people.value(StoredRuns.checked_courses, *args),
                     services.index_folders,
+                    services.released.of,
                 ),
                 # A run that moves again is read with all its visits, and waits behind no question.
                 identity_now=services.identity_now,
@@ -254,6 +256,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     Journal.prepare(_database(settings), "runner", copies=settings.data / before_upgrade.FOLDER)
     revoked = Revocations(settings.data)
     services = RunnerServices()
+    services.released = ReleasedVersions(settings.data)
     public = settings.reached.public
     monitoring = Monitoring("runner", settings.data)
     monitoring.requests.refused_stranger = services.audit.refused_stranger

@@ -12,6 +12,7 @@ from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.robots.registration import RobotRegistered, RobotRemoved
 from action_assistant.runner.robots.rights import (
     BatonPassed,
+    Drilled,
     Holder,
     Locked,
     RightsSet,
@@ -37,7 +38,9 @@ from action_assistant.runner.runs.word_index import holds
 from action_assistant.schema.runner_tables import review, robot, robot_right, run
 from action_assistant.web.auth.keys import PersonRef
 
-_RIGHTS: Final = frozenset(each.kind for each in (RightsSet, BatonPassed, Locked, Unlocked))
+_RIGHTS: Final = frozenset(
+    each.kind for each in (RightsSet, BatonPassed, Locked, Unlocked, Drilled)
+)
 #: Columns of a run that have the same names in its request.
 _AS_REQUESTED: Final = set(run.c.keys()) & set(Requested.__struct_fields__)
 
@@ -157,12 +160,23 @@ def _rights(event: Event) -> Sequence[Executable]:
             values = {"holder": None if person is None else Holder(person, at)}
         case Locked(locks=locks) | Unlocked(locks=locks):
             values = {"locks": locks}
+        case Drilled() as drill:
+            values = {"drills": [drill]}
         case _:
             return ()
     values = {name: msgspec.to_builtins(value) for name, value in values.items()}
     name = event.stream.removeprefix(stream_of_robot(""))
-    first: dict[str, object] = {"rules": {}, "set_by": None, "holder": None, "locks": []}
+    first: dict[str, object] = {
+        "rules": {},
+        "set_by": None,
+        "holder": None,
+        "locks": [],
+        "drills": [],
+    }
     statement = upsert(robot_right).values(name=name, **(first | values))
+    if "drills" in values:
+        one = func.json_extract(statement.excluded.drills, "$[0]")
+        values = {"drills": func.json_insert(robot_right.c.drills, "$[#]", func.json(one))}
     return (statement.on_conflict_do_update(index_elements=["name"], set_=values),)
 
 

@@ -45,7 +45,8 @@ folder: Final = Table(
     Column("made_by", Text, nullable=False),
     Column("rule", Text),
 )
-#: A published version. Its UMRF stands in the body of the event `(stream, event_seq)`.
+#: A published version. Its UMRF stands in the body of the event `(stream, event_seq)`. An owner may have
+#: released it.
 version: Final = Table(
     "version",
     EDITOR,
@@ -61,6 +62,9 @@ version: Final = Table(
     Column("event_seq", BigInteger, nullable=False),
     Column("note", Text, nullable=False, server_default=""),
     Column("tree_digest", Text),
+    Column("released_at", BigInteger),
+    Column("released_by", Text),
+    Column("released_by_name", Text),
     Index(None, "graph", "at"),
     Index(None, "digest"),
 )

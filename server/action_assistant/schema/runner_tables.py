@@ -84,6 +84,7 @@ robot_right: Final = Table(
     Column("set_by", JSON(none_as_null=True)),
     Column("holder", JSON(none_as_null=True)),
     Column("locks", JSON, nullable=False),
+    Column("drills", JSON, nullable=False, server_default="[]"),
 )
 #: What people noted about a run, and what may be searched of it once it is over (`summed`).
 review: Final = Table(

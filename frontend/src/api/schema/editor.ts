@@ -1923,6 +1923,15 @@ export interface EditorApi {
         ][];
     };
     /**
+     * ReleaseView
+     * @description The owner who released a version, and when.
+     */
+    ReleaseView: {
+        by: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+    };
+    /**
      * Renames
      * @description The parameters that a library has renamed: pairs of the old path and the new path.
      */
@@ -2288,6 +2297,7 @@ export interface EditorApi {
      * VersionView
      * @description A version. `umrf`: the graph as text, kept unchanged; `subgraphs`: all graphs inside, by
      *     name; lists omit both. `tree_digest`: of the graph together with them, null for old versions.
+     *     `released`: by which owner it was released, null if it is not.
      */
     VersionView: {
         id: string;
@@ -2305,6 +2315,7 @@ export interface EditorApi {
         /** @default  */
         note?: string;
         subgraphs?: EditorApi["PinnedGraph"][];
+        released?: EditorApi["ReleaseView"];
     };
     /**
      * ViewLink
@@ -2547,6 +2558,10 @@ export interface EditorPaths {
     };
     "/api/versions/{version_id}/sight": {
         get: EditorOperations["getSight"];
+    };
+    "/api/versions/{version_id}/release": {
+        put: EditorOperations["releaseVersion"];
+        delete: EditorOperations["withdrawRelease"];
     };
     "/api/graphs/{graph_id}/flat": {
         get: EditorOperations["getFlatGraph"];
@@ -3719,6 +3734,34 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["Sight"];
+                };
+            };
+        };
+    };
+    releaseVersion: {
+        parameters: {
+            path: {
+                version_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["VersionView"];
+                };
+            };
+        };
+    };
+    withdrawRelease: {
+        parameters: {
+            path: {
+                version_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["VersionView"];
                 };
             };
         };

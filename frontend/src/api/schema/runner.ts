@@ -458,6 +458,32 @@ export interface RunnerApi {
         text: string;
     };
     /**
+     * DrillRequest
+     * @description Records a Stop drill with a run on the robot. `saw_it_stop`: the person saw the robot stop;
+     *     `hardware_stop`: they tried its hardware stop.
+     */
+    DrillRequest: {
+        run: string;
+        saw_it_stop: boolean;
+        hardware_stop: boolean;
+    };
+    /**
+     * DrillShown
+     * @description A Stop drill: with which run, by whom, when Stop was pressed, and the milliseconds until rest was
+     *     proven; null if it was not. `failure`: why it failed, "" if it passed.
+     */
+    DrillShown: {
+        run: string;
+        number: number;
+        by: RunnerApi["PersonRef"];
+        /** Format: date-time */
+        stopped_at: string;
+        proof_ms: number | null;
+        saw_it_stop: boolean;
+        hardware_stop: boolean;
+        failure: string;
+    };
+    /**
      * DurationBounds
      * @description A duration in seconds, between `least` and `most`; `most` is null without an upper bound.
      */
@@ -604,6 +630,8 @@ export interface RunnerApi {
         watching?: {
             [key: string]: boolean;
         };
+        /** @default false */
+        drill?: boolean;
     };
     /**
      * GroupShown
@@ -1313,6 +1341,18 @@ export interface RunnerApi {
         ][];
     };
     /**
+     * Release
+     * @description A released version. `digest`: of its graph together with those inside; `by`: the owner who released
+     *     it.
+     */
+    Release: {
+        version: string;
+        digest: string;
+        by: RunnerApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+    };
+    /**
      * ReplayFrame
      * @description The changes by one event. `head`: the changed fields of the run; `actions`: the changed
      *     actions.
@@ -1417,7 +1457,8 @@ export interface RunnerApi {
      * RightsWanted
      * @description The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
      *     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
-     *     they watch it.
+     *     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
+     *     `released_only`: only versions start there that an owner has released.
      */
     RightsWanted: {
         /** @default all */
@@ -1426,6 +1467,10 @@ export interface RunnerApi {
         baton?: boolean;
         /** @default false */
         watched?: boolean;
+        /** @default null */
+        drill_days?: number | null;
+        /** @default false */
+        released_only?: boolean;
     };
     /**
      * Robot
@@ -1435,7 +1480,9 @@ export interface RunnerApi {
      *     besides this runner. `actions`, `graphs`: the size of its index; null before its first answer.
      *     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
      *     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
-     *     `watched`: each start has the word of its person that they watch it.
+     *     `watched`: each start has the word of its person that they watch it; `drill_days`: how old its last
+     *     Stop drill may be; `drill_due`: why one has to be made before the next start, "" if none has to be;
+     *     `drills`: the newest 20, the newest first; `released_only`: only released versions start there.
      */
     Robot: {
         name: string;
@@ -1467,6 +1514,10 @@ export interface RunnerApi {
         holder: RunnerApi["HolderShown"] | null;
         locks: RunnerApi["LockShown"][];
         watched: boolean;
+        drill_days: number | null;
+        drill_due: string;
+        drills: RunnerApi["DrillShown"][];
+        released_only: boolean;
     };
     /**
      * RobotChange
@@ -1517,7 +1568,7 @@ export interface RunnerApi {
         /** Format: date-time */
         at: string;
         /** @enum {string} */
-        kind: "baton" | "became" | "commanded" | "index_write_asked" | "index_written" | "locked" | "rights_set" | "stop_asked" | "stop_proven" | "stop_unproven" | "unlocked";
+        kind: "baton" | "became" | "commanded" | "drilled" | "index_write_asked" | "index_written" | "locked" | "rights_set" | "stop_asked" | "stop_proven" | "stop_unproven" | "unlocked";
         command: string;
         graph: string;
         sender: string;
@@ -1968,7 +2019,8 @@ export interface RunnerApi {
      *     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
      *     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
      *     of each actor ("" for actions without one); `lost`: see `Led`. `watching`: true for each robot of
-     *     which the person says that they watch it, with its hardware stop within reach.
+     *     which the person says that they watch it, with its hardware stop within reach. `drill`: the start is
+     *     for a Stop drill of its robot, and so needs no earlier one.
      */
     StartRequest: {
         version: string;
@@ -2005,6 +2057,8 @@ export interface RunnerApi {
         watching?: {
             [key: string]: boolean;
         };
+        /** @default false */
+        drill?: boolean;
     };
     /**
      * StartShown
@@ -2384,6 +2438,14 @@ export interface RunnerPaths {
     };
     "/api/robots/{name}/unlock": {
         post: RunnerOperations["unlockRobot"];
+    };
+    "/api/robots/{name}/drills": {
+        get: RunnerOperations["listDrills"];
+        post: RunnerOperations["recordDrill"];
+    };
+    "/api/releases/{version}": {
+        put: RunnerOperations["storeRelease"];
+        delete: RunnerOperations["dropRelease"];
     };
     "/api/approvals": {
         get: RunnerOperations["listApprovals"];
@@ -3139,6 +3201,66 @@ interface RunnerOperations {
                 content: {
                     "application/json": RunnerApi["Robot"];
                 };
+            };
+        };
+    };
+    listDrills: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["DrillShown"][];
+                };
+            };
+        };
+    };
+    recordDrill: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["DrillRequest"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["Robot"];
+                };
+            };
+        };
+    };
+    storeRelease: {
+        parameters: {
+            path: {
+                version: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["Release"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    dropRelease: {
+        parameters: {
+            path: {
+                version: string;
+            };
+        };
+        responses: {
+            204: {
             };
         };
     };

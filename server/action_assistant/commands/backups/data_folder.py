@@ -30,7 +30,13 @@ from action_assistant.runner.archives.raw_messages import RawArchived
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
 from action_assistant.system import posix
-from action_assistant.web.auth import confirmations, graph_seals, keys, revocations
+from action_assistant.web.auth import (
+    confirmations,
+    graph_seals,
+    keys,
+    released_versions,
+    revocations,
+)
 from action_assistant.web.network import certificate
 
 BRANCHES: Final[tuple[Branch, ...]] = ("editor", "runner")
@@ -41,7 +47,7 @@ MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
 WHOLE: Final = frozenset(
     {
         *(keys.TOKEN_FILE, certificate.FOLDER, graph_seals.FILE),
-        *("people", "sessions", "sessions.db", "tokens", "views"),
+        *("people", released_versions.FOLDER, "sessions", "sessions.db", "tokens", "views"),
     }
 )
 #: Files that are created again, or that belong to this data folder only.

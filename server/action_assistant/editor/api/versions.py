@@ -3,7 +3,7 @@
 from typing import Any
 
 import msgspec
-from litestar import Request, Response, get, post
+from litestar import Request, Response, delete, get, post, put
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.editor.api.graphs import Seq
@@ -12,6 +12,7 @@ from action_assistant.editor.interchange.subgraphs import zipped
 from action_assistant.editor.services import EditorState
 from action_assistant.web.auth.access import Needs, person_of
 from action_assistant.web.auth.graph_seals import Sight
+from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.server.openapi import FileBytes, answer
 
 
@@ -114,7 +115,30 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         digest, graphs = await services.versions.graphs_in(version_id)
         return await services.rights.sight_of(version_id, digest, graphs)
 
+    @put(
+        "/api/versions/{version_id:str}/release",
+        summary="Release a version: robots of which their owners demand that start no other",
+        operation_id="releaseVersion",
+        guards=[Needs("share")],
+    )
+    async def release(version_id: str, request: Request[Any, Any, Any]) -> VersionView:
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        return await services.versions.release(version_id, PersonRef(person.id, person.name))
+
+    @delete(
+        "/api/versions/{version_id:str}/release",
+        status_code=200,
+        summary="Withdraw the release of a version",
+        operation_id="withdrawRelease",
+        guards=[Needs("share")],
+    )
+    async def withdraw(version_id: str, request: Request[Any, Any, Any]) -> VersionView:
+        services, person = app_state.services, person_of(request)
+        await services.people.seen(person)
+        return await services.versions.withdraw(version_id, PersonRef(person.id, person.name))
+
     return [
         *(list_versions, publish_version, get_subgraphs, download_subgraphs),
-        *(get_version, get_sight),
+        *(get_version, get_sight, release, withdraw),
     ]

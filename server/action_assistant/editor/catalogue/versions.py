@@ -1,8 +1,10 @@
 """Versions: what a graph was at one seq, published as UMRF that never changes again."""
 
+import logging
 from datetime import datetime
 from typing import Any, Final
 
+import anyio
 import msgspec
 from sqlalchemy import Connection, Row, Select, select
 
@@ -10,7 +12,14 @@ from action_assistant.editor.catalogue.graph_checks import HIDDEN_INSIDE, GraphC
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents
 from action_assistant.editor.log import graph_events as h
-from action_assistant.errors import BadInput, Forbidden, NotFound, TooLarge
+from action_assistant.errors import (
+    BadInput,
+    Conflict,
+    Forbidden,
+    NotFound,
+    Refused,
+    TooLarge,
+)
 from action_assistant.journal.journal import Journal
 from action_assistant.random_ids import random_id
 from action_assistant.schema import editor_tables
@@ -18,6 +27,9 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.umrf.run_size import MOST_ACTIONS, MOST_INSIDE, excess
 from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.auth.released_versions import Release, ReleasedVersions
+
+log: Final = logging.getLogger(__name__)
 
 LABEL_LIMIT: Final = 200  # characters
 NOTE_LIMIT: Final = 4_000  # characters
@@ -60,9 +72,17 @@ class InsideView(msgspec.Struct, frozen=True):
     cut: bool
 
 
+class ReleaseView(msgspec.Struct, frozen=True):
+    """The owner who released a version, and when."""
+
+    by: PersonRef
+    at: datetime
+
+
 class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
     """A version. `umrf`: the graph as text, kept unchanged; `subgraphs`: all graphs inside, by
-    name; lists omit both. `tree_digest`: of the graph together with them, null for old versions."""
+    name; lists omit both. `tree_digest`: of the graph together with them, null for old versions.
+    `released`: by which owner it was released, null if it is not."""
 
     id: str
     graph: str
@@ -75,12 +95,21 @@ class VersionView(msgspec.Struct, frozen=True, omit_defaults=True):
     umrf: UmrfGraph | None = None
     note: str = ""
     subgraphs: tuple[PinnedGraph, ...] | None = None
+    released: ReleaseView | None = None
 
 
 class Versions:
-    """Publishes and lists versions of graphs."""
+    """Publishes, releases and lists versions of graphs."""
 
-    def __init__(self, journal: Journal, graph_reader: GraphReader, checks: GraphChecks) -> None:
+    def __init__(
+        self,
+        journal: Journal,
+        graph_reader: GraphReader,
+        checks: GraphChecks,
+        released: ReleasedVersions,
+    ) -> None:
+        self._released = released
+        self._releasing = anyio.Lock()
         self._journal = journal
         self._graph_reader = graph_reader
         self._checks = checks
@@ -133,6 +162,56 @@ class Versions:
         inside = (each.graph for each in published.subgraphs)
         return row.tree_digest or row.digest, tuple(dict.fromkeys((row.graph, *inside)))
 
+    async def release(self, version: str, author: PersonRef) -> VersionView:
+        """Release a version in the name of an owner. Doing it again writes its file again. Raise
+        NotFound if there is none with this id, Conflict if it is one of a draft, Unavailable if that
+        cannot be stored, or no runner can read it yet."""
+        async with self._releasing:
+            row = await self._row(version)
+            graph = editor_tables.graph.c
+            named = select(graph.draft_of).where(graph.id == row.graph)
+            if any(each.draft_of is not None for each in await self._journal.query(named)):
+                raise Conflict(
+                    "A version of a draft can never be released: merge the draft, and release a version "
+                    "of its graph."
+                )
+            if row.released_at is None:
+                body = h.VersionReleased(version, author.name)
+                await self._journal.append(row.stream, [h.draft(h.RELEASED, author.id, body)])
+                row = await self._row(version)
+            await anyio.to_thread.run_sync(self._released.add, _release_of(row))
+        return _view(row)
+
+    async def withdraw(self, version: str, author: PersonRef) -> VersionView:
+        """Withdraw the release of a version: from then on no robot that demands one takes it. Raise
+        NotFound if there is none with this id, Unavailable if that cannot be stored."""
+        async with self._releasing:
+            row = await self._row(version)
+            await anyio.to_thread.run_sync(self._released.remove, version)
+            if row.released_at is not None:
+                body = h.VersionReleased(version, author.name)
+                withdrawn = h.draft(h.RELEASE_WITHDRAWN, author.id, body)
+                await self._journal.append(row.stream, [withdrawn])
+        return _view(await self._row(version))
+
+    async def write_releases(self) -> None:
+        """Make the files of released versions equal to the log, which may say more or less after a
+        crash or a restored backup. A fault is logged: nothing more is released by it."""
+        rows = await self._journal.query(
+            select(editor_tables.version).where(editor_tables.version.c.released_at.is_not(None))
+        )
+        try:
+            await anyio.to_thread.run_sync(self._released.make_equal, map(_release_of, rows))
+        except Refused as refused:
+            log.error("the released versions: %s", refused.detail)
+
+    async def _row(self, version: str) -> Row[Any]:
+        chosen = select(editor_tables.version).where(editor_tables.version.c.id == version)
+        rows = await self._journal.query(chosen)
+        if not rows:
+            raise NotFound(f"There is no version {version!r}.")
+        return rows[0]
+
     async def inside(self, graph: str, seq: int | None) -> InsideView:
         """Return the graphs that publishing a graph at its change `seq` (None: the newest) would
         include. Raise NotFound for an unknown graph, Conflict for an unknown change, Unavailable if
@@ -158,11 +237,7 @@ class Versions:
     async def _published(self, version: str) -> tuple[Row[Any], h.VersionPublished]:
         """Return the row of a version and its event. Raise NotFound if there is none with this id,
         Forbidden if the person may not see a graph inside."""
-        chosen = select(editor_tables.version).where(editor_tables.version.c.id == version)
-        rows = await self._journal.query(chosen)
-        if not rows:
-            raise NotFound(f"There is no version {version!r}.")
-        row = rows[0]
+        row = await self._row(version)
         (event,) = await self._journal.read(row.stream, after=row.event_seq - 1, upto=row.event_seq)
         published = msgspec.json.decode(event.body, type=h.VersionPublished)
         if not all([await self._checks.caller_sees(each.graph) for each in published.subgraphs]):
@@ -238,4 +313,16 @@ def _view(row: Row[Any]) -> VersionView:
         at=h.when(row.at),
         tree_digest=row.tree_digest,
         note=row.note,
+        released=None if row.released_at is None else _released_view(row),
     )
+
+
+def _released_view(row: Row[Any]) -> ReleaseView:
+    by = PersonRef(row.released_by, row.released_by_name or "")
+    return ReleaseView(by, h.when(row.released_at))
+
+
+def _release_of(row: Row[Any]) -> Release:
+    """Return the release of a version, from its row in the table."""
+    view, digest = _released_view(row), row.tree_digest or row.digest
+    return Release(version=row.id, digest=digest, by=view.by, at=view.at)

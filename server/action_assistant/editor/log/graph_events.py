@@ -47,6 +47,8 @@ BUILT: Final = "action.built.v1"
 DELETED: Final = "graph.deleted.v1"
 RECOVERED: Final = "graph.recovered.v1"
 PUBLISHED: Final = "version.published.v1"
+RELEASED: Final = "version.released.v1"
+RELEASE_WITHDRAWN: Final = "version.release_withdrawn.v1"
 NAMED: Final = "person.named.v1"
 INVITED: Final = "invitation.made.v1"
 ACCEPTED: Final = "invitation.accepted.v1"
@@ -201,6 +203,13 @@ class VersionPublished(msgspec.Struct, frozen=True):
     note: str = ""
     subgraphs: tuple[PinnedSubgraph, ...] = ()
     tree_digest: str | None = None
+
+
+class VersionReleased(msgspec.Struct, frozen=True):
+    """An owner released the version `id`, or withdrew that: robots may demand it before a start."""
+
+    id: str
+    name: str
 
 
 class GraphFiled(msgspec.Struct, frozen=True):
@@ -440,6 +449,8 @@ def _about(event: Event, graph: str) -> Sequence[Executable]:
             return [this.values(deleted_at=None)]
         case "version.published.v1":
             return [insert(editor_tables.version).values(_version(event, graph))]
+        case "version.released.v1" | "version.release_withdrawn.v1":
+            return [_release(event)]
         case _:
             return ()
 
@@ -451,6 +462,20 @@ def _merged(merged: GraphMerged) -> Sequence[Executable]:
     if merged.source == merged.draft:
         base["merged_seq"] = merged.upto
     return [draft.values(base)]
+
+
+def _release(event: Event) -> Executable:
+    """Return the statement that marks a version as released, or as not released any more."""
+    body = _read(event, VersionReleased)
+    values: dict[str, Any] = dict.fromkeys(("released_at", "released_by", "released_by_name"))
+    if event.kind == RELEASED:
+        values = {
+            "released_at": event.at,
+            "released_by": event.author,
+            "released_by_name": body.name,
+        }
+    version = editor_tables.version
+    return update(version).where(version.c.id == body.id).values(values)
 
 
 def _version(event: Event, graph: str) -> dict[str, Any]:

@@ -60,6 +60,8 @@ _ABOUT: Final[Mapping[str, str]] = {
     h.DELETED: "deleted {graph}",
     h.RECOVERED: "brought back {graph}",
     h.PUBLISHED: "published version {id} of {graph}",
+    h.RELEASED: "released version {id} of {graph}",
+    h.RELEASE_WITHDRAWN: "withdrew the release of version {id} of {graph}",
     "graph.filed.v1": "moved {graph} to another folder",
     "graph.ruled.v1": "changed who may see or edit {graph}",
 }

@@ -3,20 +3,23 @@
 from datetime import UTC, datetime
 from typing import Annotated, Any, Final, Literal
 
+import anyio
 import msgspec
-from litestar import Request, get, post, put
+from litestar import Request, delete, get, post, put
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput
 from action_assistant.kit.moments import sent_us
 from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.api.services import RunnerServices
-from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.robots.registration import DrillShown, Robot, drill_view
 from action_assistant.runner.robots.rights import Operator, Rules
 from action_assistant.runner.runs import views
+from action_assistant.runner.start.drills import DrillRequest
 from action_assistant.safe_text import hold_names
-from action_assistant.web.auth.access import Needs, identity_of
+from action_assistant.web.auth.access import Needs, PersonOnly, identity_of
 from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.auth.released_versions import Release
 
 _MOST: Final = 200  # people and groups of one robot
 _Asking = Request[Any, Any, Any]
@@ -36,13 +39,16 @@ class OperatorWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
-    they watch it."""
+    they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
+    `released_only`: only versions start there that an owner has released."""
 
     operators: (
         Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
     ) = "all"
     baton: bool = False
     watched: bool = False
+    drill_days: Annotated[int, msgspec.Meta(ge=1, le=3650)] | None = None
+    released_only: bool = False
 
 
 class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -92,7 +98,13 @@ class RightsShown(msgspec.Struct, frozen=True, kw_only=True):
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     """Return the routes of the rights of robots."""
-    return [*_rules(services), *_baton(services), *_service(services)]
+    return [
+        *_rules(services),
+        *_baton(services),
+        *_service(services),
+        *_drills(services),
+        *_releases(services),
+    ]
 
 
 def _rules(services: RunnerServices) -> list[ControllerRouterHandler]:
@@ -216,6 +228,59 @@ def _service(services: RunnerServices) -> list[ControllerRouterHandler]:
     return [lock, unlock]
 
 
+def _drills(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @post(
+        "/api/robots/{name:str}/drills",
+        summary="Record a Stop drill: a run there that was stopped, and what a person saw",
+        operation_id="recordDrill",
+        guards=[PersonOnly(), Needs("operate")],
+    )
+    async def record(name: str, data: DrillRequest, request: _Asking) -> Robot:
+        await services.control.record_drill(name, data, author_of(request))
+        return services.control.robot_view(name)
+
+    @get(
+        "/api/robots/{name:str}/drills",
+        summary="All Stop drills of a robot, newest first",
+        operation_id="listDrills",
+        guards=[Needs("see")],
+    )
+    async def drills(name: str) -> list[DrillShown]:
+        services.control.robots.registration(name)
+        return [drill_view(each) for each in reversed(services.control.rights.of(name).drills)]
+
+    return [record, drills]
+
+
+def _releases(services: RunnerServices) -> list[ControllerRouterHandler]:
+    @put(
+        "/api/releases/{version:str}",
+        status_code=204,
+        summary="Tell a runner on another computer that a version is released",
+        operation_id="storeRelease",
+        guards=[Needs("share")],
+    )
+    async def store(version: str, data: Release, request: _Asking) -> None:
+        if version != data.version:
+            where: dict[str, object] = {"path": "/version"}
+            raise BadInput("The path names another version than the body.", where=where)
+        me = identity_of(request).person
+        release = msgspec.structs.replace(data, by=PersonRef(me.id, me.name))
+        await anyio.to_thread.run_sync(services.released.add, release)
+
+    @delete(
+        "/api/releases/{version:str}",
+        status_code=204,
+        summary="Tell a runner on another computer that the release of a version was withdrawn",
+        operation_id="dropRelease",
+        guards=[Needs("share")],
+    )
+    async def drop(version: str) -> None:
+        await anyio.to_thread.run_sync(services.released.remove, version)
+
+    return [store, drop]
+
+
 def _rules_of(wanted: RightsWanted) -> Rules:
     """Return the rules that an owner wants. Raise BadInput if somebody stands there twice."""
     operators: tuple[Operator, ...] | None = None
@@ -224,7 +289,13 @@ def _rules_of(wanted: RightsWanted) -> Rules:
         if len(set(ids)) < len(ids):
             raise BadInput("Somebody is named twice.", where={"path": "/operators"})
         operators = tuple(map(_operator, wanted.operators))
-    return Rules(operators=operators, baton=wanted.baton, watched=wanted.watched)
+    return Rules(
+        operators=operators,
+        baton=wanted.baton,
+        watched=wanted.watched,
+        drill_days=wanted.drill_days,
+        released_only=wanted.released_only,
+    )
 
 
 def _operator(wanted: OperatorWanted) -> Operator:

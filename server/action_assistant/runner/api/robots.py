@@ -19,6 +19,7 @@ from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.robots.rights import (
     BatonChange,
     BatonPassed,
+    Drilled,
     Locked,
     RightsEvent,
     RightsSet,
@@ -112,6 +113,7 @@ class RobotLogLine(msgspec.Struct, frozen=True, kw_only=True):
         "baton",
         "locked",
         "unlocked",
+        "drilled",
     ]
     command: str = ""
     graph: str = ""
@@ -459,7 +461,7 @@ def _line(seq: int, event: RobotEvent) -> RobotLogLine:
                 files=event.files,
                 why=event.why,
             )
-        case RightsSet() | BatonPassed() | Locked() | Unlocked():
+        case RightsSet() | BatonPassed() | Locked() | Unlocked() | Drilled():
             return _rights_line(seq, event)
         case _:
             assert_never(event)
@@ -486,6 +488,16 @@ def _rights_line(seq: int, event: RightsEvent) -> RobotLogLine:
             return RobotLogLine(seq=seq, at=at, kind="locked", sender=by, why=why)
         case Unlocked(of=of):
             return RobotLogLine(seq=seq, at=at, kind="unlocked", sender=by, was=of.name)
+        case Drilled() as drill:
+            return RobotLogLine(
+                seq=seq,
+                at=at,
+                kind="drilled",
+                sender=by,
+                why=drill.failure,
+                run=drill.run,
+                number=drill.number,
+            )
 
 
 async def _behaviours(services: RunnerServices) -> BehaviourList | None:

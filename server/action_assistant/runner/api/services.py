@@ -17,6 +17,7 @@ from action_assistant.runner.runs.sent_graphs import Sent
 from action_assistant.runner.start.index_writer import IndexWriter
 from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.web.audit.log import AuditLog
+from action_assistant.web.auth.released_versions import ReleasedVersions
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
 from action_assistant.web.workers.lanes import Lane, RunInWorker
 
@@ -41,6 +42,7 @@ class RunnerServices:
     index_writer: IndexWriter
     sent: WeakKeyDictionary[OpenRun, Sent]
     identity_now: IdentityNow
+    released: ReleasedVersions
 
     def __init__(self) -> None:
         self.behaviours = None

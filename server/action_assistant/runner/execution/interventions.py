@@ -138,6 +138,7 @@ def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
         graph=run.graph,
         override=asked.override,
         watching=asked.watching,
+        drill=run.drill,
     )
 
 

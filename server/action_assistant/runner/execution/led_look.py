@@ -6,7 +6,7 @@ of them, by a pre-flight too: a rule that is added there counts everywhere (docs
 """
 
 from collections.abc import Iterable
-from typing import Final
+from typing import Final, get_args
 
 import anyio
 import msgspec
@@ -17,7 +17,7 @@ from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.links.port import Answer, NoAnswer, NotSent
 from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.robots.rights import Claim
+from action_assistant.runner.robots.rights import Claim, RightCode
 from action_assistant.runner.runs.events import Author, Requested
 from action_assistant.runner.start.led_items import IndexingWords, indexing_item, led_item
 from action_assistant.runner.start.preflight import Item, is_blocking
@@ -32,7 +32,7 @@ _FRESH_S: Final = 3.0  # for which a look at a robot counts
 #: Why nothing begins for a run that nobody has let go on since the runner's restart.
 _NOBODY: Final = "nobody has let it go on since the runner was restarted"
 #: The codes of the items about the rights of a robot.
-_RIGHTS: Final = frozenset({"service", "right", "baton", "watched", "confirm"})
+_RIGHTS: Final = frozenset(get_args(RightCode))
 
 
 class NotAllowed(NoAnswer):

@@ -53,6 +53,7 @@ from action_assistant.runner.start.admission import (
     watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
+from action_assistant.runner.start.drills import DrillRequest, drill_of
 from action_assistant.runner.start.idempotency import StopOrder
 from action_assistant.runner.start.led_items import IndexingWords
 from action_assistant.runner.start.preflight import Preflight
@@ -106,7 +107,9 @@ class ExecutionService:
         self._runs = OpenRuns(robots, self.history, runtime)
         self.open: Final = self._runs.by_id
         self._late_activity = LateActivity(self._runs, self.history, robots, runtime)
-        self.rights: Final = RightsRegistry(robots, runtime, self._rights_changed, identity_now)
+        self.rights: Final = RightsRegistry(
+            robots, runtime, self._rights_changed, identity_now, sources.release_of
+        )
         look = LedLook(
             self._runs,
             self.foreign_stops,
@@ -431,6 +434,14 @@ class ExecutionService:
                 )
         return interventions.confirm_rest(opened, asked, author)
 
+    async def record_drill(self, robot: str, asked: DrillRequest, author: Author) -> None:
+        """Record a Stop drill of a robot: a run there that was stopped, and what a person saw. Raise
+        NotFound if there is no such robot or run, Conflict if the run shows nothing about a Stop there,
+        Unavailable if the drill could not be stored."""
+        self.robots.registration(robot)
+        run, now = await self.find(asked.run), self._runtime.clock_us()
+        await self.rights.record_drill(robot, drill_of(run, robot, asked, author, now))
+
     async def _movable(self, run: str) -> OpenRun:
         opened = self.open.get(run)
         if opened is None or opened.run.end is not None:
@@ -498,7 +509,9 @@ class ExecutionService:
                 here=falls_at is None,
                 falls_at=None if falls_at is None else time(self._runtime.clock_us() + left_us),
             )
-        return with_rights(plain, self.rights.of(plain.name), shown)
+        rights = self.rights.of(plain.name)
+        due = rights.drill_due(self._runtime.clock_us() / 1e6)
+        return with_rights(plain, rights, shown, due)
 
     async def register(self, asked: Registration, author: Author) -> Robot:
         """Register a robot, or change its registration, and return it. Raise BadInput if the
@@ -612,7 +625,9 @@ def _operator(author: Author) -> Identity:
 def _claim(run: Run, watching: tuple[str, ...]) -> Claim:
     """Return what a run brings to the rules of its robots when a person who watches these robots lets
     it go on."""
-    return Claim(digest=run.tree_digest or run.digest, watching=frozenset(watching))
+    return Claim(
+        digest=run.tree_digest or run.digest, watching=frozenset(watching), is_drill=run.drill
+    )
 
 
 def _wholes_of(run: Run) -> set[str]:

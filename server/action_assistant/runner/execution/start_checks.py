@@ -41,7 +41,11 @@ from action_assistant.runner.start.admission import (
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.led_items import INDEXING, led_item, led_items
 from action_assistant.runner.start.preflight import EngineView, Item, Preflight
-from action_assistant.runner.start.rights_registry import RightsRegistry
+from action_assistant.runner.start.rights_registry import (
+    ReleaseOf,
+    RightsRegistry,
+    nothing_released,
+)
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
 from action_assistant.umrf.check import forbids_start
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
@@ -60,11 +64,13 @@ CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[
 
 class StartSources(msgspec.Struct, frozen=True):
     """Further sources that a start needs: the folder of Python `behaviours` of simulated actions,
-    the check of expected `courses`, and the index folders by robot."""
+    the check of expected `courses`, the index folders by robot, and the release of a graph by its
+    digest (`release_of`)."""
 
     behaviours: BehaviourFolder | None = None
     courses: CoursesOf | None = None
     index_folders: Mapping[str, Path] = {}
+    release_of: ReleaseOf = nothing_released
 
 
 NO_SOURCES: Final = StartSources()
@@ -145,7 +151,14 @@ class StartChecks:
         """Take a request through all checks that may refuse it, and wait for the answer of the
         robot. `starter`: the person who starts. Raise a subclass of Refused if one check
         does."""
+        if request.drill and len(engines_of(request)) != 1:
+            raise BadInput("A Stop drill is made on one robot.", where={"path": "/drill"})
         if self.leads(request.engine, request.robots):
+            if request.drill:
+                where: dict[str, object] = {"path": "/drill"}
+                raise BadInput(
+                    "A Stop drill is made with a graph that is handed over whole.", where=where
+                )
             return await self._accept_conducted(request, starter)
         if request.robots:
             raise BadInput("Only a led run has several robots.", where={"path": "/robots"})

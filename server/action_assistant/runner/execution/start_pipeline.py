@@ -239,6 +239,7 @@ def _to_store(
         subgraphs=ready.subgraphs,
         tree_digest=ready.tree_digest if request.subgraphs or request.tree_digest else None,
         led=_led_of(accepted),
+        drill=request.drill,
     )
     targets = () if accepted.is_simulated or accepted.led else (request.engine,)
     graph = GraphOutline(ready.name, ready.actions)

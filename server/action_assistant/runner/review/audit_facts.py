@@ -72,6 +72,9 @@ class _Body(msgspec.Struct, frozen=True):
     robot: str = ""
     folder: str = ""
     version: str = ""
+    proof_us: int | None = None
+    saw_it_stop: bool = False
+    hardware_stop: bool = False
     holder: _PersonBody | None = None
     to: _PersonBody | None = None
 
@@ -171,6 +174,10 @@ class RunnerFacts:
                 if body.by is None:
                     return None
                 return self._about_run(whole, "starts", f"held {{run}}: {body.why}")
+            case "robot.drilled.v1":
+                passed = body.proof_us is not None and body.saw_it_stop and body.hardware_stop
+                how = "it passed" if passed else "it failed"
+                sentence = f"recorded a Stop drill of {{robot}} with run {body.number}: {how}"
             case "robot.baton_passed.v1":
                 if body.author is None:
                     return None

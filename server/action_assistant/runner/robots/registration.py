@@ -18,7 +18,7 @@ from action_assistant.runner.links.port import (
     Registration,
 )
 from action_assistant.runner.robots.engine import KnownEngine
-from action_assistant.runner.robots.rights import RobotRights
+from action_assistant.runner.robots.rights import Drilled, RobotRights
 from action_assistant.runner.runs.views import time
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.facts import BadProfile, facts_of
@@ -58,6 +58,9 @@ class RobotRemoved(msgspec.Struct, frozen=True, kw_only=True):
 
     at: int
     name: str
+
+
+_DRILLS: Final = 20  # that are shown of a robot
 
 
 class HeldGraph(msgspec.Struct, frozen=True, kw_only=True):
@@ -100,6 +103,20 @@ class LockShown(msgspec.Struct, frozen=True, kw_only=True):
         hold_names(self, "reason")
 
 
+class DrillShown(msgspec.Struct, frozen=True, kw_only=True):
+    """A Stop drill: with which run, by whom, when Stop was pressed, and the milliseconds until rest was
+    proven; null if it was not. `failure`: why it failed, "" if it passed."""
+
+    run: str
+    number: int
+    by: PersonRef
+    stopped_at: datetime
+    proof_ms: int | None
+    saw_it_stop: bool
+    hardware_stop: bool
+    failure: str
+
+
 class Robot(msgspec.Struct, frozen=True, kw_only=True):
     """An engine as people see it. `why`: explains any state but `answering`.
 
@@ -107,7 +124,9 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     besides this runner. `actions`, `graphs`: the size of its index; None before its first answer.
     `pauses`: pausing is safe on it. `operators`: who may start there, "all" for every operator;
     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
-    `watched`: each start has the word of its person that they watch it.
+    `watched`: each start has the word of its person that they watch it; `drill_days`: how old its last
+    Stop drill may be; `drill_due`: why one has to be made before the next start, "" if none has to be;
+    `drills`: the newest 20, the newest first; `released_only`: only released versions start there.
     """
 
     name: str
@@ -136,6 +155,10 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     holder: HolderShown | None = None
     locks: tuple[LockShown, ...] = ()
     watched: bool = False
+    drill_days: int | None = None
+    drill_due: str = ""
+    drills: tuple[DrillShown, ...] = ()
+    released_only: bool = False
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -203,8 +226,25 @@ def with_engine(plain: Robot, engine: KnownEngine, stopping: StopTrouble) -> Rob
     )
 
 
-def with_rights(plain: Robot, rights: RobotRights, holder: HolderShown | None) -> Robot:
-    """Return a robot with its rights. `holder`: who holds its baton."""
+def drill_view(drill: Drilled) -> DrillShown:
+    """Return a Stop drill as people see it."""
+    return DrillShown(
+        run=drill.run,
+        number=drill.number,
+        by=PersonRef(drill.author.id, drill.author.name),
+        stopped_at=time(drill.stopped_at),
+        proof_ms=None if drill.proof_us is None else round(drill.proof_us / 1000),
+        saw_it_stop=drill.saw_it_stop,
+        hardware_stop=drill.hardware_stop,
+        failure=drill.failure,
+    )
+
+
+def with_rights(
+    plain: Robot, rights: RobotRights, holder: HolderShown | None, drill_due: str
+) -> Robot:
+    """Return a robot with its rights. `holder`: who holds its baton; `drill_due`: why a Stop drill has
+    to be made, "" if none has to be."""
     rules = rights.rules
     operators: Literal["all"] | tuple[OperatorShown, ...] = "all"
     if rules.operators is not None:
@@ -226,4 +266,8 @@ def with_rights(plain: Robot, rights: RobotRights, holder: HolderShown | None) -
         holder=holder,
         locks=locks,
         watched=rules.watched,
+        drill_days=rules.drill_days,
+        drill_due=drill_due,
+        drills=tuple(map(drill_view, reversed(rights.drills[-_DRILLS:]))),
+        released_only=rules.released_only,
     )

@@ -19,10 +19,14 @@ from action_assistant.web.auth.rights import Denied, may
 from action_assistant.web.auth.roles import Permission
 
 #: The codes of refusals, which are those of the items of a pre-flight.
-RightCode: TypeAlias = Literal["service", "right", "baton", "watched", "confirm"]
+RightCode: TypeAlias = Literal[
+    "service", "right", "baton", "confirm", "watched", "drill", "released"
+]
 #: How a baton came to another person, or to nobody.
 BatonChange: TypeAlias = Literal["taken", "handed", "forced", "dropped", "fell", "off"]
 _NAMED: Final = 4
+_DAY_US: Final = 86_400_000_000
+_MOST_DRILLS: Final = 20  # of a robot within a day
 
 
 class Operator(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -38,21 +42,26 @@ class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The rules of an owner for a robot. `operators`: who may start there; None: every operator.
     `baton`: only its holder may; `watched`: each start has the word of its person that they watch
     the robot, with its hardware stop within reach; `ask_again`: minutes after which a person has to
-    confirm again that it is they who start, 0 where nobody is asked."""
+    confirm again that it is they who start, 0 where nobody is asked; `drill_days`: the last Stop drill
+    passed, and is so many days old at most; `released_only`: only versions start there that an owner
+    has released."""
 
     operators: tuple[Operator, ...] | None = None
     baton: bool = False
     watched: bool = False
     ask_again: int = 0
+    drill_days: int | None = None
+    released_only: bool = False
 
 
 class Claim(msgspec.Struct, frozen=True, kw_only=True):
     """The part of a start that the rules of robots ask about, apart from its person. `digest`: of the
     graph that is sent together with those inside; `watching`: the robots that a person has said to
-    watch."""
+    watch; `is_drill`: the start is for a Stop drill, which may be due."""
 
     digest: str
     watching: frozenset[str] = frozenset()
+    is_drill: bool = False
 
 
 class Holder(msgspec.Struct, frozen=True):
@@ -118,7 +127,34 @@ class Unlocked(msgspec.Struct, frozen=True, kw_only=True):
     locks: tuple[Lock, ...]
 
 
-RightsEvent: TypeAlias = RightsSet | BatonPassed | Locked | Unlocked
+class Drilled(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
+    """A person recorded a Stop drill: the Stop of a run on this robot, and what they saw. Times are
+    microseconds UTC. `stopped_at`: when Stop was pressed; `proof_us`: the time from then until an
+    answer of the engine proved rest, None if none did; `saw_it_stop`: the person saw the robot stop;
+    `hardware_stop`: they tried its hardware stop."""
+
+    kind: ClassVar[str] = "robot.drilled.v1"
+
+    at: int
+    author: Author
+    run: str
+    number: int
+    stopped_at: int
+    proof_us: int | None
+    saw_it_stop: bool
+    hardware_stop: bool
+
+    @property
+    def failure(self) -> str:
+        """Return why the drill failed, as the end of a sentence; "" if it passed."""
+        if self.proof_us is None:
+            return "its Stop was not proven"
+        if not self.saw_it_stop:
+            return "the robot was not seen to stop"
+        return "" if self.hardware_stop else "the hardware stop was not tried"
+
+
+RightsEvent: TypeAlias = RightsSet | BatonPassed | Locked | Unlocked | Drilled
 
 
 class Refusal(msgspec.Struct, frozen=True):
@@ -130,7 +166,8 @@ class Refusal(msgspec.Struct, frozen=True):
 
 class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
     """The rights of a robot at one moment. `set_by`: the owner who set its rules; `is_unread`: what was
-    recorded of them cannot be read, so that nothing starts there until an owner has set them anew."""
+    recorded of them cannot be read, so that nothing starts there until an owner has set them anew;
+    `drills`: its Stop drills, oldest first."""
 
     name: str
     rules: Rules = Rules()
@@ -138,6 +175,7 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
     holder: Holder | None = None
     locks: tuple[Lock, ...] = ()
     is_unread: bool = False
+    drills: tuple[Drilled, ...] = ()
 
     # --- what is refused ----------------------------------------------------------------------
 
@@ -175,6 +213,33 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
             yield Refusal("confirm", why)
         if claim is not None and self.rules.watched and self.name not in claim.watching:
             yield Refusal("watched", self._unwatched(is_asking))
+        if not (claim is not None and claim.is_drill) and (why := self.drill_due(now)):
+            yield Refusal("drill", why)
+
+    def drill_due(self, now: float) -> str:
+        """Return why a Stop drill has to be made before the next start; "" if none has to be. A drill
+        that is dated later than `now` (seconds since 1970) proves nothing: the clock has jumped."""
+        days, now_us = self.rules.drill_days, round(now * 1e6)
+        if days is None:
+            return ""
+        asked = f"its owner asks for one within {days} {'day' if days == 1 else 'days'}"
+        for drill in reversed(self.drills):
+            if drill.failure:
+                return f"{self.drill_words(drill)} Make one that passes."
+            if drill.at > now_us:
+                continue
+            if now_us - drill.stopped_at <= days * _DAY_US:
+                return ""
+            return f"The last Stop drill of {self.name} was on {_day(drill.stopped_at)}; {asked}."
+        return f"No Stop drill of {self.name} has been made; {asked}."
+
+    def drill_words(self, drill: Drilled) -> str:
+        """Return the sentence that says when a Stop drill was made, by whom, and how it ended."""
+        by = f"{_day(drill.stopped_at)} by {_name(PersonRef(drill.author.id, drill.author.name))}"
+        if drill.failure:
+            return f"The Stop drill of {self.name} on {by} failed: {drill.failure}."
+        took = (drill.proof_us or 0) / 1e6
+        return f"The Stop drill of {self.name} on {by} passed: rest was proven after {took:.2f} s."
 
     def _unwatched(self, is_asking: bool) -> str:
         if is_asking:
@@ -248,6 +313,8 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
                 return replace(self, holder=None if person is None else Holder(person, at))
             case Locked(locks=locks) | Unlocked(locks=locks):
                 return replace(self, locks=locks)
+            case Drilled():
+                return replace(self, drills=(*self.drills, event))
 
     def set_rules(self, rules: Rules, author: Author, at: int) -> tuple[RightsEvent, ...]:
         """Return the events by which an owner sets the rules. Without a baton nobody holds one."""
@@ -323,6 +390,18 @@ class RobotRights(msgspec.Struct, frozen=True, kw_only=True):
             raise Forbidden(self._unlocking())
         left = tuple(each for each in self.locks if each is not found)
         return Unlocked(at=at, author=author, of=found.by, locks=left)
+
+    def require_drill(self, drill: Drilled) -> None:
+        """Raise Conflict if a drill may not be recorded: its run has one already that failed, or
+        passed like this one, or there were too many within a day."""
+        same = [each for each in self.drills if each.run == drill.run]
+        if any(each.failure or not drill.failure for each in same):
+            raise Conflict(
+                f"The Stop drill with run {drill.number} is recorded already; make another one.",
+                where={"path": "/run"},
+            )
+        if sum(drill.at - each.at < _DAY_US for each in self.drills) >= _MOST_DRILLS:
+            raise Conflict(f"{_MOST_DRILLS} drills of {self.name} within a day are enough.")
 
     def _require_holder(self, by: Identity) -> PersonRef:
         if not self.rules.baton:

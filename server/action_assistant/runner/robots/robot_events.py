@@ -16,6 +16,7 @@ from action_assistant.journal.events import Event
 from action_assistant.runner.links.port import Command, EngineState, ForeignCommand
 from action_assistant.runner.robots.rights import (
     BatonPassed,
+    Drilled,
     Locked,
     RightsEvent,
     RightsSet,
@@ -163,6 +164,7 @@ _KINDS: Final[Mapping[str, type[RobotEvent]]] = {
         BatonPassed,
         Locked,
         Unlocked,
+        Drilled,
     )
 }
 

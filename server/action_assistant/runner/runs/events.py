@@ -118,6 +118,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     piece: PieceOf | None = None  # of a piece, which is no run of its own for people
     batons: tuple[str, ...] = ()  # the robots whose baton the author held
     watching: tuple[str, ...] = ()  # the robots that the author said to watch
+    drill: bool = False  # the start was for a Stop drill
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -129,6 +129,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     tree_digest: str | None = None  # of the graph together with those inside; None if unknown
     batons: tuple[str, ...] = ()  # the robots whose baton the author held at the start
     watching: tuple[str, ...] = ()  # the robots that the author said to watch
+    drill: bool = False  # it was started for a Stop drill
     #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run

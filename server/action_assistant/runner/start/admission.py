@@ -68,7 +68,8 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     script says. `subgraphs`: all graphs inside, by value, as the version has them; `tree_digest`:
     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
     of each actor ("" for actions without one); `lost`: see `Led`. `watching`: true for each robot of
-    which the person says that they watch it, with its hardware stop within reach.
+    which the person says that they watch it, with its hardware stop within reach. `drill`: the start is
+    for a Stop drill of its robot, and so needs no earlier one.
     """
 
     version: str
@@ -86,6 +87,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     robots: dict[str, str] = {}
     lost: Literal["stop", "wait"] = "stop"
     watching: Watching = {}
+    drill: bool = False
 
 
 class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -134,6 +136,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     robots: dict[str, str] = {}
     lost: Literal["stop", "wait"] = "stop"
     watching: Watching = {}
+    drill: bool = False
 
     def for_engine(self, engine: str) -> StartRequest:
         """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
@@ -154,6 +157,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             watching=self.watching
             if engine == CONDUCTED
             else {name: said for name, said in self.watching.items() if name == engine},
+            drill=self.drill,
         )
 
 
@@ -216,6 +220,8 @@ def read_group(body: bytes) -> GroupRequest:
     group = decoded(body, GroupRequest)
     if len(set(group.engines)) < len(group.engines):
         raise BadInput("A robot is named twice.", where={"path": "/engines"})
+    if group.drill and len(group.engines) > 1:
+        raise BadInput("A Stop drill is made on one robot at a time.", where={"path": "/drill"})
     return group
 
 
@@ -367,8 +373,11 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
 def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
     """Return what a start brings to the rules of robots. `ready`: None for a graph that is refused
     anyway."""
-    watching = frozenset(name for name, is_watched in request.watching.items() if is_watched)
-    return Claim(digest="" if ready is None else ready.tree_digest, watching=watching)
+    return Claim(
+        digest="" if ready is None else ready.tree_digest,
+        watching=frozenset(name for name, is_watched in request.watching.items() if is_watched),
+        is_drill=request.drill,
+    )
 
 
 def prepared_pieces(

@@ -23,6 +23,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import (
     BatonPassed,
     Claim,
+    Drilled,
     Holder,
     Lock,
     Refusal,
@@ -32,9 +33,10 @@ from action_assistant.runner.robots.rights import (
 )
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runtime import Runtime
-from action_assistant.runner.start.preflight import Item
+from action_assistant.runner.start.preflight import Item, Verdict
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Person, PersonRef
+from action_assistant.web.auth.released_versions import Release
 from action_assistant.web.auth.rights import Denied, may
 
 log: Final = logging.getLogger(__name__)
@@ -47,6 +49,15 @@ _SHORTEST_REASON: Final = 3
 
 #: Returns an identity as it is now, with the role and groups that count; None if it was ended.
 IdentityNow = Callable[[Identity], Identity | None]
+
+
+#: Returns the release of exactly the graph with a digest; None if there is none. Raises Unavailable if that
+#: cannot be read.
+ReleaseOf = Callable[[str], Release | None]
+
+
+def nothing_released(_digest: str) -> None:
+    """Return None: where no version is ever released."""
 
 
 def unchanged(identity: Identity) -> Identity | None:
@@ -76,7 +87,9 @@ class RightsRegistry:
         runtime: Runtime,
         changed: Callable[[str], None],
         now: IdentityNow = unchanged,
+        release_of: ReleaseOf = nothing_released,
     ) -> None:
+        self._release_of = release_of
         self._robots = robots
         self._runtime = runtime
         self._changed = changed
@@ -134,11 +147,27 @@ class RightsRegistry:
             text = denied.reason if is_asking else f"{who} may not run graphs on robots any more."
             return (Refusal("right", text),)
         found = tuple(record.decided.refusals(current, now, claim=claim, is_asking=is_asking))
+        rules = (record.decided.rules, record.stored.rules)
+        if claim is not None and any(each.released_only for each in rules):
+            found += self._not_released(robot, claim)
         if found or is_decided or record.stored is record.decided:
             return found
         pending = tuple(record.stored.refusals(current, now, claim=claim, is_asking=is_asking))
         text = f"The rights of {robot} are just changing, and that is not stored yet. Try it again."
         return tuple(Refusal(each.code, text) for each in pending[:1])
+
+    def _not_released(self, robot: str, claim: Claim) -> tuple[Refusal, ...]:
+        """Return why a robot that takes released versions only takes no graph with this digest; empty
+        if one was released."""
+        try:
+            if self._release_of(claim.digest) is not None:
+                return ()
+            why = (
+                f"{robot} takes only versions that an owner has released, and this is none of them."
+            )
+        except Unavailable as unread:
+            why = f"{robot} takes only versions that an owner has released. {unread.detail}"
+        return (Refusal("released", why),)
 
     def current(self, identity: Identity) -> Identity | None:
         """Return an identity as it is now, or that of another open page of the same person where its
@@ -206,7 +235,29 @@ class RightsRegistry:
             who = "You watch" if is_asking else "Somebody watches"
             text = f"{who} {robot}, with its hardware stop within reach."
             found.append(Item(code="watched", verdict="passed", text=text))
+        if rules.released_only and "released" not in blocked:
+            release = self._release_of(claim.digest)
+            by = "an owner" if release is None else release.by.name or "an owner"
+            text = f"This version was released by {by}."
+            found.append(Item(code="released", verdict="passed", text=text))
+        if "drill" not in blocked:
+            found += self._drill_items(robot, claim)
         return tuple(found)
+
+    def _drill_items(self, robot: str, claim: Claim) -> Iterator[Item]:
+        """Yield the item about the last Stop drill of a robot that blocks no start: none if there was
+        no drill and none is asked for."""
+        rights = self.of(robot)
+        due = rights.drill_due(self._runtime.clock_us() / 1e6)
+        if claim.is_drill:
+            text = (
+                "This start is for a Stop drill: press Stop while it moves, and say what you saw."
+            )
+            yield Item(code="drill", verdict="warned", text=f"{due} {text}".strip())
+        elif rights.drills:
+            last = rights.drills[-1]
+            verdict: Verdict = "warned" if last.failure else "passed"
+            yield Item(code="drill", verdict=verdict, text=rights.drill_words(last))
 
     def with_baton(self, robots: Iterable[str]) -> tuple[str, ...]:
         """Return those of these robots that have a baton."""
@@ -321,6 +372,12 @@ class RightsRegistry:
         self._robots.registration(robot)
         event = self.of(robot).drop(by, author, self._runtime.clock_us())
         await self._carry_out({robot: (event,)}, author.id)
+
+    async def record_drill(self, robot: str, drill: Drilled) -> None:
+        """Record a Stop drill of a robot. Raise Conflict as `RobotRights.require_drill` does,
+        Unavailable if it could not be stored."""
+        self.of(robot).require_drill(drill)
+        await self._carry_out({robot: (drill,)}, drill.author.id)
 
     async def lock(self, robot: str, by: Identity, author: Author, reason: str) -> None:
         """Put a robot out of service. Raise BadInput without a reason, Unavailable if that could not
@@ -463,6 +520,7 @@ class _Stored(msgspec.Struct, frozen=True):
     set_by: PersonRef | None
     holder: Holder | None
     locks: tuple[Lock, ...]
+    drills: tuple[Drilled, ...]
 
 
 def _rights_of(row: Row[Any]) -> RobotRights:

@@ -1,0 +1,127 @@
+"""Released versions: those that an owner has released, as files that either process reads.
+
+`released/DIGEST-VERSION.json` in the data folder stands for one version. The editor writes the files after
+its log, deletes them before it, and makes them equal to its table when it starts. A runner reads them
+without the editor; one with a data folder of its own is told by the page or the command. A file that is
+missing or cannot be read releases nothing.
+"""
+
+import logging
+import os
+import re
+from collections.abc import Iterable, Iterator
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Final
+
+import msgspec
+
+from action_assistant.errors import BadInput, Unavailable
+from action_assistant.private_files import make_folder, replace_file, sync
+from action_assistant.web.auth.keys import PersonRef
+
+log: Final = logging.getLogger(__name__)
+
+FOLDER: Final = "released"
+_DIGEST: Final = re.compile(r"[0-9a-f]{64}")
+_ID: Final = re.compile(r"[A-Za-z0-9_-]{1,100}")
+
+
+class Release(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A released version. `digest`: of its graph together with those inside; `by`: the owner who released
+    it."""
+
+    version: Annotated[str, msgspec.Meta(max_length=100)]
+    digest: Annotated[str, msgspec.Meta(max_length=64)]
+    by: PersonRef
+    at: datetime
+
+
+class ReleasedVersions:
+    """Reads and writes the files of released versions."""
+
+    def __init__(self, data: Path) -> None:
+        self._folder = data / FOLDER
+
+    def of(self, digest: str) -> Release | None:
+        """Return a release of exactly the graph with this digest; None if there is none. Raise
+        Unavailable if that cannot be read."""
+        try:
+            for path in self._paths():
+                if path.name.startswith(f"{digest}-") and (found := _read(path)) is not None:
+                    return found
+        except OSError as error:
+            raise Unavailable(
+                f"Which versions are released cannot be read now: {error.strerror}."
+            ) from error
+        return None
+
+    def add(self, release: Release) -> None:
+        """Store a release durably; one of the same version and digest that is there stays. Raise
+        BadInput for a malformed digest or id, Unavailable if it cannot be written."""
+        path = self._path(release)
+        try:
+            if path.exists() and _read(path) is not None:
+                return
+            make_folder(self._folder)
+            replace_file(path, msgspec.json.encode(release))
+            sync(self._folder)
+        except OSError as error:
+            raise Unavailable(f"The release could not be written: {error.strerror}.") from error
+
+    def remove(self, version: str) -> None:
+        """Withdraw the release of a version, durably. Raise Unavailable if that cannot be written."""
+        self._delete(path for path in self._listed() if _version_of(path) == version)
+
+    def make_equal(self, releases: Iterable[Release]) -> None:
+        """Store exactly these releases, and delete all others. Raise Unavailable if that cannot be
+        written."""
+        wanted = {self._path(each): each for each in releases}
+        self._delete(path for path in self._listed() if path not in wanted)
+        for release in wanted.values():
+            self.add(release)
+
+    def _delete(self, paths: Iterable[Path]) -> None:
+        try:
+            for path in paths:
+                path.unlink(missing_ok=True)
+            if self._folder.is_dir():
+                sync(self._folder)
+        except OSError as error:
+            raise Unavailable(f"The release could not be withdrawn: {error.strerror}.") from error
+
+    def _listed(self) -> list[Path]:
+        try:
+            return list(self._paths())
+        except OSError as error:
+            raise Unavailable(f"The releases cannot be read: {error.strerror}.") from error
+
+    def _paths(self) -> Iterator[Path]:
+        try:
+            with os.scandir(self._folder) as entries:
+                yield from [self._folder / entry.name for entry in entries]
+        except FileNotFoundError:
+            return
+
+    def _path(self, release: Release) -> Path:
+        if _DIGEST.fullmatch(release.digest) is None:
+            raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
+        if _ID.fullmatch(release.version) is None:
+            raise BadInput("This is no id of a version.", where={"path": "/version"})
+        return self._folder / f"{release.digest}-{release.version}.json"
+
+
+def _version_of(path: Path) -> str:
+    return path.name.partition("-")[2].removesuffix(".json")
+
+
+def _read(path: Path) -> Release | None:
+    """Return the release in a file; None for a file that is gone, damaged, or about another version."""
+    try:
+        found = msgspec.json.decode(path.read_bytes(), type=Release)
+    except FileNotFoundError:
+        return None
+    except msgspec.DecodeError as error:
+        log.error("%s cannot be read: %s", path, error)
+        return None
+    return found if path.name == f"{found.digest}-{found.version}.json" else None
