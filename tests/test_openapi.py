@@ -24,6 +24,7 @@ WITHOUT_BODY = frozenset(
         "/api/devices/{session}/end",
         "/api/tokens/{token}/revoke",
         "/api/view-links/{link}/revoke",
+        "/api/notifications/{name}/test",
         "/api/runs/{run}/pause",
         "/api/runs/{run}/resume",
         "/api/robots/{name}/stop",

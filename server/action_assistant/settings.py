@@ -60,6 +60,7 @@ VARIABLES: Final[Mapping[str, str]] = {
     "`robot-admins=owner,lab=operator,*=viewer`; `*` is everybody. Nobody else comes in",
     "ACTION_ASSISTANT_OIDC_GROUPS_CLAIM": "the claim with the groups of a person (groups)",
     "ACTION_ASSISTANT_OIDC_NAME": "the provider's name on the button (the host of the issuer)",
+    "ACTION_ASSISTANT_NOTIFICATIONS": "a TOML file that names receivers of messages by webhook and mail",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
     "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
     "direct one fail",
@@ -122,6 +123,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     token_days: float = TOKEN_DAYS
     frames: tuple[str, ...] = ()
     oidc: Mapping[str, str] = {}
+    notifications: Path | None = None
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -155,6 +157,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     index_folders: Mapping[str, Path] = {}
     metrics_token: str | None = None
     sessions: str = ""
+    notifications: Path | None = None
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -298,6 +301,12 @@ def frame_origins(environ: Mapping[str, str] = os.environ) -> tuple[str, ...]:
                 f"`https://wiki.lab.example`, not {each!r}."
             )
     return tuple(written)
+
+
+def notifications(environ: Mapping[str, str] = os.environ) -> Path | None:
+    """Return the file that names the receivers of messages; None if the variable is not set."""
+    path = environ.get("ACTION_ASSISTANT_NOTIFICATIONS", "").strip()
+    return Path(path) if path else None
 
 
 def limits(environ: Mapping[str, str] = os.environ) -> bool:

@@ -242,6 +242,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         token_days=settings.token_days(),
         frames=settings.frame_origins(),
         oidc=settings.oidc(),
+        notifications=settings.notifications(),
     )
 
 
@@ -326,6 +327,7 @@ def _runner(options: argparse.Namespace) -> int:
         index_folders=settings.index_folders(options.index_folder),
         metrics_token=settings.metrics_token(),
         sessions=settings.sessions(),
+        notifications=settings.notifications(),
     )
     listen(
         lambda: create_app(chosen),

@@ -22,6 +22,7 @@ from action_assistant.editor.api import (
     graph_rights,
     graphs,
     history,
+    inbox,
     invitations,
     library,
     members,
@@ -64,6 +65,8 @@ from action_assistant.web.monitoring.gauges import Family
 from action_assistant.web.monitoring.monitoring import Monitoring, Watched
 from action_assistant.web.monitoring.status import Activity
 from action_assistant.web.network.addresses import Addresses, addresses_of
+from action_assistant.web.notifications.receivers import receivers_of
+from action_assistant.web.notifications.routes import notification_routes
 from action_assistant.web.server.application import application
 from action_assistant.web.workers.lanes import run_here
 
@@ -109,6 +112,8 @@ async def open_services(
                     services.members.opened(),
                     services.token_log.opened(),
                     services.change_index.kept_up(),
+                    services.inboxes.kept_up(),
+                    services.notifications.sending(),
                     services.graph_checks.names.read_ahead(),
                     services.audit.writing(journal),
                 ):
@@ -129,6 +134,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     Journal.prepare(settings.database, "editor", copies=settings.data / before_upgrade.FOLDER)
     database_location.check(settings.data, settings.database, switch=settings.switch_database)
     database_location.remember(settings.data, settings.database)
+    receivers_of(settings.notifications)
     keys = Keys.of(settings.data)
     app_state = EditorState()
     revoked = Revocations(settings.data)
@@ -229,6 +235,7 @@ def _routes(
     return [
         *invitations.routes(app_state, addresses, browsers),
         *members.routes(app_state, addresses, browsers),
+        *notification_routes(lambda: app_state.services.notifications),
         *guarded(_graph_routes(app_state, addresses), app_state),
         *audit_routes(lambda wanted: _audit(app_state.services, wanted)),
     ]
@@ -241,6 +248,7 @@ def _graph_routes(app_state: EditorState, addresses: Addresses) -> list[Controll
         *folders.routes(app_state),
         *graph_rights.routes(app_state),
         *history.routes(app_state),
+        *inbox.routes(app_state),
         *versions.routes(app_state),
         *subgraphs.routes(app_state),
         *drafts.routes(app_state),

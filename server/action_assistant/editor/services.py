@@ -17,6 +17,7 @@ from action_assistant.editor.history.drafts.draft_merges import DraftMerges
 from action_assistant.editor.history.drafts.drafts import Drafts
 from action_assistant.editor.history.graph_history import GraphHistory
 from action_assistant.editor.history.restoring import Restoring
+from action_assistant.editor.inbox import KINDS, Inboxes
 from action_assistant.editor.library.library import Library, LibraryEdits
 from action_assistant.editor.people.invitations import Invitations
 from action_assistant.editor.people.members import Members
@@ -27,16 +28,20 @@ from action_assistant.editor.rooms.member import ByteRateLimits
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.presence import PersonColours
 from action_assistant.editor.workers import EditorWorkers
+from action_assistant.errors import NotFound
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import person_of
 from action_assistant.web.auth.graph_seals import RulesFile
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, Person
 from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.released_versions import ReleasedVersions
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.network.connection_limits import ConnectionLimits
+from action_assistant.web.notifications.receivers import receivers_of
+from action_assistant.web.notifications.sender import Notifications
 
 
 class EditorServices:
@@ -97,6 +102,12 @@ class EditorServices:
         self.reception = Reception(self.invitations, self.members)
         self.token_log = TokenLog(journal)
         self.change_index = ChangeIndex(journal, workers.graphs)
+        public = settings.reached.public
+        receivers = receivers_of(settings.notifications, KINDS)
+        self.notifications = Notifications(
+            journal, receivers, KINDS, public.page if public is not None else ""
+        )
+        self.inboxes = Inboxes(journal, self.change_index, receivers, may_see=self._may_see)
         self.history = GraphHistory(self.change_index)
         self.restoring = Restoring(
             journal, self.rooms, self.graph_reader, self.change_index, workers.graphs
@@ -107,6 +118,16 @@ class EditorServices:
         self.draft_merges = DraftMerges(
             journal, self.rooms, self.drafts, self.change_index, people, self.graph_checks
         )
+
+    async def _may_see(self, graph: str, person: str) -> bool:
+        """Return whether a person may see a graph by their present role and groups. Somebody who came
+        by a group link counts as a viewer; nobody who was ended sees any."""
+        try:
+            member = self.members.get(person)
+        except NotFound:
+            return await self.rights.may_see(graph, Identity(Person(person, "", "viewer")))
+        identity = Identity(Person(person, member.name, member.role), frozenset(member.groups))
+        return member.ended_at is None and await self.rights.may_see(graph, identity)
 
 
 class EditorState:

@@ -37,6 +37,7 @@ from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.links.port import Reach
 from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
+from action_assistant.runner.notices import KINDS, with_notices
 from action_assistant.runner.review.background_loops import index_words
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.stored_runs import StoredRuns
@@ -66,6 +67,9 @@ from action_assistant.web.auth.view_links import ViewLinks
 from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.connection_limits import ConnectionLimits
+from action_assistant.web.notifications.receivers import receivers_of
+from action_assistant.web.notifications.routes import notification_routes
+from action_assistant.web.notifications.sender import Notifications
 from action_assistant.web.server.application import application
 
 log: Final = logging.getLogger(__name__)
@@ -86,7 +90,9 @@ async def open_services(
         services.behaviours = BehaviourFolder.opened(settings.behaviours)
     services.index_folders = settings.index_folders
     sys.setswitchinterval(_SWITCH_S)
-    journal = await Journal.open(_database(settings), branch="runner", fold=projection.fold)
+    receivers = receivers_of(settings.notifications, KINDS)
+    fold = with_notices(projection.fold, receivers)
+    journal = await Journal.open(_database(settings), branch="runner", fold=fold)
     try:
         keep = _keep(settings)
         on_disk = anyio.to_thread.run_sync  # threads wait for disks; workers compute
@@ -117,8 +123,12 @@ async def open_services(
                 tasks.start_soon(services.review_service.run)
                 tasks.start_soon(services.retention.run)
                 tasks.start_soon(index_words, journal)
+                public = settings.reached.public
+                services.notifications = Notifications(
+                    journal, receivers, KINDS, public.page if public is not None else ""
+                )
                 control.idle_stop = partial(_note_idle_stop, services.audit)
-                async with services.audit.writing(journal):
+                async with services.audit.writing(journal), services.notifications.sending():
                     yield services
                 tasks.cancel_scope.cancel()
     finally:
@@ -246,7 +256,7 @@ def _database(settings: RunnerSettings) -> str:
 
 def create_app(settings: RunnerSettings) -> ASGIApp:
     """Return the runner as an ASGI application, and prepare its database. Raise CannotStart if the
-    database or the folder of behaviours cannot be used."""
+    database, the folder of behaviours or the file of notifications cannot be used."""
     if settings.behaviours is not None:
         BehaviourFolder.opened(settings.behaviours)
     for robot, folder in settings.index_folders.items():
@@ -254,6 +264,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
         if why := folder_trouble(robot, folder):
             log.warning("%s Graphs cannot be written there until it can be read.", why)
     Journal.prepare(_database(settings), "runner", copies=settings.data / before_upgrade.FOLDER)
+    receivers_of(settings.notifications)
     revoked = Revocations(settings.data)
     services = RunnerServices()
     services.released = ReleasedVersions(settings.data)
@@ -285,6 +296,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
             *view.routes(services, view_links),
             *revocation(keys, revoked, people_files, services.audit, limits=settings.limits),
             *shared_token_routes(tokens, revoked=partial(_note_token, services.audit)),
+            *notification_routes(lambda: services.notifications),
             *adoption(tokens, limits=settings.limits),
         ],
         title="TeMoto Action Assistant: runner",

@@ -4,7 +4,7 @@ from typing import Final
 
 from sqlalchemy import BigInteger, Column, Index, LargeBinary, MetaData, Table, Text
 
-from action_assistant.schema.log_tables import NAMES, log_tables, written_by_table
+from action_assistant.schema.log_tables import NAMES, log_tables, outbox_tables, written_by_table
 
 EDITOR: Final = MetaData(naming_convention=NAMES)
 editor_event, editor_head, editor_snapshot = log_tables(EDITOR)
@@ -179,3 +179,34 @@ people_group: Final = Table(
     Column("made_at", BigInteger, nullable=False),
     Column("made_by", Text, nullable=False),
 )
+#: A person was mentioned by `author` in the comment `key` of a graph, by its change `seq`. Derived from the
+#: changes of keys some time after the event. A copy of a comment has its key, and is no mention of its own.
+mention: Final = Table(
+    "mention",
+    EDITOR,
+    Column("key", Text, primary_key=True),
+    Column("person", Text, primary_key=True),
+    Column("graph", Text, nullable=False),
+    Column("seq", BigInteger, nullable=False),
+    Column("author", Text, nullable=False),
+    Column("at", BigInteger, nullable=False),
+    Column("text", Text, nullable=False),
+    Index(None, "person", "at"),
+    Index(None, "graph", "key"),
+)
+#: Changes of graphs in which persons may be mentioned, which nobody has looked for yet.
+mention_due: Final = Table(
+    "mention_due",
+    EDITOR,
+    Column("graph", Text, primary_key=True),
+    Column("seq", BigInteger, primary_key=True, autoincrement=False),
+    Column("at", BigInteger, nullable=False),
+)
+#: The mentions that a person has read.
+mention_read: Final = Table(
+    "mention_read",
+    EDITOR,
+    Column("person", Text, primary_key=True),
+    Column("key", Text, primary_key=True),
+)
+outbox, receiver = outbox_tables(EDITOR)

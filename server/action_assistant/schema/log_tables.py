@@ -1,7 +1,7 @@
 """The tables of a log, which both databases have.
 
-`event`, `head` (where each stream ends), `snapshot` and `written_by` are in both. Everything else is a fold of the
-events: it can be thrown away and made again. Times are microseconds since 1970, UTC.
+`event`, `head` (where each stream ends), `snapshot`, `written_by`, `outbox` and `receiver` are in both. Everything else
+is a fold of the events: it can be thrown away and made again. Times are microseconds since 1970, UTC.
 """
 
 from typing import Final
@@ -72,5 +72,41 @@ def written_by_table(metadata: MetaData) -> Table:
     )
 
 
-#: The tables that are no folds.
-LOG: Final = frozenset({"event", "head", "snapshot", "written_by"})
+def outbox_tables(metadata: MetaData) -> tuple[Table, Table]:
+    """Define in `metadata`, and return, the tables of notifications: `outbox` (the messages, each
+    written in the transaction of the event that causes it) and `receiver` (the receivers to which
+    nothing is sent any more).
+
+    `subject`: the stream that a message is about; `at`: when it happened; `facts`: JSON object with
+    the words of its sentence; `due`: when it is to be tried next, none when it is sent or given up.
+    `target`: a digest of a receiver's address, so that another address is tried again."""
+    outbox = Table(
+        "outbox",
+        metadata,
+        Column("id", Text, primary_key=True),
+        Column("receiver", Text, nullable=False),
+        Column("kind", Text, nullable=False),
+        Column("subject", Text, nullable=False),
+        Column("at", BigInteger, nullable=False),
+        Column("facts", Text, nullable=False),
+        Column("due", BigInteger),
+        Column("tries", BigInteger, nullable=False),
+        Column("tried_at", BigInteger),
+        Column("sent_at", BigInteger),
+        Column("error", Text, nullable=False, server_default=""),
+        Index(None, "receiver", "due"),
+        Index(None, "subject", "at"),
+    )
+    receiver = Table(
+        "receiver",
+        metadata,
+        Column("name", Text, primary_key=True),
+        Column("target", Text, nullable=False),
+        Column("off_at", BigInteger, nullable=False),
+        Column("why", Text, nullable=False),
+    )
+    return outbox, receiver
+
+
+#: The tables that are no folds. A message that was sent must not be sent again from its event.
+LOG: Final = frozenset({"event", "head", "snapshot", "written_by", "outbox", "receiver"})

@@ -18,7 +18,7 @@ from sqlalchemy import (
     text,
 )
 
-from action_assistant.schema.log_tables import NAMES, log_tables, written_by_table
+from action_assistant.schema.log_tables import NAMES, log_tables, outbox_tables, written_by_table
 
 RUNNER: Final = MetaData(naming_convention=NAMES)
 runner_event, runner_head, runner_snapshot = log_tables(RUNNER)
@@ -145,3 +145,4 @@ expectation: Final = Table(
     Column("at", BigInteger, nullable=False),
     Column("seq", BigInteger, nullable=False),
 )
+outbox, receiver = outbox_tables(RUNNER)

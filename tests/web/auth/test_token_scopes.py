@@ -38,7 +38,10 @@ FOR_PEOPLE = {
     ("post", "/api/logins/confirm"),
     ("post", "/api/logins/refuse"),
     ("post", "/api/tokens/{token}/revoke"),  # of another token
+    ("get", "/api/mentions"),
+    ("post", "/api/mentions/read"),
     ("post", "/api/approvals"),
+    ("post", "/api/approvals/asked"),
     ("post", "/api/runs/{run}/at_rest"),
     ("post", "/api/runs/{run}/go_on"),
     ("post", "/api/runs/{run}/outcome"),

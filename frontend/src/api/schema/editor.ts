@@ -956,6 +956,14 @@ export interface EditorApi {
         remarks: EditorApi["Note"][];
     };
     /**
+     * Inbox
+     * @description The newest mentions of a person, and how many of them are unread.
+     */
+    Inbox: {
+        unread: number;
+        mentions: EditorApi["Mention"][];
+    };
+    /**
      * InsideGraph
      * @description A graph inside of another one, with its present content. `name`: of the actions that stand
      *     for it; `graph`: its id.
@@ -1297,6 +1305,21 @@ export interface EditorApi {
         people: EditorApi["Member"][];
         groups: EditorApi["Group"][];
         origins: string[];
+    };
+    /**
+     * Mention
+     * @description A comment in which the person is mentioned. `key`: of the comment in its document; `author`:
+     *     by the log; `text`: its beginning.
+     */
+    Mention: {
+        key: string;
+        graph: string;
+        graph_name: string;
+        author: EditorApi["PersonRef"];
+        /** Format: date-time */
+        at: string;
+        text: string;
+        is_read: boolean;
     };
     /**
      * MergePreview
@@ -1863,6 +1886,13 @@ export interface EditorApi {
         note?: string;
     };
     /**
+     * ReadMentions
+     * @description The keys of mentions that the person has read.
+     */
+    ReadMentions: {
+        keys: string[];
+    };
+    /**
      * Readiness
      * @description The answer to the question whether the process can do its work, with what prevents it.
      *
@@ -1874,6 +1904,27 @@ export interface EditorApi {
         parts?: {
             [key: string]: string | null;
         };
+    };
+    /**
+     * ReceiverState
+     * @description A receiver, and how it went. `to`: its host, or mail addresses; `kinds`: of messages that this
+     *     process sends to it; `off`: why nothing is sent to it any more, "" if it is on; `waiting`: messages
+     *     that are tried again; `failed`: messages that were given up in the last 30 days; `error`: the
+     *     reason of the newest failure, "" if the newest try went well.
+     */
+    ReceiverState: {
+        name: string;
+        /** @enum {string} */
+        way: "mail" | "webhook";
+        to: string;
+        kinds: string[];
+        off: string;
+        off_at: string | null;
+        sent_at: string | null;
+        tried_at: string | null;
+        error: string;
+        waiting: number;
+        failed: number;
     };
     /**
      * Rehearsal
@@ -2456,6 +2507,12 @@ export interface EditorPaths {
         delete: EditorOperations["removeGroup"];
         patch: EditorOperations["renameGroup"];
     };
+    "/api/notifications": {
+        get: EditorOperations["listReceivers"];
+    };
+    "/api/notifications/{name}/test": {
+        post: EditorOperations["testReceiver"];
+    };
     "/api/config": {
         get: EditorOperations["getConfig"];
     };
@@ -2541,6 +2598,12 @@ export interface EditorPaths {
     };
     "/api/graphs/{graph_id}/revert": {
         post: EditorOperations["revertGraph"];
+    };
+    "/api/mentions": {
+        get: EditorOperations["listMentions"];
+    };
+    "/api/mentions/read": {
+        post: EditorOperations["readMentions"];
     };
     "/api/graphs/{graph_id}/versions": {
         get: EditorOperations["listVersions"];
@@ -3058,6 +3121,29 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["Group"];
+                };
+            };
+        };
+    };
+    listReceivers: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ReceiverState"][];
+                };
+            };
+        };
+    };
+    testReceiver: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ReceiverState"];
                 };
             };
         };
@@ -3616,6 +3702,26 @@ interface EditorOperations {
                 content: {
                     "application/json": EditorApi["GoneBack"];
                 };
+            };
+        };
+    };
+    listMentions: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Inbox"];
+                };
+            };
+        };
+    };
+    readMentions: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["ReadMentions"];
+            };
+        };
+        responses: {
+            204: {
             };
         };
     };

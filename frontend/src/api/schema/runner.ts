@@ -122,6 +122,19 @@ export interface RunnerApi {
         note: string;
     };
     /**
+     * ApprovalQuestion
+     * @description The body of a request that asks others for an approval. `robots`: those of the start.
+     */
+    ApprovalQuestion: {
+        digest: string;
+        robots: string[];
+        graph_name: string;
+        /** @default null */
+        graph?: string | null;
+        /** @default  */
+        version?: string;
+    };
+    /**
      * ApprovalRequest
      * @description The body of an approval of exactly one graph.
      */
@@ -1267,6 +1280,27 @@ export interface RunnerApi {
         parts?: {
             [key: string]: string | null;
         };
+    };
+    /**
+     * ReceiverState
+     * @description A receiver, and how it went. `to`: its host, or mail addresses; `kinds`: of messages that this
+     *     process sends to it; `off`: why nothing is sent to it any more, "" if it is on; `waiting`: messages
+     *     that are tried again; `failed`: messages that were given up in the last 30 days; `error`: the
+     *     reason of the newest failure, "" if the newest try went well.
+     */
+    ReceiverState: {
+        name: string;
+        /** @enum {string} */
+        way: "mail" | "webhook";
+        to: string;
+        kinds: string[];
+        off: string;
+        off_at: string | null;
+        sent_at: string | null;
+        tried_at: string | null;
+        error: string;
+        waiting: number;
+        failed: number;
     };
     /**
      * Recorded
@@ -2451,6 +2485,9 @@ export interface RunnerPaths {
         get: RunnerOperations["listApprovals"];
         post: RunnerOperations["approve"];
     };
+    "/api/approvals/asked": {
+        post: RunnerOperations["askApproval"];
+    };
     "/api/expectations": {
         get: RunnerOperations["listExpectations"];
         post: RunnerOperations["addExpectation"];
@@ -2535,6 +2572,12 @@ export interface RunnerPaths {
     };
     "/api/tokens/{token}/revoke": {
         post: RunnerOperations["revokeToken"];
+    };
+    "/api/notifications": {
+        get: RunnerOperations["listReceivers"];
+    };
+    "/api/notifications/{name}/test": {
+        post: RunnerOperations["testReceiver"];
     };
     "/api/tokens/records": {
         post: RunnerOperations["adoptToken"];
@@ -3292,6 +3335,17 @@ interface RunnerOperations {
             };
         };
     };
+    askApproval: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ApprovalQuestion"];
+            };
+        };
+        responses: {
+            202: {
+            };
+        };
+    };
     listExpectations: {
         responses: {
             200: {
@@ -3720,6 +3774,29 @@ interface RunnerOperations {
         };
         responses: {
             204: {
+            };
+        };
+    };
+    listReceivers: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ReceiverState"][];
+                };
+            };
+        };
+    };
+    testReceiver: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ReceiverState"];
+                };
             };
         };
     };

@@ -33,6 +33,7 @@ from action_assistant.system import posix
 from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.version import described
 from action_assistant.web.auth.keys import TOKEN_FILE, Keys
+from action_assistant.web.notifications.receivers import receivers_of
 
 _PREFIX: Final = "ACTION_ASSISTANT_"
 _HOST: Final = re.compile(r"[A-Za-z0-9_.:\[\]-]+")
@@ -139,6 +140,7 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     "ACTION_ASSISTANT_FRAME_ORIGINS": lambda value: settings.frame_origins(
         {"ACTION_ASSISTANT_FRAME_ORIGINS": value}
     ),
+    "ACTION_ASSISTANT_NOTIFICATIONS": lambda value: receivers_of(Path(value)),
     "ACTION_ASSISTANT_LIMITS": _limits,
     **{name: _log(name) for name in ("ACTION_ASSISTANT_LOG_FORMAT", "ACTION_ASSISTANT_LOG_LEVEL")},
     **{

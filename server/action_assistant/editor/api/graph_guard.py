@@ -27,13 +27,21 @@ PARAMETERS: Final[dict[str, Kind]] = {
 }
 #: Routes that answer for several graphs: they leave out what the asker may not see.
 FILTERED: Final = frozenset(
-    {"/api/graphs", "/api/folders", "/api/events", "/api/actions", "/api/actions/graphs"}
+    {
+        "/api/graphs",
+        "/api/folders",
+        "/api/events",
+        "/api/actions",
+        "/api/actions/graphs",
+        "/api/mentions",
+    }
 )
 #: Routes whose answers tell nothing of any graph.
 WITHOUT_GRAPHS: Final = frozenset(
     {
         *("/api/config", "/api/people", "/api/examples", "/api/pieces", "/api/values-package.zip"),
         *("/api/actions/deleted", "/api/graph-rules"),  # the latter is for owners
+        "/api/mentions/read",
     }
 )
 

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 import msgspec
 from sqlalchemy import Executable, ScalarSelect, delete, insert, select, update
 
-from action_assistant.editor.log import people_events
+from action_assistant.editor.log import inbox_events, people_events
 from action_assistant.journal.events import Draft, Event
 from action_assistant.kit.moments import moment
 from action_assistant.schema import editor_tables
@@ -316,7 +316,7 @@ def _read(event: Event, kind: type[T]) -> T:
 def fold(event: Event) -> Sequence[Executable]:
     """Return the statements by which a stored event changes the tables."""
     if event.kind in {UPDATED, DEFERRED}:
-        return ()
+        return inbox_events.due(event) if inbox_events.MARK in event.body else ()
     stream, _, name = event.stream.partition("/")
     if stream == "about":
         return _about(event, name)
@@ -329,6 +329,8 @@ def fold(event: Event) -> Sequence[Executable]:
         ]
     if event.stream == INVITATIONS:
         return _invitation(event)
+    if event.kind == inbox_events.READ:
+        return inbox_events.read(event)
     if event.stream == FOLDERS:
         return _folder(event)
     if event.stream == PEOPLE:

@@ -49,7 +49,11 @@ from action_assistant.runner.start.admission import (
     decoded,
     read_request,
 )
-from action_assistant.runner.start.approvals import ApprovalGiven, ApprovalRequest
+from action_assistant.runner.start.approvals import (
+    ApprovalGiven,
+    ApprovalQuestion,
+    ApprovalRequest,
+)
 from action_assistant.umrf.semantics import Script
 from action_assistant.web.audit.events import StartRefused
 from action_assistant.web.audit.routes import audit_routes
@@ -479,7 +483,17 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def approve(data: ApprovalRequest, request: _Asking) -> Approval:
         return _approval(await services.control.approvals.give(data, author_of(request)))
 
-    return [approvals, approve]
+    @post(
+        "/api/approvals/asked",
+        status_code=202,
+        summary="Ask others for their yes to exactly one graph, where messages are sent",
+        operation_id="askApproval",
+        guards=[PersonOnly(), Needs("operate")],
+    )
+    async def ask(data: ApprovalQuestion, request: _Asking) -> None:
+        await services.control.approvals.ask(data, author_of(request))
+
+    return [approvals, approve, ask]
 
 
 def _approval(given: ApprovalGiven) -> Approval:

@@ -19,6 +19,7 @@ from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.released_versions import ReleasedVersions
 from action_assistant.web.network.connection_limits import ConcurrencyLimit, ConnectionLimits
+from action_assistant.web.notifications.sender import Notifications
 from action_assistant.web.workers.lanes import Lane, RunInWorker
 
 _BODIES: Final = 4  # large bodies of one person in memory at once
@@ -43,6 +44,7 @@ class RunnerServices:
     sent: WeakKeyDictionary[OpenRun, Sent]
     identity_now: IdentityNow
     released: ReleasedVersions
+    notifications: Notifications
 
     def __init__(self) -> None:
         self.behaviours = None

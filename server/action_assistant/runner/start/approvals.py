@@ -24,6 +24,7 @@ from action_assistant.web.auth import caller
 STREAM: Final = "approvals"
 
 _DIGEST: Final = frozenset("0123456789abcdef")
+_ASKED_US: Final = 600_000_000  # in which one person asks for one graph once
 
 
 class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -39,6 +40,34 @@ class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
     version: str = ""
     note: str = ""
     device: str = ""
+
+
+class ApprovalAsked(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The event that a person asks others for an approval of the graph with this digest, for a start
+    on these robots. It lets nobody start anything."""
+
+    kind: ClassVar[str] = "approval.asked.v1"
+
+    at: int
+    digest: str
+    author: Author
+    robots: tuple[str, ...]
+    graph_name: str
+    graph: str | None = None
+    version: str = ""
+
+
+class ApprovalQuestion(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """The body of a request that asks others for an approval. `robots`: those of the start."""
+
+    digest: Annotated[str, msgspec.Meta(min_length=64, max_length=64)]
+    robots: Annotated[
+        tuple[Annotated[str, msgspec.Meta(max_length=100)], ...],
+        msgspec.Meta(min_length=1, max_length=20),
+    ]
+    graph_name: Annotated[str, msgspec.Meta(max_length=200)]
+    graph: Annotated[str, msgspec.Meta(max_length=100)] | None = None
+    version: Annotated[str, msgspec.Meta(max_length=100)] = ""
 
 
 class ApprovalRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -60,6 +89,7 @@ class Approvals:
         self._seq = 0
         self._by_digest: defaultdict[str, list[ApprovalGiven]] = defaultdict(list)
         self._reading = anyio.Lock()
+        self._asked: dict[tuple[str, str], ApprovalAsked] = {}
 
     async def give(self, request: ApprovalRequest, author: Author) -> ApprovalGiven:
         """Store an approval. If the same person has approved the graph before, return that earlier
@@ -81,6 +111,27 @@ class Approvals:
         )
         await self._journal.append(STREAM, [draft_of(given, author.id)])
         return given
+
+    async def ask(self, question: ApprovalQuestion, author: Author) -> ApprovalAsked:
+        """Store that a person asks for an approval; while one from the last ten minutes stands, return
+        that instead. Raise BadInput if the digest has the wrong form, Unavailable if the journal
+        cannot store it."""
+        if not _DIGEST.issuperset(question.digest):
+            raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
+        now = self._clock_us()
+        key = author.id, question.digest
+        before = self._asked.get(key)
+        if before is not None and now - before.at < _ASKED_US:
+            return before
+        asked = ApprovalAsked(at=now, author=author, **msgspec.structs.asdict(question))
+        self._asked = {k: v for k, v in self._asked.items() if now - v.at < _ASKED_US}
+        self._asked[key] = asked
+        try:
+            await self._journal.append(STREAM, [draft_of(asked, author.id)])
+        except BaseException:
+            self._asked.pop(key, None)
+            raise
+        return asked
 
     async def given_for(self, digest: str) -> tuple[ApprovalGiven, ...]:
         """Return the approvals of a graph, in order of time."""

@@ -1,0 +1,316 @@
+"""The inbox of each person: the comments in which others have mentioned them.
+
+Found in the committed events, not by what a page says: the author is the one that the log knows.
+"""
+
+import logging
+from collections import defaultdict
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import Set as AbstractSet
+from contextlib import asynccontextmanager
+from datetime import datetime
+from functools import partial
+from typing import Any, Final, TypeAlias
+
+import anyio
+import msgspec
+from sqlalchemy import Connection, and_, delete, func, insert, select
+
+from action_assistant.editor.history.change_index import ChangeIndex
+from action_assistant.editor.log.graph_events import draft, graph_stream
+from action_assistant.editor.log.inbox_events import READ, InboxRead, inbox_stream
+from action_assistant.editor.people.people import stored_people
+from action_assistant.errors import Refused
+from action_assistant.journal.events import Event
+from action_assistant.journal.journal import Journal
+from action_assistant.kit.clock import ClockUs, utc_us
+from action_assistant.kit.moments import moment
+from action_assistant.schema.editor_tables import (
+    graph,
+    key_change,
+    member,
+    mention,
+    mention_due,
+    mention_read,
+    outbox,
+    person,
+)
+from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.notifications.messages import LATE_US
+from action_assistant.web.notifications.outbox import id_of, row
+from action_assistant.web.notifications.receivers import Receiver
+
+log: Final = logging.getLogger(__name__)
+
+#: Returns whether a person (the second id) may see a graph (the first one).
+MaySee: TypeAlias = Callable[[str, str], Awaitable[bool]]
+
+#: The kinds of messages that the editor sends.
+KINDS: Final = ("mention",)
+#: Persons that one comment can mention; others in it are ignored.
+MOST: Final = 20
+_LOOK_S: Final = 2.0
+_GRAPHS: Final = 20  # in one look
+_EXCERPT: Final = 300  # characters
+_LONGEST_ID: Final = 100
+_SHOWN: Final = 100  # mentions in one answer
+_ROOT: Final = "comments"
+#: Messages about mentions to one receiver in an hour: nobody can flood it by comments.
+_HOURLY: Final = 30
+_HOUR_US: Final = 3_600_000_000
+
+
+class Mention(msgspec.Struct, frozen=True, kw_only=True):
+    """A comment in which the person is mentioned. `key`: of the comment in its document; `author`:
+    by the log; `text`: its beginning."""
+
+    key: str
+    graph: str
+    graph_name: str
+    author: PersonRef
+    at: datetime
+    text: str
+    is_read: bool
+
+
+class Inbox(msgspec.Struct, frozen=True):
+    """The newest mentions of a person, and how many of them are unread."""
+
+    unread: int
+    mentions: list[Mention]
+
+
+class FoundMentions(msgspec.Struct, frozen=True):
+    """The persons whom one event of a graph mentions in the comment `key`."""
+
+    seq: int
+    author: str
+    at: int
+    key: str
+    text: str
+    people: tuple[str, ...]
+
+
+class Inboxes:
+    """Finds mentions, and reads and marks the inboxes of all persons. `receivers`: to which mentions
+    are sent as messages; `may_see`: whether a person may see a graph, by their ids (None: all may)."""
+
+    def __init__(
+        self,
+        journal: Journal,
+        changes: ChangeIndex,
+        receivers: Sequence[Receiver] = (),
+        clock_us: ClockUs = utc_us,
+        may_see: MaySee | None = None,
+    ) -> None:
+        self._journal = journal
+        self._changes = changes
+        self._receivers = [each for each in receivers if "mention" in each.kinds]
+        self._clock_us = clock_us
+        self._may_see = may_see
+
+    @asynccontextmanager
+    async def kept_up(self) -> AsyncIterator[None]:
+        """Return a context during which mentions are found, some seconds after they are stored."""
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(self._keep_up)
+            yield
+            tasks.cancel_scope.cancel()
+
+    async def _keep_up(self) -> None:
+        while True:
+            try:
+                await self.find()
+            except Refused as error:
+                log.warning("mentions are not looked for: %s", error.detail)
+            await anyio.sleep(_LOOK_S)
+
+    async def find(self) -> None:
+        """Find the mentions in the edits that are marked. Raise Unavailable if the journal cannot be
+        read or written, TooMany if no worker is free."""
+        due = mention_due.c
+        marked = select(due.graph, func.min(due.seq).label("first")).group_by(due.graph)
+        for each in await self._journal.query(marked.order_by("first").limit(_GRAPHS)):
+            newest = await self._journal.newest(graph_stream(each.graph))
+            await self._changes.upto(
+                each.graph, newest
+            )  # less is there only where the log is damaged
+            found = await self._changes.value(mentions_in, each.graph, each.first, newest)
+            people = dict.fromkeys(one for mention_ in found for one in mention_.people)
+            sees = self._may_see
+            blind = {p for p in people if sees is not None and not await sees(each.graph, p)}
+            await self._journal.derive(partial(self._keep, each.graph, newest, found, blind))
+
+    async def of(self, reader: str, sees: Callable[[str], bool]) -> Inbox:
+        """Return the inbox of a person. `sees`: whether they may see the graph with an id. Raise
+        Unavailable if the journal cannot be read."""
+        return await self._journal.ask(partial(_inbox_of, reader=reader, sees=sees))
+
+    async def read(self, reader: str, keys: Sequence[str]) -> None:
+        """Mark mentions as read by a person. Raise Unavailable if the journal cannot be written."""
+        c = mention.c
+        mine = select(c.key).where(c.person == reader, c.key.in_(keys))
+        known = tuple([each.key for each in await self._journal.query(mine)])
+        if known:
+            await self._journal.append(
+                inbox_stream(reader), [draft(READ, reader, InboxRead(known))]
+            )
+
+    def _keep(
+        self,
+        graph_: str,
+        upto: int,
+        found: Sequence[FoundMentions],
+        blind: AbstractSet[str],
+        connection: Connection,
+    ) -> None:
+        """Store what was found up to a change of a graph, with the messages about it, and take the
+        marks away. `blind`: the persons who may not see the graph now, of whom no message speaks."""
+        fresh: dict[int, list[tuple[FoundMentions, tuple[str, ...]]]] = defaultdict(list)
+        for each in found:
+            people = _fresh(connection, each)
+            if people:
+                fresh[each.seq].append((each, tuple(one for one in people if one not in blind)))
+                rows = [
+                    {
+                        "key": each.key,
+                        "person": one,
+                        "graph": graph_,
+                        "seq": each.seq,
+                        "author": each.author,
+                        "at": each.at,
+                        "text": each.text,
+                    }
+                    for one in people
+                ]
+                connection.execute(insert(mention), rows)
+        for seq, mentions in fresh.items():
+            self._put_messages(connection, graph_, seq, mentions)
+        done = mention_due.c.graph == graph_, mention_due.c.seq <= upto
+        connection.execute(delete(mention_due).where(*done))
+
+    def _put_messages(
+        self,
+        connection: Connection,
+        graph_: str,
+        seq: int,
+        mentions: Sequence[tuple[FoundMentions, tuple[str, ...]]],
+    ) -> None:
+        first = mentions[0][0]
+        people = dict.fromkeys(one for _, named in mentions for one in named)
+        if not people or not self._receivers or self._clock_us() - first.at > LATE_US:
+            return  # as when the tables were made again
+        known = stored_people(connection)
+        name = connection.scalar(select(graph.c.name).where(graph.c.id == graph_))
+        facts = {
+            "person": known(first.author).name or "Somebody",
+            "people": ", ".join(known(each).name or "somebody" for each in people),
+            "graph": name or "a graph",
+            "id": graph_,
+            "key": first.key,
+        }
+        event = Event(graph_stream(graph_), seq, "", first.author, first.at, b"", 0)
+        for receiver in self._receivers:
+            id_, c = id_of(event, receiver.name), outbox.c
+            recent = c.receiver == receiver.name, c.kind == "mention", c.at > first.at - _HOUR_US
+            count = connection.scalar(select(func.count()).where(*recent)) or 0
+            if connection.scalar(select(c.id).where(c.id == id_)) is None:
+                values = row(id_, receiver.name, "mention", event.stream, first.at, facts)
+                if count >= _HOURLY:
+                    why = f"Not sent: there were {_HOURLY} mentions within an hour."
+                    values |= {"due": None, "error": why}
+                connection.execute(insert(outbox).values(values))
+
+
+def mentions_in(connection: Connection, graph_: str, first: int, upto: int) -> list[FoundMentions]:
+    """Return the persons whom the changes of a graph from `first` to `upto` mention, in the order of
+    the changes, by what the index of key changes says. For workers."""
+    c = key_change.c
+    chosen = (
+        select(c.seq, c.author, c.at, c.key, c.after)
+        .where(c.graph == graph_, c.root == _ROOT, c.seq >= first, c.seq <= upto)
+        .order_by(c.seq)
+    )
+    found = []
+    for each in connection.execute(chosen).all():
+        text, people = _mentioned(each.after)
+        if others := tuple(one for one in people if one != each.author):
+            found.append(FoundMentions(each.seq, each.author, each.at, each.key, text, others))
+    return found
+
+
+def _mentioned(packed: bytes | None) -> tuple[str, tuple[str, ...]]:
+    """Return the beginning of a comment, and the persons that it mentions. Pages write comments: what
+    is none mentions nobody."""
+    if packed is None:
+        return "", ()
+    try:
+        body: Any = msgspec.json.decode(msgspec.msgpack.decode(packed, type=str))
+    except (msgspec.DecodeError, UnicodeError):
+        return "", ()
+    if not isinstance(body, dict) or not isinstance(body.get("mentions"), list):
+        return "", ()
+    text = body.get("text")
+    people = [each for each in body["mentions"] if isinstance(each, str)]
+    fit = dict.fromkeys(
+        each for each in people if 0 < len(each) <= _LONGEST_ID and "\0" not in each
+    )
+    if not isinstance(text, str) or not text or "\0" in text:
+        return "", ()
+    return text[:_EXCERPT], tuple(fit)[:MOST]
+
+
+def _fresh(connection: Connection, found: FoundMentions) -> tuple[str, ...]:
+    """Return the persons of a comment who are known here, and whom it did not mention before: a copy
+    of a comment, as in a draft, mentions nobody anew."""
+    before = select(mention.c.person).where(mention.c.key == found.key)
+    old = set(connection.scalars(before))
+    known: set[str] = set()
+    for table in (person, member):
+        known |= set(connection.scalars(select(table.c.id).where(table.c.id.in_(found.people))))
+    return tuple(each for each in found.people if each in known and each not in old)
+
+
+def _inbox_of(connection: Connection, reader: str, sees: Callable[[str], bool]) -> Inbox:
+    c = mention.c
+    chosen = (
+        select(
+            c.key, c.graph, graph.c.name, c.author, c.at, c.text, mention_read.c.key.label("read")
+        )
+        .join(graph, and_(graph.c.id == c.graph, graph.c.deleted_at.is_(None)))
+        .outerjoin(
+            mention_read, and_(mention_read.c.person == c.person, mention_read.c.key == c.key)
+        )
+        .where(c.person == reader)
+        .order_by(c.at.desc(), c.key)
+        .limit(10 * _SHOWN)
+    )
+    known = stored_people(connection)
+    seen = [each for each in connection.execute(chosen).all() if sees(each.graph)][:_SHOWN]
+    rows = [each for each in seen if _stands(connection, each.graph, each.key, reader)]
+    found = [
+        Mention(
+            key=each.key,
+            graph=each.graph,
+            graph_name=each.name,
+            author=known(each.author),
+            at=moment(each.at),
+            text=each.text,
+            is_read=each.read is not None,
+        )
+        for each in rows
+    ]
+    return Inbox(sum(not each.is_read for each in found), found)
+
+
+def _stands(connection: Connection, graph_: str, key: str, reader: str) -> bool:
+    """Return whether a comment still mentions a person, as far as the index of key changes knows."""
+    c = key_change.c
+    newest = (
+        select(c.after)
+        .where(c.graph == graph_, c.root == _ROOT, c.key == key)
+        .order_by(c.seq.desc())
+        .limit(1)
+    )
+    found = connection.execute(newest).first()
+    return found is None or reader in _mentioned(found.after)[1]

@@ -1,0 +1,1 @@
+"""Notifications: messages for people elsewhere, by webhook or mail, out of one outbox."""

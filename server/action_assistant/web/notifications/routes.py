@@ -1,0 +1,39 @@
+"""The routes of notifications, which both processes have for their own messages."""
+
+from collections.abc import Callable
+from typing import Any
+
+from litestar import Request, get, post
+from litestar.types import ControllerRouterHandler
+
+from action_assistant.web.auth.access import Needs, person_of
+from action_assistant.web.notifications.outbox import ReceiverState
+from action_assistant.web.notifications.sender import Notifications
+
+
+def notification_routes(
+    notifications: Callable[[], Notifications],
+) -> list[ControllerRouterHandler]:
+    """Return the routes under `/api/notifications`, for owners. `notifications` returns those of the
+    open process."""
+
+    @get(
+        "/api/notifications",
+        summary="Receivers of messages by webhook and mail, as this process sends to them",
+        operation_id="listReceivers",
+        guards=[Needs("share")],
+    )
+    async def list_receivers() -> list[ReceiverState]:
+        return await notifications().states()
+
+    @post(
+        "/api/notifications/{name:str}/test",
+        status_code=200,
+        summary="Send a test to a receiver; one that takes it is on again",
+        operation_id="testReceiver",
+        guards=[Needs("share")],
+    )
+    async def test_receiver(name: str, request: Request[Any, Any, Any]) -> ReceiverState:
+        return await notifications().test(name, person_of(request).name)
+
+    return [list_receivers, test_receiver]

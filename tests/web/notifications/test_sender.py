@@ -1,0 +1,245 @@
+"""Each message is delivered once, as far as its receiver can tell by the id, or shown as failed."""
+
+import asyncio
+import random
+from collections import Counter
+from collections.abc import Awaitable, Callable, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import anyio
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from sqlalchemy import Executable, insert, select
+
+from action_assistant.errors import NotFound
+from action_assistant.journal.events import Draft, Event
+from action_assistant.journal.journal import Journal
+from action_assistant.kit.clock import utc_us
+from action_assistant.schema.editor_tables import outbox
+from action_assistant.web.notifications.delivery import NotDelivered
+from action_assistant.web.notifications.messages import Message
+from action_assistant.web.notifications.outbox import RETRIES_S, id_of, row
+from action_assistant.web.notifications.receivers import Receiver
+from action_assistant.web.notifications.sender import Notifications
+from support.doses import examples
+from web.notifications.receiving import http_receiver, webhook
+
+HOUR = 3_600_000_000
+RECEIVERS = (webhook("https://a.example/", "a"), webhook("https://b.example/", "b"))
+EVENT = Draft("thing.failed.v1", "", b"{}")
+
+
+def _fold(event: Event) -> Sequence[Executable]:
+    return [
+        insert(outbox)
+        .prefix_with("OR IGNORE")
+        .values(row(id_of(event, each.name), each.name, "run.ended", event.stream, event.at, {}))
+        for each in RECEIVERS
+    ]
+
+
+class Clock:
+    """A clock that goes on by some minutes with each look at it."""
+
+    def __init__(self) -> None:
+        self.now = utc_us()
+
+    def __call__(self) -> int:
+        self.now += HOUR // 4
+        return self.now
+
+
+async def _open(folder: Path) -> Journal:
+    return await Journal.open(f"sqlite:///{folder / 'editor.db'}", branch="editor", fold=_fold)
+
+
+async def _rows(journal: Journal) -> list[Any]:
+    return await journal.query(select(outbox))
+
+
+class Network:
+    """Receivers that fail by chance. `got`: how often each id was taken; `cut` is set when the sender
+    has to be ended before it can record that."""
+
+    def __init__(self, seed: int, fails: float, cuts: float, gone: float) -> None:
+        self._random = random.Random(seed)
+        self._fails, self._cuts, self._gone = fails, cuts, gone
+        self.got: Counter[str] = Counter()
+        self.cut = asyncio.Event()
+        self._loop = asyncio.get_running_loop()
+
+    def deliver(self, receiver: Receiver, message: Message, page: str) -> None:
+        """Take a message, or refuse it."""
+        del page
+        assert message.id.endswith(f":{receiver.name}")
+        if self._random.random() < self._gone:
+            raise NotDelivered("Gone.", is_final=True)
+        if self._random.random() < self._fails:
+            raise NotDelivered("It failed.")
+        self.got[message.id] += 1
+        if self._random.random() < self._cuts:
+            self._loop.call_soon_threadsafe(self.cut.set)
+
+
+async def _true(value: object) -> bool:
+    return bool(value)
+
+
+async def _is_off(sender: Notifications) -> bool:
+    return bool((await sender.states())[0].off)
+
+
+async def _is_over(journal: Journal) -> bool:
+    return not any(each.due is not None for each in await _rows(journal))
+
+
+async def _until(seen: Callable[[], Awaitable[bool]]) -> None:
+    with anyio.fail_after(20):
+        while not await seen():  # noqa: ASYNC110 - the other side is a thread or a database
+            await anyio.sleep(0.005)
+
+
+async def _life(journal: Journal, network: Network, clock: Clock, until: float | None) -> None:
+    """Send until all is sent, the network is cut, or `until` seconds have gone."""
+    sender = Notifications(
+        journal,
+        RECEIVERS,
+        ["run.ended"],
+        "",
+        clock_us=clock,
+        deliver=network.deliver,
+        look_s=0,
+        gap_s=0,
+    )
+    network.cut.clear()
+    with anyio.move_on_after(until):
+        async with anyio.create_task_group() as tasks:
+
+            async def end_at_cut() -> None:
+                await network.cut.wait()
+                tasks.cancel_scope.cancel()
+
+            tasks.start_soon(end_at_cut)
+            async with sender.sending():
+                await _until(lambda: _is_over(journal))
+            tasks.cancel_scope.cancel()
+
+
+async def _story(
+    folder: Path, lives: list[int], seed: int, fails: float, cuts: float, gone: float
+) -> None:
+    network, clock, appended = Network(seed, fails, cuts, gone), Clock(), 0
+    for count in lives:
+        journal = await _open(folder)
+        for _ in range(count):
+            await journal.append("run/x.y", [EVENT])
+        appended += count
+        await _life(journal, network, clock, 0.02)
+        await journal.close()
+    journal = await _open(folder)
+    while not await _is_over(journal):
+        await _life(journal, network, clock, None)
+    rows = await _rows(journal)
+    assert len(rows) == 2 * appended
+    for each in rows:
+        if each.sent_at is not None:
+            assert network.got[each.id] >= 1
+            assert not each.error
+        else:
+            assert each.error
+    if not cuts:  # only an end of the process has a message sent again
+        assert max(network.got.values(), default=0) <= 1 + len(lives)
+        assert {each.id for each in rows if each.sent_at is not None} <= set(network.got)
+    before = network.got.copy()
+    await journal.rebuild()
+    assert await _is_over(journal)
+    await _life(journal, network, clock, None)
+    assert network.got == before
+    await journal.close()
+
+
+@settings(max_examples=examples(25), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(
+    lives=st.lists(st.integers(0, 3), min_size=1, max_size=3),
+    seed=st.integers(0, 2**32),
+    fails=st.sampled_from([0, 0.3, 0.9, 1]),
+    cuts=st.sampled_from([0, 0.3]),
+    gone=st.sampled_from([0, 0, 0.2]),
+)
+def test_each_message_is_taken_once_or_shown_as_failed(
+    lives: list[int], seed: int, fails: float, cuts: float, gone: float
+) -> None:
+    with TemporaryDirectory() as folder:
+        asyncio.run(_story(Path(folder), lives, seed, fails, cuts, gone))
+
+
+async def test_a_receiver_is_tried_as_often_as_agreed_and_then_switched_off(tmp_path: Path) -> None:
+    journal, clock = await _open(tmp_path), Clock()
+    await journal.append("run/x", [EVENT])
+    network = Network(1, 1, 0, 0)
+    await _life(journal, network, clock, None)
+    assert {each.tries for each in await _rows(journal)} == {len(RETRIES_S) + 1}
+    await journal.append("run/x", [EVENT])
+    await _life(journal, network, clock, None)
+    newest = max(await _rows(journal), key=lambda each: each.id)
+    assert newest.error.startswith("Not sent: It failed.")
+    assert newest.tries == 0
+    await journal.close()
+
+
+async def test_a_test_that_arrives_switches_a_receiver_on_again(tmp_path: Path) -> None:
+    journal = await _open(tmp_path)
+    with http_receiver() as receiver:
+        chat = webhook(f"http://127.0.0.1:{receiver.port}/", "a")
+        sender = Notifications(journal, [chat], ["run.ended"], "", gap_s=0, look_s=0.01)
+        receiver.answers = [410]
+        await journal.append("run/x", [EVENT])
+        async with sender.sending():
+            await _until(lambda: _is_off(sender))
+            assert (await sender.states())[0].error.startswith("It answered 410")
+            receiver.answers = [500]
+            failed = await sender.test("a", "Ann")
+            assert (failed.off, failed.error) != ("", "")
+            works = await sender.test("a", "Ann")
+            assert (works.off, works.error, works.failed) == ("", "", 1)
+            await journal.append("run/x", [EVENT])
+            await _until(lambda: _true(len(receiver.got) == 4))
+        ids = [headers["webhook-id"] for headers, _ in receiver.got]
+        assert ids[3] == "run/x:2:a"
+        assert receiver.got[2][1]["text"] == "This is a test of the receiver a, sent by Ann."
+        with pytest.raises(NotFound):
+            await sender.test("b", "Ann")
+    await journal.close()
+
+
+async def test_a_slow_receiver_delays_nothing_else(tmp_path: Path) -> None:
+    journal = await _open(tmp_path)
+    with http_receiver() as slow, http_receiver() as quick:
+        slow.drips = True
+        both = [
+            webhook(f"http://127.0.0.1:{each.port}/", name)
+            for each, name in ((slow, "a"), (quick, "b"))
+        ]
+        sender = Notifications(journal, both, ["run.ended"], "", gap_s=0, look_s=0.01)
+        async with sender.sending():
+            await journal.append("run/x", [EVENT])
+            await _until(lambda: _true(slow.got and quick.got))
+            await journal.append("run/x", [EVENT])  # a commit goes on meanwhile
+            await _until(lambda: _true(len(quick.got) == 2))
+        # The end does not wait for the slow one either: this line is reached before its time is up.
+        assert len(slow.got) == 1
+    await journal.close()
+
+
+async def test_another_address_of_a_receiver_is_tried_again(tmp_path: Path) -> None:
+    journal = await _open(tmp_path)
+    old = Notifications(journal, [webhook("https://a.example/", "a")], ["run.ended"], "")
+    await old.outbox.switch_off(old.receivers[0], "Gone.", utc_us())
+    assert (await old.states())[0].off == "Gone."
+    new = Notifications(journal, [webhook("https://c.example/", "a")], ["run.ended"], "")
+    await new.outbox.open(new.receivers)
+    assert (await new.states())[0].off == ""
+    await journal.close()
