@@ -1,6 +1,6 @@
 /** A robot that takes only what a second person has said yes to: one asks, the other says yes, it starts. */
 
-import { expect, type Page, test } from "@playwright/test";
+import { type Browser, expect, type Page, test } from "@playwright/test";
 import { saved } from "./canvas";
 import { DOMAIN, NO_ROS, StandIn } from "./emulated-robot";
 import { type Person, Product } from "./product";
@@ -17,6 +17,23 @@ let graph: string;
 const dialog = (page: Page) => page.getByRole("dialog");
 const lookedAt = (page: Page) => page.getByRole("list", { name: "Looked at on David" });
 const yes = (page: Page) => dialog(page).getByRole("button", { name: /^Say yes to v1/ });
+
+/** A person who came by a link for them alone. */
+async function personally(browser: Browser, name: string): Promise<Person> {
+  const made = await product.ask<{ links: { path: string }[] }>("/api/members", {
+    method: "POST",
+    body: JSON.stringify({ name, role: "operator" }),
+    headers: { "content-type": "application/json" },
+  });
+  const context = await browser.newContext();
+  const page = await context.newPage();
+  const failures: string[] = [];
+  page.on("pageerror", (error) => failures.push(error.message));
+  await page.goto(`${product.url}${made.links[0]?.path}`);
+  await page.getByRole("button", { name: /^Come in as/ }).click();
+  await page.getByRole("button", { name: /^You are / }).waitFor();
+  return { context, page, failures };
+}
 
 async function openStart(page: Page): Promise<void> {
   await page.goto(`${product.url}/graphs/${graph}`);
@@ -40,13 +57,14 @@ test.beforeAll(async ({ browser }) => {
     product.runnerUrl,
   );
   graph = await product.chain(1);
-  ada = await product.person(browser, "Ada");
-  ben = await product.person(browser, "Ben");
+  ada = await personally(browser, "Ada");
+  ben = await personally(browser, "Ben");
 });
 
 test.afterAll(async () => {
   await david.kill();
   expect([...ada.failures, ...ben.failures]).toEqual([]);
+  for (const { context } of [ada, ben]) await context.close();
   await product.dispose();
 });
 

@@ -13,7 +13,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from support.product import TOKEN, Product
+from support.product import Product
 
 PROGRAM = Path(os.environ.get("UMRF_SHARED", "/nonexistent")) / "engine-lab" / "engine"
 IS_HERE = bool(os.environ.get("ENGINE_LAB")) and PROGRAM.exists()
@@ -23,8 +23,10 @@ needs_engine = pytest.mark.skipif(
 
 
 def browser(product: Product, name: str) -> httpx.Client:
-    """Return an HTTP client of the runner with the session of a person."""
-    body = {"token": TOKEN, "name": name}
+    """Return an HTTP client of the runner with the session of a person by a personal link."""
+    with product.editor() as owner:
+        made = owner.post("/api/members", json={"name": name, "role": "operator"}).json()
+    body = {"invitation": made["links"][0]["path"].removeprefix("/#i=")}
     answer = httpx.post(
         f"{product.url}/api/session", json=body, headers={"origin": product.url}, trust_env=False
     )

@@ -146,6 +146,26 @@ def test_a_profile_demands_it_or_not(value: object) -> None:
 
 
 @virtual
+async def test_who_came_by_a_link_for_several_people_is_no_second_person() -> None:
+    david, graph = Open(NEVER), sequence()
+    async with careful(Harness(), david) as control:
+        asked = order(graph, engine="David")
+        await control.approvals.give(yes(asked.digest), BEN, is_named=False)
+        with pytest.raises(Conflict, match="Ben came by a link that several people may use"):
+            await control.start(asked, ANN)
+        assert david.starts == []
+        await control.approvals.give(yes(asked.digest), CARL)
+        assert (await control.start(asked, ANN)).fresh
+        control.stop_all(ANN)
+        await until(lambda: not control.open)
+
+
+async def test_a_yes_of_before_links_were_told_apart_counts() -> None:
+    old = b'{"at":1,"digest":"x","author":{"id":"ben","name":"Ben","by":"browser"}}'
+    assert msgspec.json.decode(old, type=ApprovalGiven).is_named is None
+
+
+@virtual
 async def test_a_yes_from_the_same_browser_under_another_name_is_no_second_person() -> None:
     david, graph = Open(NEVER), sequence()
 
@@ -182,7 +202,12 @@ def test_a_browser_is_known_again_by_both_processes_after_somebody_has_signed_ou
         assert made.is_success, made.text
 
         def signed_in(name: str) -> None:
-            answer = browser.post(f"{product.url}/api/session", json={"token": TOKEN, "name": name})
+            member = {"name": name, "role": "operator"}
+            added = httpx.post(
+                f"{product.url}/api/members", json=member, headers=program, trust_env=False
+            )
+            proof = added.json()["links"][0]["path"].removeprefix("/#i=")
+            answer = browser.post(f"{product.url}/api/session", json={"invitation": proof})
             assert answer.is_success, answer.text
 
         def approved(digest: str = "") -> tuple[str, dict[str, str]]:

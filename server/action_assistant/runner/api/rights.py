@@ -17,6 +17,7 @@ from action_assistant.runner.robots.rights import Operator, Rules
 from action_assistant.runner.runs import views
 from action_assistant.runner.start.drills import DrillRequest
 from action_assistant.safe_text import hold_names
+from action_assistant.web.audit.events import ReleaseTold
 from action_assistant.web.auth.access import Needs, PersonOnly, identity_of
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.auth.released_versions import Release
@@ -266,7 +267,10 @@ def _releases(services: RunnerServices) -> list[ControllerRouterHandler]:
             raise BadInput("The path names another version than the body.", where=where)
         me = identity_of(request).person
         release = msgspec.structs.replace(data, by=PersonRef(me.id, me.name))
-        await anyio.to_thread.run_sync(services.released.add, release)
+        try:
+            await anyio.to_thread.run_sync(services.released.add, release)
+        finally:
+            services.audit.note(ReleaseTold(version), me.id)
 
     @delete(
         "/api/releases/{version:str}",
@@ -275,8 +279,12 @@ def _releases(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="dropRelease",
         guards=[Needs("share")],
     )
-    async def drop(version: str) -> None:
-        await anyio.to_thread.run_sync(services.released.remove, version)
+    async def drop(version: str, request: _Asking) -> None:
+        try:
+            await anyio.to_thread.run_sync(services.released.remove, version)
+        finally:
+            told = ReleaseTold(version, withdrawn=True)
+            services.audit.note(told, identity_of(request).person.id)
 
     return [store, drop]
 

@@ -65,6 +65,7 @@ from action_assistant.web.auth.access import (
     person_of,
     refuse,
     require,
+    session_of,
 )
 from action_assistant.web.auth.caller import client_network
 from action_assistant.web.server.openapi import answer, exchanges, reads
@@ -481,7 +482,11 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[PersonOnly(), Needs("operate")],
     )
     async def approve(data: ApprovalRequest, request: _Asking) -> Approval:
-        return _approval(await services.control.approvals.give(data, author_of(request)))
+        session = session_of(request)
+        is_named = session is None or session.personal
+        return _approval(
+            await services.control.approvals.give(data, author_of(request), is_named=is_named)
+        )
 
     @post(
         "/api/approvals/asked",

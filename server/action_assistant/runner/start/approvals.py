@@ -29,7 +29,8 @@ _ASKED_US: Final = 600_000_000  # in which one person asks for one graph once
 
 class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     """The event of an approval of the graph with this digest. `graph` and `version` say where the
-    person saw it; `device` is their browser, "" where that is not known."""
+    person saw it; `device` is their browser, "" where that is not known. `is_named`: an owner has
+    named the person, by a personal link; None in events of before that was asked."""
 
     kind: ClassVar[str] = "approval.given.v1"
 
@@ -40,6 +41,7 @@ class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=Tru
     version: str = ""
     note: str = ""
     device: str = ""
+    is_named: bool | None = None
 
 
 class ApprovalAsked(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -91,9 +93,11 @@ class Approvals:
         self._reading = anyio.Lock()
         self._asked: dict[tuple[str, str], ApprovalAsked] = {}
 
-    async def give(self, request: ApprovalRequest, author: Author) -> ApprovalGiven:
+    async def give(
+        self, request: ApprovalRequest, author: Author, *, is_named: bool = True
+    ) -> ApprovalGiven:
         """Store an approval. If the same person has approved the graph before, return that earlier
-        approval. Raise BadInput if the digest has the wrong form, Unavailable if the journal
+        approval. `is_named`: the person did not come by a link that several may use. Raise BadInput if the digest has the wrong form, Unavailable if the journal
         cannot store it."""
         if not _DIGEST.issuperset(request.digest):
             raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
@@ -108,6 +112,7 @@ class Approvals:
             version=request.version,
             note=request.note.strip(),
             device=caller.device(),
+            is_named=is_named,
         )
         await self._journal.append(STREAM, [draft_of(given, author.id)])
         return given
@@ -147,19 +152,25 @@ class Approvals:
     async def item(self, robot: Registration, digest: str, starter: str) -> Item | None:
         """Return the pre-flight item about approval; None where the robot asks for none. It passes
         when somebody else than the starter has approved the graph with another browser than the one
-        of this request."""
+        of this request. Of a link for several people nobody knows how many use it: who came by one
+        is no second person (decision 126)."""
         if robot.profile.get(SECOND_PERSON) is not True:
             return None
-        named = [each for each in await self.given_for(digest) if each.author.id != starter]
+        given = [each for each in await self.given_for(digest) if each.author.id != starter]
+        named = [each for each in given if each.is_named is not False]
         here = caller.device()
         others = [each.author for each in named if not here or each.device != here]
         if not others:
-            why = (
-                "nobody else has said yes to exactly this graph: the yes of "
-                f"{named[0].author.name or 'somebody'} came from the browser that you use"
-                if named
-                else "nobody else has said yes to exactly this graph"
-            )
+            why = "nobody else has said yes to exactly this graph"
+            if named:
+                who = named[0].author.name or "somebody"
+                why += f": the yes of {who} came from the browser that you use"
+            elif given:
+                who = given[0].author.name or "somebody"
+                why += (
+                    f": {who} came by a link that several people may use. An owner can give them a "
+                    "personal link"
+                )
             text = f"{robot.name} takes only what a second person has said yes to, and {why}."
             return Item(code="approved", verdict="blocked", text=text)
         names = ", ".join(dict.fromkeys(each.name or "somebody" for each in others[:3]))

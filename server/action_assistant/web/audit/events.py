@@ -81,6 +81,15 @@ class EndedHere(msgspec.Struct, frozen=True):
     id: str
 
 
+class ReleaseTold(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The author told this process that a version was released, or that its release was withdrawn."""
+
+    kind: ClassVar[str] = "audit.release_told.v1"
+
+    version: str
+    withdrawn: bool = False
+
+
 class PersonStored(msgspec.Struct, frozen=True, omit_defaults=True):
     """The author told this process the present state of a person. `until`: seconds since 1970."""
 

@@ -36,6 +36,7 @@ _EVENTS: Final = {
         events.ViewLinkRevoked,
         events.EndedHere,
         events.PersonStored,
+        events.ReleaseTold,
         events.StartRefused,
         events.StopPressed,
         events.StrangersRefused,
@@ -76,6 +77,11 @@ def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | No
         case events.EndedHere() as end:
             text = f"told this process that the {end.what} {end.id} has ended"
             return Fact(kind="sessions" if end.what == "session" else "people", text=text)
+        case events.ReleaseTold(version=version, withdrawn=withdrawn):
+            what = (
+                "the release of version {} was withdrawn" if withdrawn else "version {} is released"
+            )
+            return Fact(kind="graphs", text=f"told this process that {what.format(version)}")
         case events.PersonStored(name=name, role=role):
             return Fact(kind="people", text=f"told this process that {name} is here as {role}")
         case events.StartRefused() as refused:
