@@ -22,13 +22,19 @@ export class Product {
   port = 0;
   private readonly flags: readonly string[];
   private readonly hosts: string;
+  private readonly settings: Readonly<Record<string, string>>;
   private process: ChildProcess | undefined;
   private readonly contexts: BrowserContext[] = [];
 
-  /** `hosts` are names that lead here, for others on the network. */
-  constructor(flags: readonly string[] = [], hosts = "") {
+  /** `hosts` are names that lead here, for others on the network; `settings`: more of its environment. */
+  constructor(
+    flags: readonly string[] = [],
+    hosts = "",
+    settings: Readonly<Record<string, string>> = {},
+  ) {
     this.flags = flags;
     this.hosts = hosts;
+    this.settings = settings;
   }
 
   get scheme(): string {
@@ -70,6 +76,7 @@ export class Product {
         stdio: ["ignore", log, log],
         env: {
           ...process.env,
+          ...this.settings,
           ACTION_ASSISTANT_TOKEN: TOKEN,
           ACTION_ASSISTANT_HOSTS: this.hosts,
         },

@@ -40,6 +40,11 @@ const ROLES: readonly { value: Role; label: string }[] = [
   { value: "operator", label: "Operator" },
   { value: "owner", label: "Owner" },
 ];
+/** The roles that an owner may give to a person: one who comes by a provider has at most what it says. */
+const rolesFor = ({ provider }: Member) =>
+  provider ? ROLES.slice(0, ROLES.findIndex(({ value }) => value === provider.role) + 1) : ROLES;
+/** Returns the host of the provider by which a person signs in. */
+const providerHost = (issuer: string) => issuer.replace(/^https?:\/\//, "").replace(/\/.*/, "");
 const roleOf = (text: string): Role => ROLES.find(({ value }) => value === text)?.value ?? "viewer";
 
 export function PeoplePage() {
@@ -242,6 +247,7 @@ function Person({ member, groups, origin, sessions }: PersonProps) {
   const facts = [
     member.role,
     ...named.map(isolated),
+    ...(member.provider ? [`by ${providerHost(member.provider.issuer)}`] : []),
     ...(until === null ? [] : [`until ${dateText(until)}`]),
     sessions.length > 0 ? counted(sessions.length, "device") : fresh ? "invited" : "not signed in",
   ];
@@ -278,7 +284,7 @@ function Person({ member, groups, origin, sessions }: PersonProps) {
             <NativeSelect
               label="Role"
               disabled={isMe}
-              data={ROLES}
+              data={rolesFor(member)}
               value={member.role}
               onChange={(event) => {
                 const body = { role: roleOf(event.currentTarget.value) };

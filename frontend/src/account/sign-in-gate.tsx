@@ -10,10 +10,12 @@ import {
   type Credential,
   credentialIn,
   currentPerson,
+  handInProviderAnswer,
   type InvitationPreview,
   identityOf,
   openSession,
   type Person,
+  type ProviderReturn,
   readInvitation,
   rememberedName,
   rememberedPerson,
@@ -21,6 +23,7 @@ import {
   renamePerson,
   takeCredential,
   takeFarewell,
+  takeProviderReturn,
 } from "../api/session";
 import { boundedPart } from "../ui/lazy-part";
 import { useRootMark } from "../ui/use-root-mark";
@@ -31,16 +34,50 @@ const SignIn = boundedPart(() => import("./sign-in").then((part) => part.SignIn)
 const Invitation = boundedPart(() => import("./sign-in").then((part) => part.Invitation));
 const DeviceSignIn = boundedPart(() => import("./sign-in").then((part) => part.DeviceSignIn));
 const SignInBar = boundedPart(() => import("./sign-in").then((part) => part.SignInBar));
+const ProviderProof = boundedPart(() =>
+  import("./provider-sign-in").then((part) => part.ProviderProof),
+);
+const ProviderWaiting = boundedPart(() =>
+  import("./provider-sign-in").then((part) => part.ProviderWaiting),
+);
 
 type Gate =
   | { at: "knocking" }
-  | { at: "outside"; why: string }
+  /** `provider`: the reason is about a sign-in by the provider of the server. */
+  | { at: "outside"; why: string; provider?: true }
+  /** The answer of the provider is examined. */
+  | { at: "returning" }
+  /** Somebody who is signed in proves by the provider that it is they, or has done so. */
+  | { at: "proving"; done: boolean; why: string }
   | { at: "invited"; key: Credential; invited: InvitationPreview }
   | { at: "device"; code: Credential }
   /** `offline`: no server has said who this is; it is who was here last. */
   | { at: "inside"; person: Person; visit: number; offline?: true };
 
-async function knock(): Promise<Gate> {
+/** Return what came of a visit to the provider. */
+async function knockReturned(found: ProviderReturn): Promise<Gate> {
+  if (found.kind === "again") return { at: "proving", done: false, why: "" };
+  try {
+    const person = await handInProviderAnswer(found.answer);
+    return person === null
+      ? { at: "proving", done: true, why: "" }
+      : { at: "inside", person, visit: 0 };
+  } catch (error) {
+    const why = errorText(error);
+    // Whoever is signed in wanted to prove that it is they.
+    const known = await currentPerson().catch(() => null);
+    return known === null
+      ? { at: "outside", why, provider: true }
+      : { at: "proving", done: false, why };
+  }
+}
+
+async function knock(onReturn: () => void): Promise<Gate> {
+  const returned = takeProviderReturn();
+  if (returned !== null) {
+    onReturn();
+    return knockReturned(returned);
+  }
   const key = takeCredential();
   const before = rememberedPerson();
   try {
@@ -143,7 +180,7 @@ export function SignInGate({ children }: { children: ReactNode }) {
   useEffect(() => {
     let gone = false;
     const enter = () =>
-      void knock().then((next) => {
+      void knock(() => setGate({ at: "returning" })).then((next) => {
         if (gone) return;
         if (next.at === "inside") sessionEnd.clear();
         setGate((now) => {
@@ -198,6 +235,8 @@ export function SignInGate({ children }: { children: ReactNode }) {
     [gate, takeName],
   );
   if (gate.at === "knocking") return <div aria-busy="true" />;
+  if (gate.at === "returning") return <ProviderWaiting />;
+  if (gate.at === "proving") return <ProviderProof done={gate.done} why={gate.why} />;
   if (gate.at === "invited") {
     return <Invitation key={gate.key.text} link={gate.key} invited={gate.invited} onOpen={letIn} />;
   }
@@ -205,7 +244,12 @@ export function SignInGate({ children }: { children: ReactNode }) {
     return <DeviceSignIn key={gate.code.text} code={gate.code} onOpen={letIn} />;
   }
   if (hold === null) {
-    return <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />;
+    const { why, provider } = gate.at === "outside" ? gate : { why: "", provider: undefined };
+    return provider ? (
+      <SignIn why="" providerWhy={why} onOpen={letIn} />
+    ) : (
+      <SignIn why={why} onOpen={letIn} />
+    );
   }
   return (
     <PersonContext value={hold}>

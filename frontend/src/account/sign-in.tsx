@@ -14,11 +14,14 @@ import {
 } from "../api/session";
 import { Logo } from "../ui/top-bar";
 import { isolated } from "../words/isolated";
+import { ProviderButton, ProviderLink } from "./provider-sign-in";
 import style from "./sign-in.module.css";
 
 interface Props {
   /** The reason why nobody is signed in, if a link was tried. */
   why: string;
+  /** The reason why the provider of the server signed nobody in. */
+  providerWhy?: string;
   onOpen: (person: Person) => void;
 }
 
@@ -47,7 +50,7 @@ function useEnter() {
   return { enter, waiting };
 }
 
-export function SignIn({ why, onOpen }: Props) {
+export function SignIn({ why, providerWhy = "", onOpen }: Props) {
   const { enter, waiting } = useEnter();
   const entry = useSignInField((pasted) => enter(pastedCredential(pasted)), onOpen, why);
   return (
@@ -62,6 +65,7 @@ export function SignIn({ why, onOpen }: Props) {
           signs this browser in. You can paste it here as well, or type the code that another device
           of yours shows.
         </Text>
+        <ProviderButton why={providerWhy} />
         <form {...entry.form}>
           <PasswordInput
             mt="lg"
@@ -188,6 +192,7 @@ export function SignInBar({ onOpen }: { onOpen: (person: Person) => void }) {
       <p role="status">
         <b>Your session has ended.</b> Edits stay in this page, and STOP is still sent. Paste your
         link to go on.
+        <ProviderLink />
       </p>
       <PasswordInput
         aria-label="Link or token"

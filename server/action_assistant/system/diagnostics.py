@@ -78,6 +78,8 @@ CODES: Final[Mapping[str, Severity]] = {
     "proxy-host": "error",
     "proxy-path": "error",
     "proxy-sockets": "error",
+    "provider-unusable": "error",
+    "provider-address": "warning",
     # ROS 2 and robots
     "python-unusable": "error",
     "ros1-sourced": "error",

@@ -16,6 +16,7 @@ import pytest
 from action_assistant.web.network.certificate import Certificate
 from support.doctor import asked, fault, faults
 from support.product import TOKEN, Product, free_ports, running
+from support.provider import provided
 from support.proxy import NGINX, nginx
 
 NAME = "localhost"
@@ -195,3 +196,29 @@ def test_the_token_is_never_shown_to_what_is_looked_at(data: Path) -> None:
                     )
     assert len(heard) >= 2
     assert TOKEN.encode() not in b"".join(heard)
+
+
+def test_an_identity_provider_that_cannot_be_used_is_told_with_the_reason(
+    data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def told(data: Path) -> dict[str, str]:
+        return {each.code: each.message for each in faults(data)}
+
+    named = "ACTION_ASSISTANT_OIDC_"
+    monkeypatch.setenv(f"{named}ISSUER", f"http://127.0.0.1:{free_ports()}")
+    assert "CLIENT_ID is missing" in told(data)["setting-wrong"]
+    monkeypatch.setenv(f"{named}CLIENT_ID", "us")
+    monkeypatch.setenv(f"{named}GROUPS", "lab=everything")
+    assert "GROUP=ROLE" in told(data)["setting-wrong"]
+    monkeypatch.setenv(f"{named}GROUPS", "*=viewer")
+    codes = told(data)
+    assert "cannot be reached" in codes["provider-unusable"]
+    assert "on this computer only" in codes["provider-address"]
+    monkeypatch.setenv("ACTION_ASSISTANT_PUBLIC_URL", f"https://{NAME}:1/")
+    with provided() as provider:
+        monkeypatch.setenv(f"{named}ISSUER", provider.issuer)
+        codes = told(data)
+        assert not {"provider-unusable", "provider-address"} & codes.keys()
+        monkeypatch.setenv(f"{named}ISSUER", provider.issuer + "/")
+        codes = told(data)
+        assert f"it calls itself {provider.issuer}" in codes["provider-unusable"]

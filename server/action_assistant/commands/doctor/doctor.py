@@ -63,6 +63,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     database_checks.runs_are_there,
     process_checks.processes_fit,
     process_checks.proxy_leads_here,
+    process_checks.provider_answers,
     machine_checks.descriptors_suffice,
     machine_checks.clock_is_possible,
     machine_checks.shared_memory_is_there,

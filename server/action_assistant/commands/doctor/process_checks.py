@@ -1,5 +1,6 @@
 """The editor and the runner, as far as they run: whether they are ours, of one version and one token."""
 
+import contextlib
 import socket
 import ssl
 import time
@@ -9,13 +10,16 @@ from email.utils import parsedate_to_datetime
 from typing import Final
 from urllib.parse import urlsplit
 
+import anyio
 import httpx
 import msgspec
 from cryptography import x509
 
+from action_assistant import settings
 from action_assistant.commands.doctor.database_checks import span
 from action_assistant.commands.doctor.installation import Installation
-from action_assistant.errors import CannotStart
+from action_assistant.editor.people.identity_provider import IdentityProvider
+from action_assistant.errors import CannotStart, Unavailable
 from action_assistant.journal import lock
 from action_assistant.settings import reached
 from action_assistant.share_links import is_ours
@@ -23,6 +27,7 @@ from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.version import VERSION
 from action_assistant.web.auth.access import REFUSED_SOCKET
 from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.provider_settings import provider_of
 from action_assistant.web.network.certificate import Certificate
 
 _PATIENCE_S: Final = 3.0
@@ -220,6 +225,44 @@ def proxy_leads_here(place: Installation) -> Iterator[Diagnostic]:
     with client(verify=trust) as asking:
         yield _shown(asking, "page", public.page, headers)
         yield _shown(asking, "runner", public.runner, headers)
+
+
+def provider_answers(place: Installation) -> Iterator[Diagnostic]:
+    """Check that the identity provider of the settings answers, and that others have an address at
+    which they can sign in by it; yield the findings. No secret is sent."""
+    try:
+        known = provider_of(settings.oidc())
+    except CannotStart as error:
+        yield found(
+            "setting-wrong", "ACTION_ASSISTANT_OIDC_…", str(error), "Correct or complete it."
+        )
+        return
+    if known is None:
+        return
+    try:
+        anyio.run(IdentityProvider(known).metadata)
+    except Unavailable as error:
+        yield found(
+            "provider-unusable",
+            known.issuer,
+            f"Nobody can sign in by the provider: {error.detail}",
+            "Look whether it runs and this computer reaches it; ACTION_ASSISTANT_OIDC_ISSUER has to "
+            "be what its .well-known/openid-configuration calls `issuer`. Links go on working.",
+        )
+    else:
+        yield fine(known.issuer, "The identity provider answers.")
+    with contextlib.suppress(CannotStart):  # reported with the settings
+        public = reached(place.public_url, None).public
+        if settings.share() == "tls" or (public is not None and public.is_secure):
+            return
+        yield found(
+            "provider-address",
+            "ACTION_ASSISTANT_PUBLIC_URL",
+            "An identity provider is set, and others reach the page by no https address: it is offered "
+            "on this computer only.",
+            "Serve the page by https (--public-url, or --share --tls), and register the address "
+            "with /signed-in at its end as a redirect address at the provider.",
+        )
 
 
 def _shown(asking: httpx.Client, name: str, url: str, headers: dict[str, str]) -> Diagnostic:

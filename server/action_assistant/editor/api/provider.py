@@ -250,7 +250,7 @@ class ProviderSignIn:
             await to_thread.run_sync(self._browsers.end_all_of, person)
             raise Forbidden(
                 f"{settings.name} knows you, but none of your groups there may come in here. Ask "
-                "who runs this server."
+                "the person who runs this server."
             )
         mapped = settings.groups.keys() & set(found.groups)
         address = client_address(request.scope)

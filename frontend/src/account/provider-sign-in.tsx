@@ -1,0 +1,120 @@
+/** Sign-in by the identity provider of the server, where one is set. */
+import { Button, Paper, Text, Title } from "@mantine/core";
+import { useEffect, useState } from "react";
+import { errorText } from "../api/http";
+import { pageUrl } from "../api/page-url";
+import { providerName, visitProvider } from "../api/session";
+import { Logo } from "../ui/top-bar";
+import style from "./sign-in.module.css";
+
+/** Return the name of the provider; null while it is not known, and where none is set. */
+function useProvider(): string | null {
+  const [name, setName] = useState<string | null>(null);
+  useEffect(() => {
+    let gone = false;
+    providerName().then(
+      (found) => !gone && setName(found),
+      () => {}, // the other ways to sign in say it when the server does not answer
+    );
+    return () => {
+      gone = true;
+    };
+  }, []);
+  return name;
+}
+
+/** The button that leads to the provider; nothing where none is set. `why`: what came of the last visit. */
+export function ProviderButton({ why, again = false }: { why: string; again?: boolean }) {
+  const name = useProvider();
+  const [problem, setProblem] = useState(why);
+  const [busy, setBusy] = useState(false);
+  useEffect(() => {
+    // Back from the provider by the browser's own button, the page is as it was left.
+    const onShow = () => setBusy(false);
+    window.addEventListener("pageshow", onShow);
+    return () => window.removeEventListener("pageshow", onShow);
+  }, []);
+  const go = () => {
+    setBusy(true);
+    setProblem("");
+    visitProvider(again).catch((error) => {
+      setProblem(errorText(error));
+      setBusy(false);
+    });
+  };
+  return (
+    <>
+      {problem !== "" && (
+        <Text className="ink-error" mt="md" role="alert">
+          {problem}
+        </Text>
+      )}
+      {name !== null && (
+        <>
+          <Button variant="filled" fullWidth mt="md" loading={busy} onClick={go}>
+            <span className={style.provider}>
+              {again ? "Confirm with" : "Sign in with"} <bdi>{name}</bdi>
+            </span>
+          </Button>
+          {!again && (
+            <Text size="xs" c="dimmed" mt="xs">
+              Signing out here leaves you signed in there.
+            </Text>
+          )}
+        </>
+      )}
+    </>
+  );
+}
+
+/** A link to the page in another tab, where a person signs in by the provider while edits stay in this
+ * one. */
+export function ProviderLink() {
+  const name = useProvider();
+  if (name === null) return null;
+  return (
+    <>
+      {" "}
+      Or{" "}
+      <a href={`${pageUrl()}/`} target="_blank" rel="noopener">
+        sign in with <bdi>{name}</bdi> in a new tab
+      </a>
+      .
+    </>
+  );
+}
+
+/** The page on which a person who is signed in proves by the provider that it is they. `done`: they have;
+ * `why`: what came of the last visit. */
+export function ProviderProof({ done, why }: { done: boolean; why: string }) {
+  return (
+    <main className={style.page}>
+      <Paper className={style.card} withBorder radius="lg">
+        <Logo />
+        <Title order={1} size="h3" mt="md">
+          {done ? "It is confirmed that it is you" : "Confirm that it is you"}
+        </Title>
+        <Text c="dimmed" mt="xs">
+          {done
+            ? "Close this tab, and go on in the one before."
+            : "You are asked for your password there, also if you are signed in."}
+        </Text>
+        {!done && <ProviderButton why={why} again />}
+      </Paper>
+    </main>
+  );
+}
+
+/** The page while the answer of the provider is examined. */
+export function ProviderWaiting() {
+  return (
+    <main className={style.page}>
+      <Paper className={style.card} withBorder radius="lg">
+        <Logo />
+        <Text mt="md" role="status">
+          Signing in …
+        </Text>
+      </Paper>
+    </main>
+  );
+}
