@@ -1,5 +1,6 @@
 /** Requests to editor and runner, and how they refuse. */
 import { hearAnswer, tick } from "../clock/server-clock";
+import { Watched } from "../ui/watched";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
 
@@ -132,13 +133,28 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
 /** Return the response of a route. Throws `Refusal` or `Unreachable`. */
 export async function fetchAnswer(url: string, request: RequestOptions = {}): Promise<Response> {
   const response = await send(url, request);
-  if (!response.ok) throw new Refusal(await problemOf(response));
-  return response;
+  if (response.ok) return response;
+  const refusal = new Refusal(await problemOf(response));
+  if ((request.method ?? "GET") !== "GET") noteUnconfirmed(refusal.details);
+  throw refusal;
 }
 
 /** Return the text that a route answers, unparsed, so that `5` and `5.0` stay different. */
 export async function fetchText(url: string, request: RequestOptions = {}): Promise<string> {
   return (await fetchAnswer(url, request)).text();
+}
+
+/** Robots that want to know that it is this person; null if nothing has asked for that. */
+export const unconfirmed = new Watched<readonly string[] | null>(null);
+
+/** Have the page ask the person to confirm who they are, if that is why something was refused. */
+function noteUnconfirmed({ where }: ProblemDetails): void {
+  const { item, engines, robots } = { ...where } as Readonly<Record<string, unknown>>;
+  const each = Object.entries(engines ?? {}) as [string, { item?: string; robots?: object }][];
+  const asking = each.filter(([, why]) => why.item === "confirm");
+  const led = asking.flatMap(([name, why]) => (why.robots ? Object.keys(why.robots) : [name]));
+  if (item === "confirm") unconfirmed.set(Object.keys(robots ?? {}));
+  else if (led.length > 0) unconfirmed.set(led);
 }
 
 /** One sentence for people, whatever went wrong. */

@@ -1,6 +1,7 @@
 /** The one socket to the runner: live state of runs, and the way for Stop. */
 import { hearStamp, tick } from "../clock/server-clock";
 import { isEqual, newAid } from "../graph/stop-basics";
+import type { AskedConfirmation } from "./confirmations";
 import { errorText, isFinal, isSignedIn, sessionEnd } from "./http";
 import { isPieceOf } from "./led-runs";
 import { pageUrl } from "./page-url";
@@ -43,6 +44,8 @@ export interface LiveState {
   engines: readonly Robot[];
   runs: ReadonlyMap<string, Run>;
   stops: readonly StopRequest[];
+  /** Requests of the person's other devices that this page can answer, while the link is live. */
+  asked: readonly AskedConfirmation[];
 }
 
 type RunnerMessage = RunnerApi["RunnerMessage"];
@@ -66,6 +69,7 @@ export class LiveSocket {
     engines: [],
     runs: new Map(),
     stops: [],
+    asked: [],
   };
   /**
    * Time at which its engine last showed each open run, by the server's clock. Apart from `now`,
@@ -234,7 +238,7 @@ export class LiveSocket {
 
   /** There is no link; another try comes after a while, unless nobody is signed in. */
   #down(): void {
-    if (this.state.link !== "down") this.#set({ link: "down", since: tick() });
+    if (this.state.link !== "down") this.#set({ link: "down", since: tick(), asked: [] });
     this.#set({ unreached: this.#unreached });
     clearTimeout(this.#again);
     if (this.#closed || this.#unreached?.kind === "ended") return;
@@ -289,6 +293,9 @@ export class LiveSocket {
         break;
       case "refused":
         this.#answerStop(message.stop_id, "refused", message.detail);
+        break;
+      case "confirm":
+        this.#set({ asked: message.asked });
         break;
       case "engines":
         this.#set({ engines: message.engines });

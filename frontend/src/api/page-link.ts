@@ -94,6 +94,7 @@ class PageLink {
 export const pageLink = new PageLink();
 
 const NOTHING: LiveState = {
+  asked: [],
   link: "connecting",
   since: tick(),
   engines: [],

@@ -4,7 +4,8 @@ import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { useEffect, useState } from "react";
 import { Route, Router, Switch } from "wouter";
 import { SignInGate } from "../account/sign-in-gate";
-import { Refusal } from "../api/http";
+import { Refusal, unconfirmed } from "../api/http";
+import { useLive } from "../api/page-link";
 import { basePath } from "../api/page-url";
 import { DragPreview } from "../canvas/action-drag";
 import { NewVersionNotice } from "../offline/page-version";
@@ -63,6 +64,27 @@ function ImportReview() {
   const waits = useWatched(importReviews) !== null;
   useEffect(() => setAsked((was) => was || waits), [waits]);
   return <OverlayBoundary>{asked && <ImportReviewDialog />}</OverlayBoundary>;
+}
+
+const ConfirmDialog = lazyPart(() =>
+  import("../account/confirm-dialog").then((part) => part.ConfirmDialog),
+);
+const ConfirmQuestion = lazyPart(() =>
+  import("../account/confirm-question").then((part) => part.ConfirmQuestion),
+);
+
+/** What this page has to confirm, and what another device asks it to. */
+function Confirmations() {
+  const wanted = useWatched(unconfirmed) !== null;
+  const asked = useLive().now.asked.length > 0;
+  const [opened, setOpened] = useState(false);
+  useEffect(() => setOpened((was) => was || wanted), [wanted]);
+  return (
+    <OverlayBoundary>
+      {opened && <ConfirmDialog />}
+      {asked && <ConfirmQuestion />}
+    </OverlayBoundary>
+  );
 }
 
 const graphs: Crumb = { label: "Graphs", to: "/" };
@@ -156,6 +178,7 @@ export function App() {
               <ImportReview />
               <RestQuestion />
               <UnansweredStartNotice />
+              <Confirmations />
               <DragPreview />
               <NewVersionNotice />
               <LiveRegion />

@@ -4,6 +4,7 @@ import {
   Button,
   Group,
   Modal,
+  NumberInput,
   SegmentedControl,
   Select,
   Stack,
@@ -100,6 +101,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
     robot.operators === "all" ? NOBODY : robot.operators,
   );
   const [baton, setBaton] = useState(robot.baton);
+  const [askAgain, setAskAgain] = useState<number | string>(robot.ask_again || "");
   usePendingText(
     chosen === robot.operators || chosen === NOBODY ? "" : JSON.stringify(chosen),
     null,
@@ -116,6 +118,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
         watched: robot.watched,
         drill_days: robot.drill_days,
         released_only: robot.released_only,
+        ask_again: Number(askAgain) || 0,
       });
       await client.invalidateQueries({ queryKey: ["robots"] });
       onClose();
@@ -159,6 +162,15 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
             description="Only the person who holds it starts there, goes on and resumes. If the baton changes hands, led runs wait for its new holder."
             checked={baton}
             onChange={(event) => setBaton(event.currentTarget.checked)}
+          />
+          <NumberInput
+            label="Ask again who starts, after so many minutes"
+            description="Whoever starts there confirms on another device of theirs, or with a passkey, that it is they. Programs cannot start there then. Empty: nobody is asked."
+            min={0}
+            max={1440}
+            allowDecimal={false}
+            value={askAgain}
+            onChange={setAskAgain}
           />
           {error !== null && (
             <Text c="var(--error)" role="alert">

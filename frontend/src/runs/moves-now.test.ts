@@ -26,6 +26,7 @@ const run = (part: Partial<Run>) =>
   }) as unknown as Run;
 
 const live = (runs: Run[], link: LiveState["link"] = "live"): LiveState => ({
+  asked: [],
   link,
   since: 0,
   engines: [],

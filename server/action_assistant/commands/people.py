@@ -17,10 +17,12 @@ from action_assistant.commands.client import (
 from action_assistant.errors import CannotStart, Refused, RequestRefused
 from action_assistant.private_files import own_folder
 from action_assistant.safe_text import one_line
+from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.keys import Keys
-from action_assistant.web.auth.people_files import PersonFile
+from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role
+from action_assistant.web.auth.session_files import SessionFiles
 
 if TYPE_CHECKING:  # slow to load, and most calls do not need it
     from action_assistant.editor.api.members import Members
@@ -77,6 +79,16 @@ def _add_persons(words: "argparse._SubParsersAction[argparse.ArgumentParser]") -
     )
     end.add_argument("person", metavar="NAME_OR_ID")
     end.set_defaults(handler=_end_person)
+
+    confirm = command(
+        words,
+        "confirm",
+        "confirm that all open sessions of a person are theirs, where they have lost every passkey "
+        "and other device; on the computer with the data folder",
+        "Mari",
+    )
+    confirm.add_argument("person", metavar="NAME_OR_ID")
+    confirm.set_defaults(handler=_confirm_person)
 
 
 def _add_link(link: argparse.ArgumentParser) -> None:
@@ -217,6 +229,30 @@ def _end_person(options: argparse.Namespace) -> int:
         except Refused as error:
             raise CannotStart(f"{silent} {error}") from error
     print(one_line(f"{options.person} is out on all devices, for good."))
+    return 0
+
+
+def _confirm_person(options: argparse.Namespace) -> int:
+    """Confirm all open sessions of a person in the data folder, which each process reads by itself."""
+    data = options.data.resolve()
+    confirmations = Confirmations(data, Keys.known(data))
+    wanted = options.person.casefold()
+    people = PeopleFiles(data)
+    found = []
+    for each in SessionFiles(data, Revocations(data)).every():
+        file = people.get(each.person.id)
+        name = each.person.name if file is None else file.name
+        if wanted in {name.casefold(), each.person.id.casefold()}:
+            found.append(each)
+    if not found:
+        raise CannotStart(f"No session in {data} is of a person called {options.person!r}.")
+    if len({each.person.id for each in found}) > 1:
+        ids = ", ".join(sorted({each.person.id for each in found}))
+        raise CannotStart(f"Several people are called {options.person!r}: say which one: {ids}.")
+    for each in found:
+        confirmations.confirm(each.id, "command")
+        print(one_line(f"{each.id}  {each.browser or 'a browser'}, since {each.since:%Y-%m-%d}"))
+    print(one_line(f"{options.person} is confirmed on these devices now."))
     return 0
 
 

@@ -72,7 +72,7 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
     rights = command(
         words,
         "rights",
-        "say who may start on a robot, and whether it has a baton; without options, show it",
+        "say who may start on a robot, and what is asked before; without options, show it",
         "David --operator gY2kq=2027-01-31 --baton on",
     )
     rights.add_argument("name", metavar="NAME")
@@ -100,6 +100,13 @@ def _add_rights(words: "argparse._SubParsersAction[argparse.ArgumentParser]") ->
         "--released-only",
         choices=["on", "off"],
         help="only versions start there that an owner has released",
+    )
+    rights.add_argument(
+        "--ask-again",
+        type=int,
+        metavar="MINUTES",
+        help="whoever starts there confirms again after so many minutes that it is they, by another "
+        "device or a passkey; 0 for never. Programs cannot start there then",
     )
     rights.set_defaults(handler=_rights)
 
@@ -215,7 +222,10 @@ def _rights(options: argparse.Namespace) -> int:
         robot = _robot(server, options.name)
         if options.all and options.operator:
             raise RequestRefused("Say --all or --operator, not both.")
-        rules = (options.baton, options.watched, options.released_only, options.drill_days)
+        rules = (
+            *(options.baton, options.watched, options.released_only, options.drill_days),
+            options.ask_again,
+        )
         if options.all or options.operator or any(each is not None for each in rules):
             operators: Any = robot.operators
             if options.all:
@@ -230,6 +240,7 @@ def _rights(options: argparse.Namespace) -> int:
                 "drill_days": robot.drill_days
                 if options.drill_days is None
                 else options.drill_days or None,
+                "ask_again": robot.ask_again if options.ask_again is None else options.ask_again,
             }
             body = msgspec.to_builtins(wanted)
             robot = _changed(server, "PUT", f"{_path(options)}/rights", body)
@@ -237,6 +248,8 @@ def _rights(options: argparse.Namespace) -> int:
     print(one_line(_baton_text(robot)))
     for said in _rules_texts(robot):
         print(one_line(said))
+    if robot.ask_again:
+        print(f"whoever starts there confirms again after {robot.ask_again} min that it is they")
     return 0
 
 

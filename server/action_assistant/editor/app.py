@@ -49,6 +49,7 @@ from action_assistant.settings import EditorSettings
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.audit.routes import audit_routes
 from action_assistant.web.audit.rows import AuditFilter
+from action_assistant.web.auth.confirmation_routes import confirmation_routes
 from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.device_codes import DeviceCodes
 from action_assistant.web.auth.keys import Keys, ScrapeToken, Session
@@ -194,6 +195,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
             *provider.routes(by_provider),
             *_routes(app_state, addresses, browsers),
             *devices.routes(codes, browsers, addresses, audit, keys),
+            *confirmation_routes(confirmations, limits=settings.limits),
             *tokens.routes(app_state, token_files, limits=settings.limits),
             *view.routes(app_state, view_links, addresses, audit, settings.frames),
             *doctor.routes(settings),

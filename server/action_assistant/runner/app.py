@@ -24,6 +24,7 @@ from action_assistant.public_url import RUNNER
 from action_assistant.runner import projection
 from action_assistant.runner.api import view
 from action_assistant.runner.api.caller import SMALL
+from action_assistant.runner.api.confirmations import routes as device_confirmations
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.api.monitoring import WatchedRunner
 from action_assistant.runner.api.runs import routes
@@ -51,6 +52,7 @@ from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.audit.events import StopPressed
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.caller import BackgroundTasks
+from action_assistant.web.auth.confirmation_routes import confirmation_routes
 from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, ScrapeToken
@@ -200,7 +202,7 @@ async def _executing(
         ):
             for_people.recorder_of = own.recorder_of = control.recorder_of
             services.worker_queries, services.control = for_people, control
-            services.hub = Hub(control, utc_us)
+            services.hub = Hub(control, utc_us, services.requests)
             services.index_writer = IndexWriter(
                 control.robots,
                 services.index_folders,
@@ -298,6 +300,8 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
             *shared_token_routes(tokens, revoked=partial(_note_token, services.audit)),
             *notification_routes(lambda: services.notifications),
             *adoption(tokens, limits=settings.limits),
+            *confirmation_routes(confirmations, limits=settings.limits),
+            *device_confirmations(services, confirmations),
         ],
         title="TeMoto Action Assistant: runner",
         keys=keys,

@@ -13,6 +13,8 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from action_assistant.runner.api.live import Hub, Outbox
+from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.keys import Person
 from runner.harness import ANN, Harness, carousel, clock_us, order, sequence, virtual
 from runner.process import RunnerProcess, over, started
 
@@ -144,7 +146,7 @@ async def test_a_page_that_does_not_read_is_owed_one_state_of_each_run() -> None
     harness = Harness()
     async with harness.runner() as control:
         hub = Hub(control, clock_us)
-        box = Outbox(hub, lambda: True)
+        box = Outbox(hub, lambda: True, Identity(Person(ANN.id, ANN.name)))
         hub.boxes.add(box)
         run = (await control.start(order(carousel(), script=BUSY), ANN)).run
         await anyio.sleep(30)
@@ -166,7 +168,7 @@ async def test_states_of_one_run_come_at_most_twenty_times_a_second() -> None:
     harness = Harness()
     async with harness.runner() as control:
         hub = Hub(control, clock_us)
-        box = Outbox(hub, lambda: True)
+        box = Outbox(hub, lambda: True, Identity(Person(ANN.id, ANN.name)))
         hub.boxes.add(box)
         await control.start(order(carousel(), script=BUSY), ANN)
         sent: list[str] = []
@@ -185,7 +187,7 @@ async def test_the_answer_to_a_stop_goes_before_everything_that_waits() -> None:
     harness = Harness()
     async with harness.runner() as control:
         hub = Hub(control, clock_us)
-        box = Outbox(hub, lambda: True)
+        box = Outbox(hub, lambda: True, Identity(Person(ANN.id, ANN.name)))
         hub.boxes.add(box)
         for i in range(20):
             await control.start(order(carousel(f"busy{i}"), script=BUSY), ANN)
@@ -207,7 +209,7 @@ async def test_an_expired_session_is_shown_nothing_more_but_its_stop_is_followed
     harness = Harness()
     async with harness.runner() as control:
         hub = Hub(control, clock_us)
-        box = Outbox(hub, lambda: False)
+        box = Outbox(hub, lambda: False, Identity(Person(ANN.id, ANN.name)))
         hub.boxes.add(box)
         run = (await control.start(order(sequence(), script=ENDLESS), ANN)).run
         box.post(await hub.follow(f'{{"type":"stop","run":"{run.id}","stop_id":"s"}}', ANN))

@@ -89,11 +89,16 @@ class Guest:
         found: str = self.http.get("/api/session").json()["person"]["role"]
         return found
 
-    def runner(self, method: str, path: str) -> httpx.Response:
+    def runner(self, method: str, path: str, body: Any = None) -> httpx.Response:
         """Ask the runner with the same cookie."""
         headers = {**self.http.headers, "host": f"{LAB}:{self.product.port + 1}"}
         return httpx.request(
-            method, self.product.runner_url + path, headers=headers, trust_env=False, timeout=20
+            method,
+            self.product.runner_url + path,
+            headers=headers,
+            json=body,
+            trust_env=False,
+            timeout=20,
         )
 
     @contextlib.contextmanager

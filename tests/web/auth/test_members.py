@@ -228,6 +228,17 @@ def test_a_device_is_added_by_a_code_that_the_first_one_confirms(
     assert phone.http.post("/api/session/device/answer", json=claim).status_code == 401
     devices = first.http.get("/api/devices").json()
     assert len(devices["sessions"]) == 2
+    # Whoever takes up an unlocked device can add their own: it confirms nothing for a day.
+    asked = first.runner("POST", "/api/confirmations", {}).json()
+    answer = f"/api/confirmations/{asked['id']}/answer"
+    assert phone.runner("POST", answer, {"yes": True}).status_code == 404
+    assert first.runner("GET", f"/api/confirmations/{asked['id']}").json()["state"] == "waiting"
+    assert first.http.get("/api/confirmations/mine").json()["last"] is None
+    said = product.cli("people", "confirm", "nora", "--data", str(product.data))
+    assert said.returncode == 0, said.stderr
+    mine = first.http.get("/api/confirmations/mine").json()["last"]
+    assert (mine["how"], mine["session"]) == ("command", devices["this"])
+    assert first.runner("GET", "/api/confirmations/mine").json()["last"] == mine
     other = next(each["id"] for each in devices["sessions"] if each["id"] != devices["this"])
     assert first.http.post(f"/api/devices/{other}/end").status_code == 204
     assert phone.http.get("/api/graphs").status_code == 401

@@ -102,7 +102,8 @@ def test_every_route_says_who_may_call_it_and_means_it(product: Product, process
             if permission is None:
                 open_to_strangers = "/healthz|/readyz|/api/server|/api/session"
                 by_programs = (
-                    "/api/logins(/claim|/cancel)?$|/api/tokens/records$|/api/sessions/ended$"
+                    "/api/logins(/claim|/cancel)?$|/api/(tokens|confirmations)/records$"
+                    "|/api/sessions/ended$"
                 )
                 of_all_signed_in = "/api/tokens/{token}/revoke$"
                 of_links = "/api/view$|/api/view/(graph|run)(/events)?$"

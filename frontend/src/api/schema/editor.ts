@@ -357,6 +357,18 @@ export interface EditorApi {
         code: string;
     };
     /**
+     * Confirmation
+     * @description The last confirmation of a session. `at`: seconds since 1970. `seal`: proves that a server
+     *     with the same token made it, so it may be shown to anybody.
+     */
+    Confirmation: {
+        session: string;
+        at: number;
+        /** @enum {string} */
+        how: "command" | "device" | "oidc" | "passkey";
+        seal: string;
+    };
+    /**
      * Counts
      * @description The number of problems of each severity.
      */
@@ -1562,6 +1574,13 @@ export interface EditorApi {
         address?: string;
     };
     /**
+     * OwnConfirmation
+     * @description The last confirmation of the session that asks; null if there was none.
+     */
+    OwnConfirmation: {
+        last: EditorApi["Confirmation"] | null;
+    };
+    /**
      * OwnDevices
      * @description The open sessions of the person; `this`: the id of the one that asks. `origins`: the
      *     addresses of the page for other devices, the likeliest first. `ends`: by session the seal with
@@ -2727,6 +2746,12 @@ export interface EditorPaths {
     };
     "/api/devices/codes/{code}/qr": {
         get: EditorOperations["getDeviceQrCode"];
+    };
+    "/api/confirmations/mine": {
+        get: EditorOperations["getConfirmation"];
+    };
+    "/api/confirmations/records": {
+        post: EditorOperations["adoptConfirmation"];
     };
     "/api/tokens": {
         get: EditorOperations["listTokens"];
@@ -4517,6 +4542,26 @@ interface EditorOperations {
                 content: {
                     "image/svg+xml": string;
                 };
+            };
+        };
+    };
+    getConfirmation: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["OwnConfirmation"];
+                };
+            };
+        };
+    };
+    adoptConfirmation: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["Confirmation"];
+            };
+        };
+        responses: {
+            204: {
             };
         };
     };

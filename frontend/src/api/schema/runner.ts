@@ -450,6 +450,71 @@ export interface RunnerApi {
         slower: ("a" | "b") | null;
     };
     /**
+     * ConfirmMessage
+     * @description All requests to confirm who somebody is that this page can answer now.
+     */
+    ConfirmMessage: {
+        /** @enum {string} */
+        type: "confirm";
+        asked: RunnerApi["ConfirmationShown"][];
+    };
+    /**
+     * Confirmation
+     * @description The last confirmation of a session. `at`: seconds since 1970. `seal`: proves that a server
+     *     with the same token made it, so it may be shown to anybody.
+     */
+    Confirmation: {
+        session: string;
+        at: number;
+        /** @enum {string} */
+        how: "command" | "device" | "oidc" | "passkey";
+        seal: string;
+    };
+    /**
+     * ConfirmationAnswer
+     * @description The answer of the person on another device: whether it is they who ask.
+     */
+    ConfirmationAnswer: {
+        yes: boolean;
+    };
+    /**
+     * ConfirmationAsked
+     * @description A request, for the device that made it. `devices`: how many other devices of the person show it
+     *     now; `seconds`: until it is over; `record`: the sealed confirmation, once another device has said
+     *     yes.
+     */
+    ConfirmationAsked: {
+        id: string;
+        number: string;
+        seconds: number;
+        /** @enum {string} */
+        state: "confirmed" | "refused" | "waiting";
+        devices: number;
+        record: RunnerApi["Confirmation"] | null;
+    };
+    /**
+     * ConfirmationShown
+     * @description A request, as other devices of its person show it. `browser` and `address`: of the device that
+     *     asks, "" for the computer of the server; `robots`: on which it wants to start; `seconds`: until it
+     *     is over.
+     */
+    ConfirmationShown: {
+        id: string;
+        number: string;
+        browser: string;
+        address: string;
+        robots: string[];
+        seconds: number;
+    };
+    /**
+     * ConfirmationWanted
+     * @description A wish to be confirmed. `robots`: on which the person wants to start; empty for other things.
+     */
+    ConfirmationWanted: {
+        /** @default [] */
+        robots?: string[];
+    };
+    /**
      * Difference
      * @description The difference between two states of one graph. `before` and `after` are the numbers of the
      *     document's changes at which the graph was in these states.
@@ -1079,6 +1144,13 @@ export interface RunnerApi {
         codes: string[];
         reason: string;
     };
+    /**
+     * OwnConfirmation
+     * @description The last confirmation of the session that asks; null if there was none.
+     */
+    OwnConfirmation: {
+        last: RunnerApi["Confirmation"] | null;
+    };
     PageMessage: RunnerApi["StopMessage"];
     /**
      * Parting
@@ -1469,7 +1541,8 @@ export interface RunnerApi {
     };
     /**
      * RightShown
-     * @description The rights of the asker on a robot. `why`: why they may not start there, "" if they may; `holds`:
+     * @description The rights of the asker on a robot. `why`: why they may not start there, "" if they may, perhaps
+     *     after they have confirmed who they are; `holds`:
      *     they hold its baton; `may_take`: they may take its baton, with a reason if somebody holds it.
      */
     RightShown: {
@@ -1492,7 +1565,8 @@ export interface RunnerApi {
      * @description The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
      *     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
      *     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
-     *     `released_only`: only versions start there that an owner has released.
+     *     `released_only`: only versions start there that an owner has released;
+     *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never.
      */
     RightsWanted: {
         /** @default all */
@@ -1505,6 +1579,8 @@ export interface RunnerApi {
         drill_days?: number | null;
         /** @default false */
         released_only?: boolean;
+        /** @default 0 */
+        ask_again?: number;
     };
     /**
      * Robot
@@ -1516,7 +1592,8 @@ export interface RunnerApi {
      *     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
      *     `watched`: each start has the word of its person that they watch it; `drill_days`: how old its last
      *     Stop drill may be; `drill_due`: why one has to be made before the next start, "" if none has to be;
-     *     `drills`: the newest 20, the newest first; `released_only`: only released versions start there.
+     *     `drills`: the newest 20, the newest first; `released_only`: only released versions start there;
+     *     `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never.
      */
     Robot: {
         name: string;
@@ -1552,6 +1629,7 @@ export interface RunnerApi {
         drill_due: string;
         drills: RunnerApi["DrillShown"][];
         released_only: boolean;
+        ask_again: number;
     };
     /**
      * RobotChange
@@ -1881,7 +1959,7 @@ export interface RunnerApi {
         subgraphs: RunnerApi["SubgraphShown"][];
         tree_digest: string | null;
     };
-    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
+    RunnerMessage: RunnerApi["Hello"] | RunnerApi["RunMessage"] | RunnerApi["EnginesMessage"] | RunnerApi["ConfirmMessage"] | RunnerApi["Heartbeat"] | RunnerApi["Stopping"] | RunnerApi["RefusedMessage"];
     /**
      * SaidShown
      * @description A person's statement of the result of a visit that no answer has shown.
@@ -2581,6 +2659,22 @@ export interface RunnerPaths {
     };
     "/api/tokens/records": {
         post: RunnerOperations["adoptToken"];
+    };
+    "/api/confirmations/mine": {
+        get: RunnerOperations["getConfirmation"];
+    };
+    "/api/confirmations/records": {
+        post: RunnerOperations["adoptConfirmation"];
+    };
+    "/api/confirmations": {
+        post: RunnerOperations["askToConfirm"];
+    };
+    "/api/confirmations/{request_id}": {
+        get: RunnerOperations["getConfirmationRequest"];
+        delete: RunnerOperations["cancelConfirmationRequest"];
+    };
+    "/api/confirmations/{request_id}/answer": {
+        post: RunnerOperations["answerConfirmationRequest"];
     };
     "/healthz": {
         get: RunnerOperations["getHealth"];
@@ -3804,6 +3898,81 @@ interface RunnerOperations {
         requestBody: {
             content: {
                 "application/json": RunnerApi["Adopted"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    getConfirmation: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["OwnConfirmation"];
+                };
+            };
+        };
+    };
+    adoptConfirmation: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["Confirmation"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    askToConfirm: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ConfirmationWanted"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": RunnerApi["ConfirmationAsked"];
+                };
+            };
+        };
+    };
+    getConfirmationRequest: {
+        parameters: {
+            path: {
+                request_id: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["ConfirmationAsked"];
+                };
+            };
+        };
+    };
+    cancelConfirmationRequest: {
+        parameters: {
+            path: {
+                request_id: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    answerConfirmationRequest: {
+        parameters: {
+            path: {
+                request_id: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["ConfirmationAnswer"];
             };
         };
         responses: {

@@ -5,7 +5,7 @@ import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { identifiedText } from "../../api/courses";
-import { errorText } from "../../api/http";
+import { errorText, unconfirmed } from "../../api/http";
 import { fetchInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
@@ -211,6 +211,30 @@ function Exactly({
   );
 }
 
+/** Return the robots that ask this person to confirm who they are. */
+function askingRobots(looks: readonly Preflight[] | undefined): string[] {
+  const asks = ({ items }: Preflight) =>
+    items.some(({ code, verdict }) => code === "confirm" && verdict === "blocked");
+  return (looks ?? []).filter(asks).map(({ engine }) => engine);
+}
+
+/** Offers to confirm who one is, before anything is held; the dialog stays as it is. */
+function ConfirmFirst({ looks }: { looks: readonly Preflight[] | undefined }) {
+  const robots = askingRobots(looks);
+  if (robots.length === 0) return null;
+  return (
+    <section className={style.second} aria-label="Confirm that it is you">
+      <Button
+        size="compact-sm"
+        leftSection={<IconUserCheck size={14} aria-hidden />}
+        onClick={() => unconfirmed.set(robots)}
+      >
+        Confirm that it is you …
+      </Button>
+    </section>
+  );
+}
+
 /** Return why nothing can be started now; null when it can. */
 function obstacleOf(
   engines: readonly string[],
@@ -219,6 +243,7 @@ function obstacleOf(
 ): string | null {
   if (engines.length === 0) return "Choose where";
   if (looks === undefined) return "Looking …";
+  if (askingRobots(looks).length > 0) return "Confirm that it is you first";
   if (looks.some((look) => look.never)) return "A check prevents the start";
   const codes = looks.flatMap((look) => look.override);
   if (codes.length > 0 && reason.trim() === "") return "Say why to start anyway";
@@ -366,6 +391,7 @@ export function StartDialog(props: Props) {
         </section>
       )}
       <SecondPerson graph={graph} label={label} looks={looks} />
+      <ConfirmFirst looks={looks} />
       {codes.length > 0 && !looks?.some(({ never }) => never) && (
         <Textarea
           label="Why start anyway? It is recorded with the run."

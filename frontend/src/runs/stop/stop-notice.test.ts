@@ -25,7 +25,7 @@ function now(part: Partial<Run> | null, link: LiveState["link"] = "live"): LiveS
     ...part,
   } as Run;
   const runs = new Map(part ? [["r", run]] : []);
-  return { link, since: 0, engines: [], stops: [stop], runs };
+  return { link, since: 0, engines: [], stops: [stop], asked: [], runs };
 }
 
 test("a Stop that nothing proves becomes loud", () => {

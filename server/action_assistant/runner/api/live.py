@@ -23,6 +23,10 @@ from litestar.exceptions import WebSocketDisconnect, WebSocketException
 from action_assistant.errors import Forbidden, Refused
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.api.caller import author_of
+from action_assistant.runner.api.confirmation_requests import (
+    ConfirmationRequests,
+    ConfirmationShown,
+)
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.robots.registration import Robot
@@ -32,6 +36,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.stop.foreign_stop import StoppedAll
 from action_assistant.safe_text import hold_names
 from action_assistant.web.auth.access import identity_of, is_expired
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.rights import Denied, may
 
 log: Final = logging.getLogger(__name__)
@@ -100,6 +105,12 @@ class EnginesMessage(msgspec.Struct, frozen=True, tag="engines", tag_field="type
     engines: list[Robot]
 
 
+class ConfirmMessage(msgspec.Struct, frozen=True, tag="confirm", tag_field="type"):
+    """All requests to confirm who somebody is that this page can answer now."""
+
+    asked: list[ConfirmationShown]
+
+
 class Heartbeat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
     """Sent once a second while the link is alive. `seen`: when each open run was last shown by its
     engine; `heard`: when each robot last answered."""
@@ -111,7 +122,7 @@ class Heartbeat(msgspec.Struct, frozen=True, tag="beat", tag_field="type"):
 
 #: The messages of the runner over the socket, and those of a page.
 RunnerMessage: TypeAlias = (
-    Hello | RunMessage | EnginesMessage | Heartbeat | Stopping | RefusedMessage
+    Hello | RunMessage | EnginesMessage | ConfirmMessage | Heartbeat | Stopping | RefusedMessage
 )
 PageMessage: TypeAlias = StopMessage
 
@@ -129,8 +140,14 @@ class EncodedRun(msgspec.Struct, frozen=True):
 class Hub:
     """Has the outboxes of all pages, and encodes runs and engines once for all of them."""
 
-    def __init__(self, control: ExecutionService, clock_us: ClockUs) -> None:
+    def __init__(
+        self,
+        control: ExecutionService,
+        clock_us: ClockUs,
+        requests: ConfirmationRequests | None = None,
+    ) -> None:
         self.control = control
+        self.requests = requests or ConfirmationRequests()
         self.clock_us = clock_us
         self.boxes: set[Outbox] = set()
         self._frames: WeakKeyDictionary[OpenRun, EncodedRun] = WeakKeyDictionary()
@@ -138,6 +155,21 @@ class Hub:
         self._engines: str | None = None
         control.watch(self._changed)
         control.watch_robots(self._robots_changed)
+        self.requests.watch(self._requests_changed)
+
+    def _requests_changed(self, person: str) -> None:
+        for box in self.boxes:
+            if box.identity.person.id == person:
+                box.mark_requests()
+
+    def devices_shown(self, request: str) -> int:
+        """Return how many devices have a page open that can answer a request to confirm."""
+        shown = (
+            box.identity.session
+            for box in self.boxes
+            if any(each.id == request for each in self.requests.shown_to(box.identity))
+        )
+        return len({session.id for session in shown if session is not None})
 
     def _robots_changed(self) -> None:
         self._engines = None
@@ -237,7 +269,8 @@ async def prepare_view(run: Run, cache: views.ActionViewCache) -> None:
 class Outbox:
     """The messages that wait for one page: answers in order, and the runs that have changed."""
 
-    def __init__(self, hub: Hub, is_allowed: Callable[[], bool]) -> None:
+    def __init__(self, hub: Hub, is_allowed: Callable[[], bool], identity: Identity) -> None:
+        self.identity = identity
         self._hub = hub
         self._is_allowed = is_allowed
         self._answers: deque[str] = deque()
@@ -245,6 +278,7 @@ class Outbox:
         self._next: dict[str, float] = {}  # run -> when it may be sent again
         self._engines_at = math.inf  # when the engines are to be sent
         self._engines_next = 0.0  # not before
+        self._has_requests = False
         self._news = anyio.Event()
 
     def mark(self, opened: OpenRun) -> None:
@@ -258,6 +292,11 @@ class Outbox:
         if self._engines_at == math.inf:
             self._engines_at = self._engines_next
             self._news.set()
+
+    def mark_requests(self) -> None:
+        """Have the requests to confirm sent to the page, since one of its person has changed."""
+        self._has_requests = True
+        self._news.set()
 
     def post(self, text: str) -> bool:
         """Queue the text of an answer without waiting; return False when too many answers wait,
@@ -297,6 +336,9 @@ class Outbox:
             self._changed.clear()
             self._engines_at = math.inf
             return None
+        if self._has_requests:
+            self._has_requests = False
+            return _text(ConfirmMessage(self._hub.requests.shown_to(self.identity)))
         if now >= self._engines_at:
             self._engines_at = math.inf
             self._engines_next = now + _ENGINES_GAP_S
@@ -316,10 +358,12 @@ async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
     """Serve the socket of one page until it disconnects. A page with an expired session may still
     stop runs, but gets no more states."""
     author = author_of(socket)
-    box = Outbox(hub, lambda: not is_expired(socket))
+    box = Outbox(hub, lambda: not is_expired(socket), identity_of(socket))
     await socket.accept()
     box.post(await hub.hello())
     hub.boxes.add(box)
+    if hub.requests.shown_to(box.identity):
+        box.mark_requests()
     try:
         with hub.control.rights.here(identity_of(socket)):
             await _attend(socket, hub, box, author)
@@ -365,5 +409,5 @@ async def _write(socket: WebSocket[Any, Any, Any], box: Outbox) -> None:
         pass
 
 
-def _text(message: Stopping | RefusedMessage | Heartbeat) -> str:
+def _text(message: Stopping | RefusedMessage | Heartbeat | ConfirmMessage) -> str:
     return msgspec.json.encode(message).decode()

@@ -19,9 +19,12 @@ from action_assistant.runner.start.drills import DrillRequest
 from action_assistant.safe_text import hold_names
 from action_assistant.web.audit.events import ReleaseTold
 from action_assistant.web.auth.access import Needs, PersonOnly, identity_of
+from action_assistant.web.auth.confirmations import LONGEST_S
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.auth.released_versions import Release
 
+#: Minutes: older confirmations are not kept.
+LONGEST_ASK_AGAIN: Final = round(LONGEST_S / 60)
 _MOST: Final = 200  # people and groups of one robot
 _Asking = Request[Any, Any, Any]
 _Reason = Annotated[str, msgspec.Meta(max_length=500)]
@@ -41,7 +44,8 @@ class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     """The rules of an owner for a robot. `operators`: who may start there, "all" for every operator;
     `baton`: only the holder of its baton may; `watched`: each start has the word of its person that
     they watch it; `drill_days`: its last Stop drill is so old at most, null for no such rule;
-    `released_only`: only versions start there that an owner has released."""
+    `released_only`: only versions start there that an owner has released;
+    `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never."""
 
     operators: (
         Literal["all"] | Annotated[tuple[OperatorWanted, ...], msgspec.Meta(max_length=_MOST)]
@@ -50,6 +54,7 @@ class RightsWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     watched: bool = False
     drill_days: Annotated[int, msgspec.Meta(ge=1, le=3650)] | None = None
     released_only: bool = False
+    ask_again: Annotated[int, msgspec.Meta(ge=0, le=LONGEST_ASK_AGAIN)] = 0
 
 
 class BatonTake(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -77,7 +82,8 @@ class UnlockWanted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RightShown(msgspec.Struct, frozen=True, kw_only=True):
-    """The rights of the asker on a robot. `why`: why they may not start there, "" if they may; `holds`:
+    """The rights of the asker on a robot. `why`: why they may not start there, "" if they may, perhaps
+    after they have confirmed who they are; `holds`:
     they hold its baton; `may_take`: they may take its baton, with a reason if somebody holds it."""
 
     robot: str
@@ -139,7 +145,7 @@ def _rules(services: RunnerServices) -> list[ControllerRouterHandler]:
             found.append(
                 RightShown(
                     robot=name,
-                    why=" ".join(each.text for each in refused),
+                    why=" ".join(each.text for each in refused if each.code != "confirm"),
                     holds=holds,
                     may_take=control.rights.of(name).rules.baton and has_right and not holds,
                 )
@@ -303,6 +309,7 @@ def _rules_of(wanted: RightsWanted) -> Rules:
         watched=wanted.watched,
         drill_days=wanted.drill_days,
         released_only=wanted.released_only,
+        ask_again=wanted.ask_again,
     )
 
 

@@ -6,6 +6,7 @@ from typing import Final
 from weakref import WeakKeyDictionary
 
 from action_assistant.journal.journal import Journal
+from action_assistant.runner.api.confirmation_requests import ConfirmationRequests
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.archives.retention import Retention
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -53,3 +54,4 @@ class RunnerServices:
         self.sent = WeakKeyDictionary()
         self.body_limit = ConcurrencyLimit(_BODIES)
         self.audit = AuditLog()
+        self.requests = ConfirmationRequests()

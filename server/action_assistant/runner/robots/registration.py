@@ -126,7 +126,8 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     `baton`: only its `holder` may, null being nobody; `locks`: who has put it out of service;
     `watched`: each start has the word of its person that they watch it; `drill_days`: how old its last
     Stop drill may be; `drill_due`: why one has to be made before the next start, "" if none has to be;
-    `drills`: the newest 20, the newest first; `released_only`: only released versions start there.
+    `drills`: the newest 20, the newest first; `released_only`: only released versions start there;
+    `ask_again`: minutes after which whoever starts there confirms again that it is they, 0 for never.
     """
 
     name: str
@@ -159,6 +160,7 @@ class Robot(msgspec.Struct, frozen=True, kw_only=True):
     drill_due: str = ""
     drills: tuple[DrillShown, ...] = ()
     released_only: bool = False
+    ask_again: int = 0
 
 
 def registration_of(row: Row[Any]) -> Registration:
@@ -270,4 +272,5 @@ def with_rights(
         drill_due=drill_due,
         drills=tuple(map(drill_view, reversed(rights.drills[-_DRILLS:]))),
         released_only=rules.released_only,
+        ask_again=rules.ask_again,
     )

@@ -10,6 +10,7 @@ import msgspec
 
 from action_assistant.journal.events import Draft
 from action_assistant.web.auth.caller import stamped
+from action_assistant.web.auth.confirmations import ConfirmedBy
 from action_assistant.web.auth.sessions import SignInMeans
 
 #: The stream of the audit in the log of a process.
@@ -100,6 +101,17 @@ class PersonStored(msgspec.Struct, frozen=True, omit_defaults=True):
     role: str
     groups: tuple[str, ...] = ()
     until: float | None = None
+
+
+class Confirmed(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The author confirmed that it is they who use the session `session`. `refused`: on another
+    device of theirs they said that it is not."""
+
+    kind: ClassVar[str] = "audit.confirmed.v1"
+
+    session: str
+    how: ConfirmedBy
+    refused: bool = False
 
 
 class StartRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):

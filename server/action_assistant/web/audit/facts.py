@@ -16,6 +16,12 @@ _HOW: Final[Mapping[str, str]] = {
     "personal": "by a personal link",
     "device": "on another device",
 }
+_CONFIRMED: Final[Mapping[str, str]] = {
+    "device": "on another device",
+    "passkey": "by a passkey",
+    "oidc": "by signing in again",
+    "command": "by the command line",
+}
 _REFUSED: Final[Mapping[str, str]] = {
     "start": "was refused a start",
     "change": "was refused a change of a run",
@@ -37,6 +43,7 @@ _EVENTS: Final = {
         events.EndedHere,
         events.PersonStored,
         events.ReleaseTold,
+        events.Confirmed,
         events.StartRefused,
         events.StopPressed,
         events.StrangersRefused,
@@ -84,6 +91,12 @@ def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | No
             return Fact(kind="graphs", text=f"told this process that {what.format(version)}")
         case events.PersonStored(name=name, role=role):
             return Fact(kind="people", text=f"told this process that {name} is here as {role}")
+        case events.Confirmed(session=session, how=how, refused=is_refused):
+            if is_refused:
+                text = f"said on another device that it is not they who use the session {session}"
+            else:
+                text = f"confirmed {_CONFIRMED.get(how, how)} who uses the session {session}"
+            return Fact(kind="sessions", text=text)
         case events.StartRefused() as refused:
             return _refused(refused)
         case events.StopPressed(robot=robot, run=run, times=times):

@@ -20,7 +20,7 @@ import msgspec
 from action_assistant.errors import BadInput, Unauthenticated
 from action_assistant.private_files import make_folder, replace_file
 from action_assistant.random_ids import random_id
-from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.keys import Keys, Session
 
 log: Final = logging.getLogger(__name__)
 
@@ -31,9 +31,13 @@ _ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _SKEW_S: Final = 60.0  # by which the clock of another process may be ahead
 _MOST: Final = 5000  # sessions that one process keeps in memory
 
-#: The means by which a person was confirmed: on another device of theirs, by a passkey, or by
-#: signing in at an identity provider again.
-ConfirmedBy: TypeAlias = Literal["device", "passkey", "oidc"]
+#: The means by which a person was confirmed: on another device of theirs, by a passkey, by signing
+#: in at an identity provider again, or by the command line on the data folder.
+ConfirmedBy: TypeAlias = Literal["device", "passkey", "oidc", "command"]
+#: Seconds for which a confirmation also vouches for what the person adds: devices and passkeys.
+SURE_S: Final = 600.0
+#: Seconds after which a device or passkey counts that was added without that.
+ADDED_S: Final = 24 * 3600.0
 _Text = Annotated[str, msgspec.Meta(max_length=100)]
 
 
@@ -44,7 +48,19 @@ class Confirmation(msgspec.Struct, frozen=True):
     session: _Text
     at: float
     how: ConfirmedBy
-    seal: _Text = ""
+    seal: _Text
+
+
+def is_sure(confirmed_at: float | None, now: float) -> bool:
+    """Return whether a device or passkey that is added now counts at once: it is certain that its
+    person adds it, and not somebody who has found their device unlocked."""
+    return confirmed_at is not None and confirmed_at >= now - SURE_S
+
+
+def may_confirm(session: Session, now: float) -> bool:
+    """Return whether a session may confirm another one of its person. One that was added without a
+    confirmation may not for a day, in which its person can see and end it."""
+    return not session.expired and (not session.added or session.begun <= now - ADDED_S)
 
 
 class _Known(NamedTuple):
@@ -68,7 +84,7 @@ class Confirmations:
         for other runners. Raise ValueError for a malformed id."""
         if _ID.fullmatch(session_id) is None:
             raise ValueError(f"{session_id!r} is no id of a session")
-        plain = Confirmation(session_id, self._clock(), how)
+        plain = Confirmation(session_id, self._clock(), how, "")
         made = msgspec.structs.replace(plain, seal=self._seal(plain))
         self._keep(made)
         return made

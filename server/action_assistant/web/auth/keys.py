@@ -1,7 +1,7 @@
 """The secret of local mode: a token for programs, and sessions sealed with it for browsers.
 
 A session cookie is `payload.signature`, both base64url; the payload is JSON `[id, person id, name,
-expires, role, invitation, personal, begun]`. Either process can verify it by itself, because both read the same token.
+expires, role, invitation, personal, begun, added]`. Either process can verify it by itself, because both read the same token.
 Cookies of before there were roles end after `expires`: they were traded for the token, so they are an
 owner's. Cookies without `begun` are of before sessions could be idle, and expire by `expires` alone.
 """
@@ -45,7 +45,8 @@ class Session(msgspec.Struct, frozen=True):
     """A browser that has presented the token or an invitation. `expires` and `begun`: seconds since
     1970; `begun` is 0 in cookies of earlier versions. `invitation`: the id of the group link; None
     for the token and for personal links. `personal`: whether the person came by a personal link,
-    so that an owner gives name, role and groups."""
+    so that an owner gives name, role and groups. `added`: another session of the person let it in, and
+    nobody had confirmed that session shortly before."""
 
     id: str
     person: Person
@@ -53,6 +54,7 @@ class Session(msgspec.Struct, frozen=True):
     invitation: str | None = None
     personal: bool = False
     begun: float = 0.0
+    added: bool = False
 
     @property
     def expired(self) -> bool:
@@ -71,6 +73,7 @@ class Sealed(msgspec.Struct, frozen=True, array_like=True):
     invitation: str | None = None
     personal: bool = False
     begun: float = 0.0
+    added: bool = False
 
 
 class ServerProof(msgspec.Struct, frozen=True):
@@ -138,16 +141,18 @@ class Keys:
         person_id: str | None = None,
         session_id: str | None = None,
         personal: bool = False,
+        added: bool = False,
         seconds: float = SESSION_SECONDS,
     ) -> Session:
         """Make a session that begins now, and expires after `seconds`. `invitation`: the group link
         by which the person came. `person_id`: the id of a person who is known already.
         `session_id`: the id of a browser's session that goes on, so that revoking it ends all
-        cookies of this browser. `personal`: the person came by a personal link."""
+        cookies of this browser. `personal`: the person came by a personal link. `added`: as in
+        `Session`."""
         person = Person(person_id or random_id(), name, role)
         begun = time.time()
         return Session(
-            session_id or random_id(), person, begun + seconds, invitation, personal, begun
+            session_id or random_id(), person, begun + seconds, invitation, personal, begun, added
         )
 
     def secret_of(self, invitation: str) -> str:
@@ -216,6 +221,7 @@ class Keys:
             session.invitation,
             session.personal,
             session.begun,
+            session.added,
         )
         payload = _text(msgspec.json.encode(fields))
         return f"{payload}.{_text(self._sign(payload))}"
@@ -263,7 +269,13 @@ class Keys:
             return None
         person = Person(found.person, found.name, found.role)
         return Session(
-            found.id, person, found.expires, found.invitation, found.personal, found.begun
+            found.id,
+            person,
+            found.expires,
+            found.invitation,
+            found.personal,
+            found.begun,
+            found.added,
         )
 
     def _sign(self, payload: str) -> bytes:

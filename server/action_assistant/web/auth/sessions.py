@@ -30,6 +30,7 @@ from action_assistant.web.auth.access import (
 )
 from action_assistant.web.auth.browser_names import browser_name
 from action_assistant.web.auth.caller import Origin, acting_for, client_network
+from action_assistant.web.auth.confirmations import is_sure
 from action_assistant.web.auth.device_codes import DeviceCodes, WaitingDevice
 from action_assistant.web.auth.keys import SESSION_SECONDS, Keys, Person, PersonRef, Session
 from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
@@ -253,6 +254,7 @@ class Sessions:
             invitation=first.invitation,
             person_id=first.person.id,
             personal=first.personal,
+            added=not is_sure(standing.confirmed_at, time.time()),
             seconds=self._standings.limits[standing.person.role].longest,
         )
 
@@ -320,6 +322,7 @@ class Sessions:
             invitation=invitation,
             person_id=known.id if known is not None else None,
             session_id=now.id if now is not None else None,
+            added=now.added if now is not None else known is not None,
             seconds=self._standings.limits[role].longest,
         )
 
@@ -653,6 +656,7 @@ def _renamed(keys: Keys, session: Session, name: str) -> Session:
         invitation=session.invitation,
         person_id=person.id,
         session_id=session.id,
+        added=session.added,
     )
 
 
