@@ -46,6 +46,7 @@ from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQu
 from action_assistant.runner.robots.recordings import Recordings
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.sight import RunSight
 from action_assistant.runner.start.index_writer import IndexWriter, folder_trouble
 from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
@@ -194,6 +195,7 @@ async def _executing(
                     lambda *args: for_people.value(StoredRuns.checked_courses, *args),
                     services.index_folders,
                     services.released.of,
+                    services.sight,
                 ),
                 # A run that moves again is read with all its visits, and waits behind no question.
                 identity_now=services.identity_now,
@@ -202,7 +204,7 @@ async def _executing(
         ):
             for_people.recorder_of = own.recorder_of = control.recorder_of
             services.worker_queries, services.control = for_people, control
-            services.hub = Hub(control, utc_us, services.requests)
+            services.hub = Hub(control, utc_us, services.requests, services.identity_now)
             services.index_writer = IndexWriter(
                 control.robots,
                 services.index_folders,
@@ -292,6 +294,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     limits = limits_of(settings.sessions)
     standings = Standings(people_files, browsers, limits, confirmations=confirmations)
     services.identity_now = partial(_identity_now, standings, revoked)
+    services.sight = RunSight(settings.data, keys)
     return application(
         [
             *routes(services),

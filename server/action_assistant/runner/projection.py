@@ -34,6 +34,7 @@ from action_assistant.runner.runs.events import (
     decode,
 )
 from action_assistant.runner.runs.queries import OPEN
+from action_assistant.runner.runs.sight import graphs_inside
 from action_assistant.runner.runs.word_index import holds
 from action_assistant.schema.runner_tables import review, robot, robot_right, run
 from action_assistant.web.auth.keys import PersonRef
@@ -134,9 +135,14 @@ def _run(asked: Requested) -> Executable:
 
 
 def _first_summary(asked: Requested) -> dict[str, object]:
-    """Return the summary of a run right after its request: without alarms, and with its group and
-    robots if it has any."""
-    summary: dict[str, object] = {"alarms": []}
+    """Return the summary of a run right after its request: without alarms, with the ids of the
+    graphs inside, and with its group and robots if it has any."""
+    summary: dict[str, object] = {
+        "alarms": [],
+        "inside": graphs_inside(asked.sight, asked.subgraphs),
+    }
+    if asked.unsighted:
+        summary["unsighted"] = True
     if asked.group is not None:
         summary["group"] = asked.group
     if asked.led is not None:

@@ -710,6 +710,8 @@ export interface RunnerApi {
         };
         /** @default false */
         drill?: boolean;
+        /** @default null */
+        sight?: RunnerApi["Sight"] | null;
     };
     /**
      * GroupShown
@@ -946,6 +948,7 @@ export interface RunnerApi {
         lead?: RunnerApi["Author"];
         batons?: string[];
         watching?: string[];
+        hidden?: boolean;
         cause: string;
         pinned: boolean;
         note: string;
@@ -1022,7 +1025,8 @@ export interface RunnerApi {
     /**
      * ModifyRequest
      * @description Another version of the graph of a run, by value. `continue_from`: the full name of an action
-     *     to start when the graph continues; `watching`: as in `StartRequest`.
+     *     to start when the graph continues; `watching`, `sight`: as in
+     *     `StartRequest`.
      */
     ModifyRequest: {
         version: string;
@@ -1039,6 +1043,8 @@ export interface RunnerApi {
         watching?: {
             [key: string]: boolean;
         };
+        /** @default null */
+        sight?: RunnerApi["Sight"] | null;
     };
     /**
      * NeverTaken
@@ -1731,6 +1737,16 @@ export interface RunnerApi {
         graphs: string[];
     };
     /**
+     * Rule
+     * @description Names those who may see a graph, and those who may also edit it as far as their role allows.
+     *     Editors may see it, too; with `editors` "all" everybody who may see it may edit it. Owners may do
+     *     both.
+     */
+    Rule: {
+        readers: "all" | string[];
+        editors: "all" | string[];
+    };
+    /**
      * RunComparison
      * @description The comparison of run `a` with run `b`. `graph`: the difference of the sent graphs;
      *     `parameters`: its changes of values of actions; `subgraphs`: the names of graphs inside that
@@ -1840,6 +1856,7 @@ export interface RunnerApi {
         lead?: RunnerApi["Author"];
         batons?: string[];
         watching?: string[];
+        hidden?: boolean;
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -1854,7 +1871,8 @@ export interface RunnerApi {
      *     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
      *     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
      *     further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
-     *     held at the start; `watching`: those that they said to watch.
+     *     held at the start; `watching`: those that they said to watch. `hidden`: the
+     *     reader may not see its graph, so that little else is given.
      */
     RunSummary: {
         id: string;
@@ -1893,6 +1911,7 @@ export interface RunnerApi {
         lead?: RunnerApi["Author"];
         batons?: string[];
         watching?: string[];
+        hidden?: boolean;
     };
     /**
      * RunWhole
@@ -1937,6 +1956,7 @@ export interface RunnerApi {
         lead?: RunnerApi["Author"];
         batons?: string[];
         watching?: string[];
+        hidden?: boolean;
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -2103,6 +2123,23 @@ export interface RunnerApi {
         run: RunnerApi["SharedState"];
     };
     /**
+     * Sight
+     * @description The rules of a version at one time: a run of it is for those who may see all its graphs.
+     *
+     *     `digest`: the tree digest of the version, or its digest if it has none. `graphs`: the ids of the
+     *     graph and of all graphs inside. `rules`: the rule that counts for each of them, in their order.
+     *     `at`: microseconds since 1970.
+     */
+    Sight: {
+        version: string;
+        digest: string;
+        graphs: string[];
+        rules: RunnerApi["Rule"][];
+        at: number;
+        /** @default  */
+        seal?: string;
+    };
+    /**
      * Sighting
      * @description The engines that are seen now. `left_s`: seconds during which discovery may still find
      *     others; 0 when it is complete.
@@ -2132,7 +2169,9 @@ export interface RunnerApi {
      *     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
      *     of each actor ("" for actions without one); `lost`: see `Led`. `watching`: true for each robot of
      *     which the person says that they watch it, with its hardware stop within reach. `drill`: the start is
-     *     for a Stop drill of its robot, and so needs no earlier one.
+     *     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
+     *     version, as the editor seals them; without it, where there are rules, the run is for its starter
+     *     and owners.
      */
     StartRequest: {
         version: string;
@@ -2171,6 +2210,8 @@ export interface RunnerApi {
         };
         /** @default false */
         drill?: boolean;
+        /** @default null */
+        sight?: RunnerApi["Sight"] | null;
     };
     /**
      * StartShown
@@ -2181,6 +2222,22 @@ export interface RunnerApi {
         request_id: string;
         under_way: boolean;
         runs: RunnerApi["RunShown"][];
+    };
+    /**
+     * Statement
+     * @description The rules of all graphs at one time, also of deleted graphs, and of drafts, for which that of
+     *     their origin counts. `graphs`: the index in `rules` of the rule that counts, by the id of the
+     *     graph; graphs that are left out are open to everybody. `at`: microseconds since 1970; a later
+     *     statement has a greater one.
+     */
+    Statement: {
+        at: number;
+        rules: RunnerApi["Rule"][];
+        graphs: {
+            [key: string]: number;
+        };
+        /** @default  */
+        seal?: string;
     };
     /**
      * Statistics
@@ -2619,6 +2676,9 @@ export interface RunnerPaths {
     };
     "/api/audit": {
         get: RunnerOperations["listAudit"];
+    };
+    "/api/graph-rules": {
+        put: RunnerOperations["storeGraphRules"];
     };
     "/api/view/run": {
         get: RunnerOperations["viewRun"];
@@ -3742,6 +3802,17 @@ interface RunnerOperations {
                 content: {
                     "application/json": RunnerApi["AuditPage"];
                 };
+            };
+        };
+    };
+    storeGraphRules: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["Statement"];
+            };
+        };
+        responses: {
+            204: {
             };
         };
     };

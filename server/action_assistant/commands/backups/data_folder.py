@@ -27,6 +27,7 @@ from action_assistant.journal.journal import Journal
 from action_assistant.journal.removal import StreamRemoved
 from action_assistant.private_files import opener
 from action_assistant.runner.archives.raw_messages import RawArchived
+from action_assistant.runner.runs import sight
 from action_assistant.schema.runner_tables import runner_event
 from action_assistant.settings import ARCHIVE, RESTORING
 from action_assistant.system import posix
@@ -46,7 +47,7 @@ RECORDINGS: Final = "recordings"
 MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
 WHOLE: Final = frozenset(
     {
-        *(keys.TOKEN_FILE, certificate.FOLDER, graph_seals.FILE),
+        *(keys.TOKEN_FILE, certificate.FOLDER, graph_seals.FILE, sight.FILE),
         *("people", released_versions.FOLDER, "sessions", "sessions.db", "tokens", "views"),
     }
 )

@@ -100,7 +100,7 @@ def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
         for on in on_engine(engine)
     ]
     wanted = (
-        *(run.c.id, run.c.number, run.c.graph_name),
+        *(run.c.id, run.c.number, run.c.author_id, run.c.graph, run.c.graph_name),
         *(run.c.state, run.c.result, run.c.summary),
     )
     named = union_all(*(select(each) for each in newest))

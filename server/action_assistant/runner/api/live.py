@@ -33,6 +33,8 @@ from action_assistant.runner.robots.registration import Robot
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.sight import Unseen, names_seen, run_graphs
+from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.runner.stop.foreign_stop import StoppedAll
 from action_assistant.safe_text import hold_names
 from action_assistant.web.auth.access import identity_of, is_expired
@@ -44,6 +46,7 @@ log: Final = logging.getLogger(__name__)
 _GAP_S: Final = 0.05  # between two states of one run
 _SHARE: Final = 20  # at most one part in so many of the time goes into encoding one run
 _HEARTBEAT_S: Final = 1.0
+_LOOK_S: Final = 0.5  # between two looks at what a person may see
 _SEND_S: Final = 15.0
 _AT_ONCE: Final = 250  # actions whose views are made in one turn of the event loop
 _ENGINES_GAP_S: Final = 0.25  # between two lists of engines
@@ -71,9 +74,12 @@ class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
     unknown: dict[str, str] = {}
 
     @classmethod
-    def everything(cls, stop_id: str, stopped: StoppedAll) -> "Stopping":
-        """Return the message that answers a Stop of everything."""
-        return cls(stop_id, stopped.runs, stopped.graphs, stopped.unknown)
+    def everything(
+        cls, stop_id: str, stopped: StoppedAll, unseen: Unseen | None = None
+    ) -> "Stopping":
+        """Return the message that answers a Stop of everything. `unseen`: the graphs that its sender
+        may not see."""
+        return cls(stop_id, stopped.runs, names_seen(stopped.graphs, unseen), stopped.unknown)
 
 
 class RefusedMessage(msgspec.Struct, frozen=True, tag="refused", tag_field="type"):
@@ -138,15 +144,18 @@ class EncodedRun(msgspec.Struct, frozen=True):
 
 
 class Hub:
-    """Has the outboxes of all pages, and encodes runs and engines once for all of them."""
+    """Has the outboxes of all pages, and encodes runs and engines once for all who see everything.
+    `identity_now`: says which role and groups a person has now."""
 
     def __init__(
         self,
         control: ExecutionService,
         clock_us: ClockUs,
         requests: ConfirmationRequests | None = None,
+        identity_now: IdentityNow = unchanged,
     ) -> None:
         self.control = control
+        self.identity_now = identity_now
         self.requests = requests or ConfirmationRequests()
         self.clock_us = clock_us
         self.boxes: set[Outbox] = set()
@@ -176,8 +185,11 @@ class Hub:
         for box in self.boxes:
             box.mark_engines()
 
-    def engines(self) -> str:
-        """Return all engines as a message; it is encoded once per change."""
+    def engines(self, unseen: Unseen | None) -> str:
+        """Return all engines as a message; it is encoded once per change for all who see
+        everything."""
+        if unseen is not None:
+            return msgspec.json.encode(EnginesMessage(self.control.robot_views(unseen))).decode()
         if self._engines is None:
             message = EnginesMessage(self.control.robot_views())
             self._engines = msgspec.json.encode(message).decode()
@@ -215,13 +227,26 @@ class Hub:
         frame = self._frames.get(opened)
         return 0.0 if frame is None or frame.revision == opened.revision else frame.next
 
-    async def hello(self) -> str:
+    def unseen(self, identity: Identity) -> Unseen | None:
+        """Return the graphs that a person may not see now; None if they see everything."""
+        return self.control.sight.unseen(self.identity_now(identity))
+
+    async def hello(self, identity: Identity) -> str:
         """Return the first message for a page. The event loop stays free while large runs are
-        prepared."""
+        prepared. `identity`: of the person who reads it."""
         for opened in tuple(self.control.shown.values()):
             await self.prepare_view(opened)
-        runs = [self.run_view(opened) for opened in self.control.shown.values()]
-        return msgspec.json.encode(Hello(self.control.robot_views(), runs)).decode()
+        now = self.unseen(identity)
+        runs = [
+            views.hidden(view) if _is_hidden(opened, now) else view
+            for opened in self.control.shown.values()
+            for view in (self.run_view(opened),)
+        ]
+        return msgspec.json.encode(Hello(self.control.robot_views(now), runs)).decode()
+
+    def hidden_frame(self, opened: OpenRun) -> str:
+        """Return the message about an open run for a person who may not see its graph."""
+        return msgspec.json.encode(RunMessage(views.hidden(self.run_view(opened)))).decode()
 
     async def prepare_view(self, opened: OpenRun) -> None:
         """Fill the cache of an open run's view, with pauses for other tasks, so that encoding it
@@ -237,10 +262,13 @@ class Hub:
         recorded = opened.recorder.recorded
         return views.run_view(opened.run, recorded=recorded, cache=self.view_cache(opened))
 
-    async def follow(self, text: str, author: Author, *, denied: str = "") -> str:
+    async def follow(
+        self, text: str, author: Author, *, denied: str = "", unseen: Unseen | None = None
+    ) -> str:
         """Carry out a message of a page in the name of `author`, and return the text of the answer.
         A message that cannot be understood or carried out is answered with the reason, not raised.
-        `denied`: why its sender may not stop anything; "" if they may.
+        `denied`: why its sender may not stop anything; "" if they may. `unseen`: the graphs that they
+        may not see.
         """
         stop_id = ""
         try:
@@ -251,7 +279,8 @@ class Hub:
             if denied:
                 raise Forbidden(denied)
             if message.run == "all":
-                return _text(Stopping.everything(stop_id, self.control.stop_all(author, stop_id)))
+                stopped = self.control.stop_all(author, stop_id)
+                return _text(Stopping.everything(stop_id, stopped, unseen))
             runs = await self.control.stop(message.run, author, stop_id)
         except msgspec.DecodeError as wrong:
             return _text(RefusedMessage(stop_id, f"Not understood: {wrong}"))
@@ -266,6 +295,10 @@ async def prepare_view(run: Run, cache: views.ActionViewCache) -> None:
         await anyio.lowlevel.checkpoint()
 
 
+def _is_hidden(opened: OpenRun, unseen: Unseen | None) -> bool:
+    return unseen is not None and unseen.hides(run_graphs(opened.run))
+
+
 class Outbox:
     """The messages that wait for one page: answers in order, and the runs that have changed."""
 
@@ -273,6 +306,7 @@ class Outbox:
         self.identity = identity
         self._hub = hub
         self._is_allowed = is_allowed
+        self._unseen = hub.unseen(identity)
         self._answers: deque[str] = deque()
         self._changed: dict[str, OpenRun] = {}
         self._next: dict[str, float] = {}  # run -> when it may be sent again
@@ -308,17 +342,31 @@ class Outbox:
     async def deliver(self, send: Callable[[str], Awaitable[None]]) -> None:
         """Send messages until cancelled. Raises TimeoutError when the page does not read."""
         beat = anyio.current_time() + _HEARTBEAT_S
+        look = anyio.current_time() + _LOOK_S
         while True:
             self._news = anyio.Event()
+            if anyio.current_time() >= look:
+                look = anyio.current_time() + _LOOK_S
+                self._look_again()
             while (text := self._pick(beat)) is not None:
                 with anyio.fail_after(_SEND_S):
                     await send(text)
                 if text.startswith('{"type":"beat"'):
                     beat = anyio.current_time() + _HEARTBEAT_S
             runs = (self._due(run, opened) for run, opened in self._changed.items())
-            due = min([beat, self._engines_at, *runs])
+            due = min([beat, look, self._engines_at, *runs])
             with anyio.move_on_after(max(0.0, due - anyio.current_time())):
                 await self._news.wait()
+
+    def _look_again(self) -> None:
+        """Send everything anew if a rule, or the role or groups of the person, have changed what they
+        may see."""
+        unseen = self._hub.unseen(self.identity)
+        if unseen != self._unseen:
+            self._unseen = unseen
+            for opened in self._hub.control.shown.values():
+                self.mark(opened)
+            self.mark_engines()
 
     def _due(self, run: str, opened: OpenRun) -> float:
         return max(self._next.get(run, 0.0), self._hub.due(opened))
@@ -342,10 +390,13 @@ class Outbox:
         if now >= self._engines_at:
             self._engines_at = math.inf
             self._engines_next = now + _ENGINES_GAP_S
-            return self._hub.engines()
+            return self._hub.engines(self._unseen)
         for run, opened in self._changed.items():
             if self._due(run, opened) <= now:
                 del self._changed[run]
+                if _is_hidden(opened, self._unseen):
+                    self._next[run] = now + _GAP_S
+                    return self._hub.hidden_frame(opened)
                 frame = self._hub.frame(opened)
                 self._next[run] = now + max(_GAP_S, _SHARE * frame.cost)
                 if opened.run.end is not None and opened.recorder.idle:
@@ -360,7 +411,7 @@ async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
     author = author_of(socket)
     box = Outbox(hub, lambda: not is_expired(socket), identity_of(socket))
     await socket.accept()
-    box.post(await hub.hello())
+    box.post(await hub.hello(box.identity))
     hub.boxes.add(box)
     if hub.requests.shown_to(box.identity):
         box.mark_requests()
@@ -390,7 +441,8 @@ async def _read(
             text = await socket.receive_text()
             stop = may(identity_of(socket), "stop", now=time.time())
             denied = stop.reason if isinstance(stop, Denied) else ""
-            if not box.post(await hub.follow(text, author, denied=denied)):
+            unseen = hub.unseen(identity_of(socket))
+            if not box.post(await hub.follow(text, author, denied=denied, unseen=unseen)):
                 await socket.close(code=_TOO_SLOW, reason="too slow")
                 break
     except (WebSocketDisconnect, WebSocketException, OSError):

@@ -1,7 +1,7 @@
 """Keeps in the audit the starts that are refused: a refused start becomes no run."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any, Final, Literal, TypeAlias
 
 import msgspec
@@ -43,11 +43,17 @@ class StartNeeds(Needs):
         self, connection: ASGIConnection[Any, Any, Any, Any], handler: BaseRouteHandler
     ) -> None:
         """Raise Forbidden if the person's role lacks the permission."""
-        run = str(connection.path_params.get("run", ""))[:_LONGEST]
-        with noted(self._services, connection, StartRefused(what=self._what, why="", run=run)):
+        with self.noting(connection):
             if self._of_people:
                 await PersonOnly()(connection, handler)
             await super().__call__(connection, handler)
+
+    def noting(
+        self, connection: ASGIConnection[Any, Any, Any, Any]
+    ) -> AbstractContextManager[None]:
+        """Return a context that keeps a refusal inside it in the audit."""
+        run = str(connection.path_params.get("run", ""))[:_LONGEST]
+        return noted(self._services, connection, StartRefused(what=self._what, why="", run=run))
 
 
 @contextmanager

@@ -18,6 +18,7 @@ from action_assistant.runner.analysis.comparison import RunComparison
 from action_assistant.runner.analysis.replay import RunReplay
 from action_assistant.runner.analysis.statistics import Statistics
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
+from action_assistant.runner.api.run_guard import require_run, unseen_by
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives import examples
 from action_assistant.runner.archives.raw_messages import RawMessages
@@ -247,7 +248,9 @@ def _many_runs(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="compareRuns",
         guards=[Needs("see")],
     )
-    async def comparison(a: str, b: str) -> Response[RunComparison]:
+    async def comparison(a: str, b: str, request: _Asking) -> Response[RunComparison]:
+        for each in (a, b):
+            await require_run(services, request, each)
         return json_of(await services.worker_queries.text(StoredRuns.compare, a, b), RunComparison)
 
     @get(
@@ -257,12 +260,15 @@ def _many_runs(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
     )
     async def statistics(
+        request: _Asking,
         graph: str,
         robot: str | None = None,
         last: Annotated[int, Parameter(ge=1, le=1000)] = 200,
     ) -> Response[Statistics]:
         return json_of(
-            await services.worker_queries.text(StoredRuns.statistics, graph, robot, last),
+            await services.worker_queries.text(
+                StoredRuns.statistics, graph, robot, last, unseen_by(services, request)
+            ),
             Statistics,
         )
 

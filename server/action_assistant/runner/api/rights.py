@@ -11,6 +11,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput
 from action_assistant.kit.moments import sent_us
 from action_assistant.runner.api.caller import author_of
+from action_assistant.runner.api.run_guard import require_run, unseen_by
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.robots.registration import DrillShown, Robot, drill_view
 from action_assistant.runner.robots.rights import Operator, Rules
@@ -123,7 +124,7 @@ def _rules(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def set_rights(name: str, data: RightsWanted, request: _Asking) -> Robot:
         await services.control.rights.set_rules(name, _rules_of(data), author_of(request))
-        return services.control.robot_view(name)
+        return services.control.robot_view(name, unseen_by(services, request))
 
     @get(
         "/api/rights",
@@ -166,7 +167,7 @@ def _baton(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def take(name: str, data: BatonTake, request: _Asking) -> Robot:
         rights, me = services.control.rights, identity_of(request)
         await rights.take(name, me, author_of(request), data.reason)
-        return services.control.robot_view(name)
+        return services.control.robot_view(name, unseen_by(services, request))
 
     @post(
         "/api/robots/{name:str}/baton/hand",
@@ -178,7 +179,7 @@ def _baton(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def hand(name: str, data: BatonHand, request: _Asking) -> Robot:
         rights, me = services.control.rights, identity_of(request)
         await rights.hand(name, data.to, me, author_of(request))
-        return services.control.robot_view(name)
+        return services.control.robot_view(name, unseen_by(services, request))
 
     @post(
         "/api/robots/{name:str}/baton/drop",
@@ -189,7 +190,7 @@ def _baton(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def drop(name: str, request: _Asking) -> Robot:
         await services.control.rights.drop(name, identity_of(request), author_of(request))
-        return services.control.robot_view(name)
+        return services.control.robot_view(name, unseen_by(services, request))
 
     @post(
         "/api/runs/{run:str}/hand_over",
@@ -218,7 +219,7 @@ def _service(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def lock(name: str, data: LockWanted, request: _Asking) -> Robot:
         rights, me = services.control.rights, identity_of(request)
         await rights.lock(name, me, author_of(request), data.reason)
-        return services.control.robot_view(name)
+        return services.control.robot_view(name, unseen_by(services, request))
 
     @post(
         "/api/robots/{name:str}/unlock",
@@ -230,7 +231,7 @@ def _service(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def unlock(name: str, data: UnlockWanted, request: _Asking) -> Robot:
         rights, me = services.control.rights, identity_of(request)
         await rights.unlock(name, me, author_of(request), data.of)
-        return services.control.robot_view(name)
+        return services.control.robot_view(name, unseen_by(services, request))
 
     return [lock, unlock]
 
@@ -243,8 +244,9 @@ def _drills(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[PersonOnly(), Needs("operate")],
     )
     async def record(name: str, data: DrillRequest, request: _Asking) -> Robot:
+        await require_run(services, request, data.run)
         await services.control.record_drill(name, data, author_of(request))
-        return services.control.robot_view(name)
+        return services.control.robot_view(name, unseen_by(services, request))
 
     @get(
         "/api/robots/{name:str}/drills",

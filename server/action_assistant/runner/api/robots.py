@@ -7,10 +7,12 @@ from typing import Any, Final, Literal, assert_never
 import msgspec
 from litestar import Request, Response, delete, get, patch, post
 from litestar.types import ControllerRouterHandler
+from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, NotFound, Refused
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of
 from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
+from action_assistant.runner.api.run_guard import require_all_on_robot, shown, unseen_by
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.links.behaviours.folder import BehaviourList
 from action_assistant.runner.links.port import Candidate, Registration, Sighting
@@ -37,6 +39,7 @@ from action_assistant.runner.robots.robot_events import (
     StopWasProven,
 )
 from action_assistant.runner.runs import views
+from action_assistant.runner.runs.sight import HIDDEN_NAME, names_seen, run_graphs
 from action_assistant.runner.start.admission import GroupRequest, read_group
 from action_assistant.runner.start.index_writer import (
     IndexWriteAnswer,
@@ -167,8 +170,8 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="listRobots",
         guards=[Needs("see")],
     )
-    async def robots() -> list[Robot]:
-        return services.control.robot_views()
+    async def robots(request: _Asking) -> list[Robot]:
+        return services.control.robot_views(unseen_by(services, request))
 
     @get(
         "/api/reach",
@@ -176,11 +179,10 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="getReach",
         guards=[Needs("see")],
     )
-    async def reach() -> ReachStatus:
+    async def reach(request: _Asking) -> ReachStatus:
         control = services.control
-        return ReachStatus(
-            control.robot_views(), control.robots.no_reach, await _behaviours(services)
-        )
+        engines = control.robot_views(unseen_by(services, request))
+        return ReachStatus(engines, control.robots.no_reach, await _behaviours(services))
 
     @get(
         "/api/candidates",
@@ -208,7 +210,8 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def register(data: Registration, request: _Asking) -> Response[Robot]:
         _require_owner_to_loosen(services, data.name, data, request)
-        robot = await services.control.register(data, author_of(request))
+        await services.control.register(data, author_of(request))
+        robot = services.control.robot_view(data.name, unseen_by(services, request))
         return Response(robot, status_code=201, headers={"location": f"/api/robots/{robot.name}"})
 
     @patch(
@@ -226,7 +229,8 @@ def _registry(services: RunnerServices) -> list[ControllerRouterHandler]:
         except msgspec.ValidationError as wrong:
             raise BadInput(str(wrong)) from wrong
         _require_owner_to_loosen(services, name, registration, request)
-        return await services.control.register(registration, author_of(request))
+        await services.control.register(registration, author_of(request))
+        return services.control.robot_view(registration.name, unseen_by(services, request))
 
     @delete(
         "/api/robots/{name:str}",
@@ -260,8 +264,8 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="getRobot",
         guards=[Needs("see")],
     )
-    async def robot(name: str) -> Robot:
-        return services.control.robot_view(name)
+    async def robot(name: str, request: _Asking) -> Robot:
+        return services.control.robot_view(name, unseen_by(services, request))
 
     @get(
         "/api/robots/{name:str}/known",
@@ -269,10 +273,12 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="getRobotIndex",
         guards=[Needs("see")],
     )
-    async def known(name: str) -> RobotKnowledge:
+    async def known(name: str, request: _Asking) -> RobotKnowledge:
+        unseen = unseen_by(services, request)
         index = await services.control.robots.index(name)
         actions = [_action(action, index.actions[action]) for action in sorted(index.actions)]
-        return RobotKnowledge(actions, sorted(index.graphs), index.unread)
+        graphs = [] if unseen is not None and unseen.is_some else sorted(index.graphs)
+        return RobotKnowledge(actions, graphs, index.unread)
 
     @get(
         "/api/robots/{name:str}/known/{action:str}",
@@ -295,10 +301,12 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="getRobotLog",
         guards=[Needs("see")],
     )
-    async def events(name: str) -> list[RobotLogLine]:
+    async def events(name: str, request: _Asking) -> list[RobotLogLine]:
         services.control.robots.registration(name)
         found = await services.control.robots.robot_log.newest(name, _EVENTS)
-        return [_line(seq, event) for seq, event in reversed(found)]
+        unseen = unseen_by(services, request)
+        lines = [_line(seq, event) for seq, event in reversed(found)]
+        return lines if unseen is None or not unseen.is_some else list(map(_without_graphs, lines))
 
     @get(
         "/api/robots/{name:str}/events/{seq:int}/umrf",
@@ -307,7 +315,8 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         responses={200: answer(UmrfGraph)},
     )
-    async def commanded(name: str, seq: int) -> Response[bytes]:
+    async def commanded(name: str, seq: int, request: _Asking) -> Response[bytes]:
+        require_all_on_robot(services, request)
         services.control.robots.registration(name)
         return await _umrf(services, await services.control.robots.robot_log.graph(name, seq))
 
@@ -318,9 +327,12 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         responses={200: answer(UmrfGraph)},
     )
-    async def held(name: str, graph: str) -> Response[bytes]:
+    async def held(name: str, graph: str, request: _Asking) -> Response[bytes]:
         """Return the graph that a robot holds, without its run state, since a graph with a state
         must not be sent again."""
+        seen = services.control.robot_view(name, unseen_by(services, request)).holds
+        if all(each.graph != graph for each in seen):
+            require_all_on_robot(services, request)
         return await _umrf(services, services.control.robots.held_graph(name, graph))
 
     @get(
@@ -341,7 +353,8 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         responses={200: answer(FileBytes, media="application/gzip")},
     )
-    async def recording(name: str, file: str) -> Response[bytes]:
+    async def recording(name: str, file: str, request: _Asking) -> Response[bytes]:
+        require_all_on_robot(services, request)
         services.control.robots.registration(name)
         recordings = services.control.robots.recordings
         if recordings is None:
@@ -356,7 +369,9 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("stop")],
     )
     async def stop(name: str, request: _Asking) -> RobotStopped:
-        return RobotStopped(*services.control.stop_robot(name, author_of(request)))
+        runs, graphs = services.control.stop_robot(name, author_of(request))
+        names = names_seen({name: graphs}, unseen_by(services, request))
+        return RobotStopped(runs, names[name])
 
     return [robot, known, known_action, events, commanded, held, recorded, recording, stop]
 
@@ -392,9 +407,11 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
                 grouped = await services.control.start_group(
                     group, author_of(request), identity_of(request)
                 )
-        runs = [views.run_view(run) for run in grouped.runs]
-        shown = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
-        return Response(shown, status_code=201 if grouped.fresh else 200)
+        runs = [
+            shown(services, request, views.run_view(run), run_graphs(run)) for run in grouped.runs
+        ]
+        started = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
+        return Response(started, status_code=201 if grouped.fresh else 200)
 
     return [look, start]
 
@@ -465,6 +482,15 @@ def _line(seq: int, event: RobotEvent) -> RobotLogLine:
             return _rights_line(seq, event)
         case _:
             assert_never(event)
+
+
+def _without_graphs(line: RobotLogLine) -> RobotLogLine:
+    """Return a line without the names of graphs, and without texts that may name them: for a person
+    who may not see some graph, since nobody knows whose graphs these are."""
+    is_about_graphs = line.kind not in {"became", "rights_set", "baton", "locked", "unlocked"}
+    why = "" if is_about_graphs else line.why
+    graph = HIDDEN_NAME if line.graph else ""
+    return replace(line, graph=graph, has_graph=False, graphs=(), files=(), why=why)
 
 
 def _rights_line(seq: int, event: RightsEvent) -> RobotLogLine:

@@ -6,10 +6,10 @@ from typing import Annotated, Any, Final, get_args
 
 import anyio
 import msgspec
-from litestar import Request, Response, WebSocket, delete, get, post, websocket
+from litestar import Request, Response, WebSocket, delete, get, post, put, websocket
 from litestar.exceptions import HTTPException
 from litestar.openapi import ResponseSpec
-from litestar.params import Parameter
+from litestar.params import JSONBody, Parameter
 from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
@@ -33,6 +33,13 @@ from action_assistant.runner.api.live import (
 )
 from action_assistant.runner.api.refused_starts import StartNeeds, noted, refusal_of
 from action_assistant.runner.api.review import json_of
+from action_assistant.runner.api.run_guard import (
+    guarded,
+    is_hidden,
+    require_run,
+    shown,
+    unseen_by,
+)
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.interventions import ModifyRequest, RestRequest
 from action_assistant.runner.execution.start_checks import engines_of
@@ -41,6 +48,7 @@ from action_assistant.runner.review.stored_runs import HistoryEvent, StoredRuns
 from action_assistant.runner.runs import queries, views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run, State
+from action_assistant.runner.runs.sight import run_graphs
 from action_assistant.runner.start.admission import (
     GoOnRequest,
     ResumeRequest,
@@ -68,12 +76,15 @@ from action_assistant.web.auth.access import (
     session_of,
 )
 from action_assistant.web.auth.caller import client_network
+from action_assistant.web.auth.graph_seals import Statement
 from action_assistant.web.server.openapi import answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once
 _STOP_BYTES: Final = 4_096  # of the body of a Stop; whatever comes after them is not read
+_RULES_BODY: Final = 10_000_000  # bytes
 _STOP_S: Final = 1.0  # for which a Stop waits for its body
 _ALIVE_S: Final = 15.0  # between two comments that keep an event stream open
+_LOOK_S: Final = 0.5  # after which a stream looks again whether its caller may see the run
 _Asking = Request[Any, Any, Any]
 
 
@@ -86,7 +97,7 @@ class StopBody(msgspec.Struct, frozen=True):
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     """Return all routes of the runner."""
-    return [
+    every = [
         *_starts(services),
         *_commands(services),
         *_queries(services),
@@ -98,7 +109,9 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
         *review.routes(services),
         *audit_routes(lambda wanted: _audit(services, wanted)),
         _live(services),
+        _rules(services),
     ]
+    return guarded(every, services)
 
 
 async def _audit(services: RunnerServices, wanted: AuditFilter) -> bytes:
@@ -126,8 +139,9 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
                 started = await services.control.start(
                     start_request, author_of(request), identity_of(request)
                 )
+        view = await _run_view(services, started.run)
         return Response(
-            await _run_view(services, started.run),
+            shown(services, request, view, run_graphs(started.run)),
             status_code=201 if started.fresh else 200,
             headers={"location": f"/api/runs/{started.run.id}"},
         )
@@ -138,12 +152,15 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="getStart",
         guards=[Needs("see")],
     )
-    async def started(request_id: str) -> views.StartShown:
+    async def started(request_id: str, request: _Asking) -> views.StartShown:
         # Before the query: a start that is not under way any more is stored.
         under_way = services.control.under_way(request_id)
         rows = await services.control.history.rows(queries.of_start(request_id))
         runs = [await services.control.find(row.id) for row in rows]
-        found = [await _run_view(services, run) for run in runs]
+        found = [
+            shown(services, request, await _run_view(services, run), run_graphs(run))
+            for run in runs
+        ]
         return views.StartShown(request_id=request_id, under_way=under_way, runs=found)
 
     return [start, started]
@@ -161,7 +178,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def stop_all(request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
         stopped = services.control.stop_all(author_of(request), stop_id)
-        return Stopping.everything(stop_id, stopped)
+        return Stopping.everything(stop_id, stopped, unseen_by(services, request))
 
     @post(
         "/api/runs/{run:str}/stop",
@@ -265,6 +282,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
 def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get("/api/runs", summary="Runs, newest first", operation_id="listRuns", guards=[Needs("see")])
     async def listed(
+        request: _Asking,
         graph: str | None = None,
         robot: str | None = None,
         run_state: Annotated[str | None, Parameter(query="state")] = None,
@@ -298,7 +316,10 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
             run: views.summary(opened.run, recorded=opened.recorder.recorded)
             for run, opened in services.control.shown.items()
         }
-        found = await services.worker_queries.text(StoredRuns.listed, wanted, limit, open_runs)
+        unseen = unseen_by(services, request)
+        found = await services.worker_queries.text(
+            StoredRuns.listed, wanted, limit, open_runs, unseen
+        )
         return json_of(found, list[views.Listed])
 
     @get(
@@ -307,8 +328,9 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="listLabels",
         guards=[Needs("see")],
     )
-    async def every_label() -> list[str]:
-        rows = await services.control.history.rows(queries.all_labels())
+    async def every_label(request: _Asking) -> list[str]:
+        unseen = unseen_by(services, request)
+        rows = await services.control.history.rows(queries.all_labels(unseen))
         return [row.label for row in rows]
 
     @get(
@@ -317,11 +339,12 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="getRun",
         guards=[Needs("see")],
     )
-    async def one(run: str) -> Response[views.RunWhole]:
+    async def one(run: str, request: _Asking) -> Response[views.RunWhole]:
+        is_all = not await is_hidden(services, request, run)
         opened = services.control.open.get(run)
         if opened is None:
             return json_of(
-                await services.worker_queries.text(StoredRuns.whole, run), views.RunWhole
+                await services.worker_queries.text(StoredRuns.whole, run, is_all), views.RunWhole
             )
         if opened not in services.sent:
             services.sent[opened] = await services.worker_queries.value(StoredRuns.sent, run)
@@ -333,7 +356,8 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
             recorded=opened.recorder.recorded,
             cache=services.hub.view_cache(opened),
         )
-        return json_of(msgspec.json.encode(whole), views.RunWhole)
+        seen = whole if is_all else views.hidden(whole)
+        return json_of(msgspec.json.encode(seen), views.RunWhole)
 
     @get(
         "/api/runs/{run:str}/events",
@@ -356,7 +380,7 @@ def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:
         if newest <= after and is_over:
             return Response(None, status_code=204)  # tells an EventSource not to reconnect
         return Stream(
-            _tail(services, run, after),
+            _tail(services, run, after, request),
             media_type="text/event-stream",
             headers={"cache-control": "no-store"},
         )
@@ -378,6 +402,21 @@ def _live(services: RunnerServices) -> ControllerRouterHandler:
             await refuse(socket.scope, socket.receive, socket.send, refused)
 
     return live
+
+
+def _rules(services: RunnerServices) -> ControllerRouterHandler:
+    @put(
+        "/api/graph-rules",
+        status_code=204,
+        summary="Store the rules that say who may see which graphs, as the editor has sealed them",
+        operation_id="storeGraphRules",
+        guards=[Needs("share")],
+        request_max_body_size=_RULES_BODY,
+    )
+    async def store(data: JSONBody[Statement]) -> None:
+        await services.control.sight.store(data)
+
+    return store
 
 
 async def _require_command_role(services: RunnerServices, run: str, request: _Asking) -> None:
@@ -432,11 +471,19 @@ def _last_event_id(request: _Asking) -> int:
     return int(asked)
 
 
-async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator[bytes]:
+async def _tail(
+    services: RunnerServices, run: str, after: int, request: _Asking
+) -> AsyncIterator[bytes]:
     """Yield the stored events of a run after number `after` in the format of an HTTP event stream,
-    then later ones as they are stored, until the run is over. While nothing comes, yield a comment
-    now and then to keep the connection."""
+    then later ones as they are stored, until the run is over or the caller may not see it any more.
+    While nothing comes, yield a comment now and then to keep the connection."""
+    alive_at = anyio.current_time() + _ALIVE_S
+    identity = identity_of(request)
     while True:
+        unseen = services.control.sight.unseen(services.identity_now(identity))
+        graphs = services.control.graphs_now(run)
+        if unseen is not None and (graphs is None or unseen.hides(graphs)):
+            return
         opened = services.control.open.get(run)
         revision = opened.revision if opened is not None else 0
         if await services.worker_queries.newest(run) > after:
@@ -445,9 +492,10 @@ async def _tail(services: RunnerServices, run: str, after: int) -> AsyncIterator
             continue
         if opened is None:
             return
-        with anyio.move_on_after(_ALIVE_S) as waited:
+        with anyio.move_on_after(_LOOK_S):
             await services.control.change(run, revision)
-        if waited.cancelled_caught:
+        if anyio.current_time() >= alive_at:
+            alive_at = anyio.current_time() + _ALIVE_S
             yield b": alive\n\n"
 
 
@@ -470,9 +518,14 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
     )
     async def approvals(
+        request: _Asking,
         digest: Annotated[str, Parameter(min_length=64, max_length=64)],
     ) -> list[Approval]:
-        return [_approval(each) for each in await services.control.approvals.given_for(digest)]
+        unseen = unseen_by(services, request)
+        given = await services.control.approvals.given_for(digest)
+        return [
+            _approval(each) for each in given if unseen is None or each.graph not in unseen.graphs
+        ]
 
     @post(
         "/api/approvals",
@@ -482,6 +535,7 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[PersonOnly(), Needs("operate")],
     )
     async def approve(data: ApprovalRequest, request: _Asking) -> Approval:
+        services.control.sight.require_graphs(identity_of(request), data.graph)
         session = session_of(request)
         is_named = session is None or session.personal
         return _approval(
@@ -496,6 +550,7 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[PersonOnly(), Needs("operate")],
     )
     async def ask(data: ApprovalQuestion, request: _Asking) -> None:
+        services.control.sight.require_graphs(identity_of(request), data.graph)
         await services.control.approvals.ask(data, author_of(request))
 
     return [approvals, approve, ask]
@@ -519,10 +574,11 @@ def _expected_courses(services: RunnerServices) -> list[ControllerRouterHandler]
         operation_id="listExpectations",
         guards=[Needs("see")],
     )
-    async def listed() -> Response[list[Expectation]]:
-        return json_of(
-            await services.worker_queries.text(StoredRuns.expectations), list[Expectation]
+    async def listed(request: _Asking) -> Response[list[Expectation]]:
+        found = await services.worker_queries.text(
+            StoredRuns.expectations, unseen_by(services, request)
         )
+        return json_of(found, list[Expectation])
 
     @post(
         "/api/expectations",
@@ -535,7 +591,12 @@ def _expected_courses(services: RunnerServices) -> list[ControllerRouterHandler]
     async def expect(request: _Asking) -> Expectation:
         async with body_of(request, services.body_limit) as body:
             wanted = decoded(body, Expect)
-            return await services.review_service.expect(wanted, author_of(request))
+            if wanted.run:
+                await require_run(services, request, wanted.run)
+            graphs = (wanted.graph, *(each.graph for each in wanted.subgraphs))
+            services.control.sight.require_graphs(identity_of(request), *graphs)
+            unseen = unseen_by(services, request)
+            return await services.review_service.expect(wanted, author_of(request), unseen)
 
     @delete(
         "/api/expectations/{name:str}",
@@ -544,7 +605,8 @@ def _expected_courses(services: RunnerServices) -> list[ControllerRouterHandler]
         guards=[Needs("edit")],
     )
     async def retire(name: str, request: _Asking) -> None:
-        await services.review_service.retire(name, author_of(request))
+        unseen = unseen_by(services, request)
+        await services.review_service.retire(name, author_of(request), unseen)
 
     return [listed, expect, retire]
 
@@ -562,11 +624,14 @@ def _course_checks(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def check(request: _Asking) -> Response[CheckedCourses]:
         async with body_of(request, services.body_limit) as body:
             check_request = decoded(body, CheckRequest)
+            graphs = (check_request.graph, *(each.graph for each in check_request.subgraphs))
+            services.control.sight.require_graphs(identity_of(request), *graphs)
             text = await services.worker_queries.text(
                 StoredRuns.checked_courses,
                 check_request.graph,
                 bytes(check_request.umrf),
                 check_request.subgraphs,
+                unseen_by(services, request),
             )
         return json_of(text, CheckedCourses)
 

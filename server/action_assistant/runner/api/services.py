@@ -15,6 +15,7 @@ from action_assistant.runner.links.behaviours.folder import BehaviourFolder
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.sent_graphs import Sent
+from action_assistant.runner.runs.sight import NO_RULES, RunSight
 from action_assistant.runner.start.index_writer import IndexWriter
 from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.web.audit.log import AuditLog
@@ -46,10 +47,12 @@ class RunnerServices:
     identity_now: IdentityNow
     released: ReleasedVersions
     notifications: Notifications
+    sight: RunSight
 
     def __init__(self) -> None:
         self.behaviours = None
         self.identity_now = unchanged
+        self.sight = NO_RULES
         self.index_folders = {}
         self.sent = WeakKeyDictionary()
         self.body_limit = ConcurrencyLimit(_BODIES)

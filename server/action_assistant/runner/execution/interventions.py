@@ -19,6 +19,7 @@ from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import SentGraph
+from action_assistant.runner.runs.sight import RunSight, run_graphs
 from action_assistant.runner.start.admission import (
     StartRequest,
     Watching,
@@ -30,6 +31,8 @@ from action_assistant.runner.start.admission import (
 from action_assistant.runner.start.approvals import Approvals
 from action_assistant.runner.start.preflight import not_matched_in
 from action_assistant.umrf.facts import SIMULATED
+from action_assistant.web.auth.graph_seals import Sight
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.workers.lanes import RunInWorker
 
 _MOVING: Final = frozenset({"running", "paused"})
@@ -37,7 +40,8 @@ _MOVING: Final = frozenset({"running", "paused"})
 
 class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Another version of the graph of a run, by value. `continue_from`: the full name of an action
-    to start when the graph continues; `watching`: as in `StartRequest`."""
+    to start when the graph continues; `watching`, `sight`: as in
+    `StartRequest`."""
 
     version: str
     digest: str
@@ -45,6 +49,7 @@ class ModifyRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_
     continue_from: str = ""
     override: Override | None = None
     watching: Watching = {}
+    sight: Sight | None = None
 
 
 async def pause(opened: OpenRun, author: Author) -> Run:
@@ -83,13 +88,16 @@ async def modify(
     approvals: Approvals,
     run_in_worker: RunInWorker,
     require: Callable[[Claim], None],
+    sight: RunSight,
+    identity: Identity,
 ) -> Run:
     """Give a running graph another structure, in the name of `author`, and return the run. `body`
     is an encoded ModifyRequest; `engine` is None for a simulated run; `approvals` checks the yes of
     a second person, where the robot demands it; `require` raises a refusal if the author may not
-    start this on its robot. Raise BadInput if the body is wrong, Conflict if
-    the run or its engine does not allow the change, Unavailable if the message could not be sent,
-    and OutcomeUnknown if it cannot be known whether the engine has made the change."""
+    start this on its robot; `sight` knows which graphs `identity` and others may see. Raise BadInput if
+    the body is wrong, Forbidden for a graph that the author may not see, Conflict if the run or its
+    engine does not allow the change, Unavailable if the message could not be sent, and OutcomeUnknown if
+    it cannot be known whether the engine has made the change."""
     run = opened.run
     _require_moving(run)
     if not opened.pauses:
@@ -99,6 +107,7 @@ async def modify(
         )
     asked = decoded(body, ModifyRequest)
     watching = watched_in(asked.watching, run.robots)
+    await _require_sight(asked, run, sight, identity)
     facts = SIMULATED if engine is None else engine.facts
     start = _as_start(asked, run)
     ready = await run_in_worker(prepared, start, facts, run.id)
@@ -124,6 +133,22 @@ async def modify(
     except EngineRefused as why:
         raise Conflict(f"The engine refuses the change: {why}") from why
     return opened.run
+
+
+async def _require_sight(
+    asked: ModifyRequest, run: Run, sight: RunSight, identity: Identity
+) -> None:
+    """Check the sight of the new version of a run. Raise Conflict if it may show graphs that the
+    version of the start did not show, since the rules of these say who may see the run."""
+    digest = "" if asked.sight is None else asked.sight.digest  # of the graphs inside, too
+    await sight.accept(asked.sight, asked.version, (digest,), identity)
+    if not sight.has_rules or run.unsighted:
+        return
+    if asked.sight is None or not set(asked.sight.graphs) <= set(run_graphs(run).graphs):
+        raise Conflict(
+            "It is not known who may see all graphs of this version. Stop the run, and start the version.",
+            where={"path": "/sight"},
+        )
 
 
 def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:

@@ -19,6 +19,7 @@ from action_assistant.runner.robots.engine import KnownEngine, foreign_graphs
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import Claim, RightCode
 from action_assistant.runner.runs.events import Author, Requested
+from action_assistant.runner.runs.sight import RunSight
 from action_assistant.runner.start.led_items import IndexingWords, indexing_item, led_item
 from action_assistant.runner.start.preflight import Item, is_blocking
 from action_assistant.runner.start.rights_registry import RightsRegistry
@@ -67,8 +68,10 @@ class LedLook:
         foreign_stops: ForeignStopLoop,
         indexing: IndexingWords,
         rights: RightsRegistry,
+        sight: RunSight,
     ) -> None:
         self._runs = runs
+        self._sight = sight
         self._rights = rights
         self._foreign_stops = foreign_stops
         self._indexing = indexing
@@ -134,7 +137,8 @@ class LedLook:
             raise NoAnswer("something that others have started is being stopped there")
         others = foreign_graphs(answer, self._runs.on(name))
         if others:
-            raise NoAnswer(f"somebody else runs {others[0]} there")
+            what = "a graph" if self._sight.has_rules else others[0]
+            raise NoAnswer(f"somebody else runs {what} there")
         taken = self._runs.occupying(name, apart_from=run.run)
         if taken is not None:
             raise NoAnswer(f"run {taken.number} is {taken.state} there")

@@ -13,7 +13,7 @@ import anyio
 import msgspec
 from sqlalchemy import Row
 
-from action_assistant.errors import Conflict, NotFound
+from action_assistant.errors import Conflict, Forbidden, NotFound
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution import interventions
 from action_assistant.runner.execution.conducted_steps import Word
@@ -32,6 +32,7 @@ from action_assistant.runner.robots.registration import (
     HolderShown,
     Robot,
     registration_of,
+    seen_by,
     with_rights,
 )
 from action_assistant.runner.robots.registry import Robots
@@ -42,6 +43,7 @@ from action_assistant.runner.runs.events import Author, Ended
 from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal, whole_of
 from action_assistant.runner.runs.recorder import RunRecorder
 from action_assistant.runner.runs.run import Press, Run, go_on_press, outcome_press
+from action_assistant.runner.runs.sight import RunGraphs, Unseen, run_graphs
 from action_assistant.runner.runs.views import microseconds, time
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import (
@@ -97,6 +99,7 @@ class ExecutionService:
     ) -> None:
         self.robots = robots
         self.history = RunHistory(runtime.journal, past)
+        self.sight: Final = sources.sight
         self.approvals: Final = Approvals(runtime.journal, runtime.clock_us)
         self._runtime = runtime
         self._robot_watchers: list[Callable[[], None]] = []
@@ -105,6 +108,7 @@ class ExecutionService:
         self._stops = StopOrder()
         self.foreign_stops: Final = ForeignStopLoop(robots, runtime, self._robots_changed)
         self._runs = OpenRuns(robots, self.history, runtime)
+        self._runs.watch(self._remember_sight)
         self.open: Final = self._runs.by_id
         self._late_activity = LateActivity(self._runs, self.history, robots, runtime)
         self.rights: Final = RightsRegistry(
@@ -115,6 +119,7 @@ class ExecutionService:
             self.foreign_stops,
             IndexingWords(runtime.journal, runtime.clock_us),
             self.rights,
+            sources.sight,
         )
         self._checks = StartChecks(
             self._runs,
@@ -171,6 +176,11 @@ class ExecutionService:
         """Call `watcher` with every run that has changed, at once and on the event loop."""
         self._runs.watch(watcher)
 
+    def _remember_sight(self, opened: OpenRun) -> None:
+        """Remember who may see a run: its robot may hold its graph long after it is over."""
+        if not opened.is_led and self.sight.known(opened.run.id) is None:
+            self.sight.remember(opened.run.id, run_graphs(opened.run))
+
     def watch_robots(self, watcher: Callable[[], None]) -> None:
         """Call `watcher` whenever a robot has changed, at once."""
         self._robot_watchers.append(watcher)
@@ -209,8 +219,11 @@ class ExecutionService:
         self, group: GroupRequest, starter: str = "", identity: Identity | None = None
     ) -> list[Preflight]:
         """Return the pre-flight of a start on each engine; `starter` is the id of the person who
-        would start, `identity` as for `start`. Only a get is sent."""
-        return await self._checks.look(group, identity or _operator(Author(starter, "")))
+        would start, `identity` as for `start`. Only a get is sent. Raise Forbidden if the starter may
+        not see the graph, or one inside."""
+        by = identity or _operator(Author(starter, ""))
+        await self._checks.require_sight(group, by)
+        return await self._checks.look(group, by)
 
     def under_way(self, request_id: str) -> bool:
         """Return whether the start, or the start of a group, with this request id is being carried
@@ -321,6 +334,8 @@ class ExecutionService:
             approvals=self.approvals,
             run_in_worker=self._runtime.run_in_worker,
             require=partial(self._require_rights, opened.run, author, identity),
+            sight=self.sight,
+            identity=identity or _operator(author),
         )
 
     async def go_on(
@@ -384,6 +399,8 @@ class ExecutionService:
         if opened.run.led is None:
             raise Conflict("Only a run that is led has further starts to hand over.")
         by, receiver = identity or _operator(author), self.rights.require_present(to)
+        if self.sight.hides(run_graphs(opened.run), receiver):
+            raise Forbidden("That person may not see the graph of this run.")
         robots = opened.run.robots
         events = self.rights.handing(robots, run, receiver, by, author)
         self.rights.require(set(robots) - set(events), receiver)
@@ -456,6 +473,15 @@ class ExecutionService:
         """Return a run, open or over. Raise NotFound if there is no such run."""
         return await self._runs.find(run)
 
+    def graphs_now(self, run: str) -> RunGraphs | None:
+        """Return the facts that decide who may see an open run, or one that was open in this process;
+        None for any other id. A piece has those of its whole run."""
+        whole = whole_of(run) or run
+        opened = self.open.get(whole) or self.open.get(run)
+        if opened is None or opened.run.piece is not None:
+            return self.sight.known(whole) or self.sight.known(run)
+        return run_graphs(opened.run)
+
     @property
     def shown(self) -> dict[str, OpenRun]:
         """The open runs that people see, by id: all but the pieces that a conductor leads."""
@@ -484,15 +510,21 @@ class ExecutionService:
             return await self.history.run(run)
         raise NotFound("There is no such run.")
 
-    def robot_views(self) -> list[Robot]:
-        """Return all engines as people see them, the simulator first."""
-        return [self._with_rights(each) for each in self.robots.all(self.foreign_stops.trouble)]
+    def robot_views(self, unseen: Unseen | None = None) -> list[Robot]:
+        """Return all engines as people see them, the simulator first. `unseen`: the graphs that the
+        reader may not see."""
+        return [
+            seen_by(self._with_rights(each), unseen, self.graphs_now)
+            for each in self.robots.all(self.foreign_stops.trouble)
+        ]
 
-    def robot_view(self, name: str) -> Robot:
-        """Return one engine as people see it. Raise NotFound if no robot has this name."""
+    def robot_view(self, name: str, unseen: Unseen | None = None) -> Robot:
+        """Return one engine as people see it; `unseen` as above. Raise NotFound if no robot has this
+        name."""
         if name == SIMULATOR:
             return next(self.robots.all())
-        return self._with_rights(self.robots.robot(name, self.foreign_stops.trouble))
+        robot = self._with_rights(self.robots.robot(name, self.foreign_stops.trouble))
+        return seen_by(robot, unseen, self.graphs_now)
 
     def _with_rights(self, plain: Robot) -> Robot:
         """Return a robot with its rights and the holder of its baton."""

@@ -24,8 +24,9 @@ from action_assistant.runner.links.port import CONDUCTED, SIMULATOR, Answer, Lin
 from action_assistant.runner.links.simulator import LeadableLink, Simulator
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.runs.events import Author, Overridden
+from action_assistant.runner.runs.events import Author, Overridden, Requested
 from action_assistant.runner.runs.sent_graphs import SentSubgraph
+from action_assistant.runner.runs.sight import NO_RULES, RunSight, Unseen
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start import preflight
 from action_assistant.runner.start.admission import (
@@ -59,18 +60,21 @@ _COURSES_S: Final = 5.0  # a pre-flight waits at most so long for expected cours
 _MOST_OVERRIDDEN: Final = 40  # overridden problems that are stored with a run
 
 #: Checks the expected courses of a graph, by its id, against a text of it and the graphs inside.
-CoursesOf: TypeAlias = Callable[[str, bytes, Sequence[SentSubgraph]], Awaitable[CheckedCourses]]
+CoursesOf: TypeAlias = Callable[
+    [str, bytes, Sequence[SentSubgraph], Unseen | None], Awaitable[CheckedCourses]
+]
 
 
 class StartSources(msgspec.Struct, frozen=True):
     """Further sources that a start needs: the folder of Python `behaviours` of simulated actions,
     the check of expected `courses`, the index folders by robot, and the release of a graph by its
-    digest (`release_of`)."""
+    digest (`release_of`), and who may see which graphs."""
 
     behaviours: BehaviourFolder | None = None
     courses: CoursesOf | None = None
     index_folders: Mapping[str, Path] = {}
     release_of: ReleaseOf = nothing_released
+    sight: RunSight = NO_RULES
 
 
 NO_SOURCES: Final = StartSources()
@@ -146,6 +150,23 @@ class StartChecks:
         self._simulator = simulator
         self._sources = sources
         self._prefixes = Workspace.of(os.environ).prefixes
+
+    async def require_sight(self, request: StartRequest | GroupRequest, starter: Identity) -> None:
+        """Verify the sight of a version, and check that the starter may see all of its graphs. Raise
+        what `RunSight.accept` raises."""
+        sight, digests = self._sources.sight, (request.digest, request.tree_digest)
+        await sight.accept(request.sight, request.version, digests, starter)
+        sight.require_graphs(starter, request.graph, *(each.graph for each in request.subgraphs))
+
+    def with_sight(
+        self, requested: Requested, request: StartRequest, starter: Identity
+    ) -> Requested:
+        """Return the first event of a run with the facts that say who may see it. Raise Forbidden if
+        the starter may not see the graph that its text names."""
+        sight = self._sources.sight
+        sight.require_graphs(starter, requested.graph)
+        unsighted = request.sight is None and sight.has_rules
+        return msgspec.structs.replace(requested, sight=request.sight, unsighted=unsighted)
 
     async def accept(self, request: StartRequest, starter: Identity) -> AcceptedStart:
         """Take a request through all checks that may refuse it, and wait for the answer of the
@@ -304,6 +325,7 @@ class StartChecks:
             open_runs=open_runs,
             settled=self._late_activity.settled_on(name),
             index_folder=self._sources.index_folders.get(name),
+            names_graphs=not self._sources.sight.has_rules,
         )
 
     async def _decide(
@@ -370,7 +392,10 @@ class StartChecks:
         starting a graph of this name."""
         longest_ms = self._robots.reachable(engine).facts.longest_loading_ms
         other = self._runs.occupying(engine, graph_name)
-        return preflight.free_item(engine, other, graph_name, longest_ms, self._clock_us())
+        names_graphs = not self._sources.sight.has_rules
+        return preflight.free_item(
+            engine, other, graph_name, longest_ms, self._clock_us(), names_graphs=names_graphs
+        )
 
     async def _behaviours_for(self, ready: Prepared) -> BehaviourFolder:
         """Return the folder of Python behaviours of simulated actions, after a check that all those
@@ -415,7 +440,7 @@ class StartChecks:
             found[engine] = await self._look(group.for_engine(engine), starter)
 
         async def check_courses() -> None:
-            courses.extend(await self._course_items(group))
+            courses.extend(await self._course_items(group, starter))
 
         async with anyio.create_task_group() as tasks:
             tasks.start_soon(check_courses)
@@ -512,7 +537,7 @@ class StartChecks:
         item = await self._approvals.item(robot.registration, ready.tree_digest, starter.person.id)
         return [] if item is None else [item]
 
-    async def _course_items(self, group: GroupRequest) -> Sequence[Item]:
+    async def _course_items(self, group: GroupRequest, starter: Identity) -> Sequence[Item]:
         """Return the items that say whether the graph takes its expected courses (recorded runs
         that it has to repeat); () if there is nothing to check. They only warn and never block a
         start, even if the courses could not be checked."""
@@ -520,7 +545,10 @@ class StartChecks:
             return ()
         try:
             with anyio.fail_after(_COURSES_S):
-                found = await self._sources.courses(group.graph, bytes(group.umrf), group.subgraphs)
+                unseen = self._sources.sight.unseen(starter)
+                found = await self._sources.courses(
+                    group.graph, bytes(group.umrf), group.subgraphs, unseen
+                )
                 return preflight.course_items(found)
         except TimeoutError:
             why = f"That takes longer than {_COURSES_S:.0f} s."

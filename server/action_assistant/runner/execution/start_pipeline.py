@@ -85,6 +85,7 @@ class StartPipeline:
             known = await self._known(request)
             if known is not None:
                 return Started(known, fresh=False)
+            await self._checks.require_sight(request, starter)
             async with self.turns(engines_of(request)):
                 accepted = await self._checks.accept(request, starter)
                 run = await self._store_and_hand_over(accepted, author, starter, stops)
@@ -112,6 +113,7 @@ class StartPipeline:
                 ]
                 failed = dict.fromkeys(missing, "It was not started with the others.")
                 return Grouped(known[0].group or "", known, failed, fresh=False)
+            await self._checks.require_sight(group, starter)
             async with self.turns(group.engines):
                 accepted = await self._checks.accept_all(requests, starter)
                 return await self._hand_over_group(accepted, author, starter, stops)
@@ -161,6 +163,7 @@ class StartPipeline:
         claim = claim_of(accepted.request, accepted.prepared)
         watching = tuple(sorted(claim.watching))
         requested = msgspec.structs.replace(requested, batons=batons, watching=watching)
+        requested = self._checks.with_sight(requested, accepted.request, starter)
         await self._checks.give_words(accepted, author)
         self._checks.require_free(accepted)
         self._rights.require(robots, starter, claim)

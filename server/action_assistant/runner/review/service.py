@@ -6,7 +6,7 @@ import anyio
 import msgspec
 from sqlalchemy import select
 
-from action_assistant.errors import NotFound
+from action_assistant.errors import Conflict, NotFound
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.analysis import annotations, expected_runs
 from action_assistant.runner.archives import examples
@@ -17,6 +17,7 @@ from action_assistant.runner.review.worker_queries import WorkerQueries
 from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.recorder import RunRecorder, stream_of
 from action_assistant.runner.runs.run import Run
+from action_assistant.runner.runs.sight import Unseen
 from action_assistant.schema.runner_tables import expectation, review, run_label
 
 
@@ -110,22 +111,30 @@ class ReviewService:
     # --- expectations -------------------------------------------------------------------------
 
     async def expect(
-        self, wanted: expected_runs.Expect, author: Author
+        self, wanted: expected_runs.Expect, author: Author, unseen: Unseen | None = None
     ) -> expected_runs.Expectation:
         """Save an expected course in the name of `author`. `wanted`: a run, or a graph with a
-        script. Raise NotFound for an unknown run; BadInput, NotUmrf or TooLarge for a bad request;
+        script; `unseen`: the graphs that the author may not see, whose courses are not replaced. Raise NotFound for an unknown run; BadInput, NotUmrf or TooLarge for a bad request;
         Conflict if the simulator takes another course than the run."""
         name = expected_runs.name_of(wanted.name)
+        if await self._is_hidden(name, unseen):
+            raise Conflict("This name is taken. Choose another one.", where={"path": "/name"})
         now = self._clock_us()
         await self._queries.wait_until_stored(wanted.run)
         saved = await self._queries.value(StoredRuns.expected, wanted, name, author, now)
         await self._journal.append(expected_runs.STREAM, [draft_of(saved, author.id)])
         return expected_runs.expectation_view(saved)
 
-    async def retire(self, name: str, author: Author) -> None:
-        """Remove the expected course of this name. `author`: who removes it. Raise NotFound if
-        there is no such course."""
-        if not await self._journal.query(select(expectation).where(expectation.c.name == name)):
+    async def _is_hidden(self, name: str, unseen: Unseen | None) -> bool:
+        if unseen is None:
+            return False
+        return await self._queries.value(StoredRuns.hides_expectation, name, unseen)
+
+    async def retire(self, name: str, author: Author, unseen: Unseen | None = None) -> None:
+        """Remove the expected course of this name. `author`: who removes it; `unseen`: the graphs that
+        they may not see. Raise NotFound if there is no such course that they may see."""
+        rows = await self._journal.query(select(expectation).where(expectation.c.name == name))
+        if not rows or await self._is_hidden(name, unseen):
             raise NotFound(f"Nothing is expected under the name {name!r}.")
         retired = expected_runs.Retired(self._clock_us(), name, author)
         await self._journal.append(expected_runs.STREAM, [draft_of(retired, author.id)])

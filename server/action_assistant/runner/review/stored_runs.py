@@ -30,14 +30,16 @@ from action_assistant.runner.robots.recordings import Recording, hours
 from action_assistant.runner.robots.robot_events import stream_of_robot
 from action_assistant.runner.runs import queries, views, word_index
 from action_assistant.runner.runs.events import Author, Observed, decode, said_in
-from action_assistant.runner.runs.history import RunHistory
+from action_assistant.runner.runs.history import RunHistory, whole_of
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import Sent, SentSubgraph, read_sent, sent_of
 from action_assistant.runner.runs.shared_view import SharedRun, shared_run
+from action_assistant.runner.runs.sight import RunGraphs, Unseen, graphs_requested
 from action_assistant.schema.runner_tables import (
     expectation,
     robot,
+    run,
     runner_event,
     runner_head,
     runner_written_by,
@@ -109,6 +111,7 @@ class StoredRuns:
         self.keyframe_store = KeyframeStore(journal)
         self._journal = journal
         self._history = RunHistory(journal)
+        self._old_runs: dict[str, RunGraphs] = {}
 
     async def made_keyframes(self, run_id: str) -> int:
         """Make the keyframes of a run, and return the seq of its last keyframe. Raise NotFound if
@@ -123,6 +126,34 @@ class StoredRuns:
         graph = None if good else await self._graph(run_id)  # only a run that went badly has causes
         said = await self._said(run_id)
         return annotations.sum_of(found, graph, now, said)
+
+    async def run_graphs(self, run_id: str) -> RunGraphs | None:
+        """Return the facts that decide who may see a run, those of the whole run for a piece; None if
+        there is no such run. Raise Unavailable if the journal cannot be read."""
+        columns = (run.c.id, run.c.author_id, run.c.graph, run.c.summary)
+        whole = whole_of(run_id) or run_id
+        rows = await self.rows(select(*columns).where(run.c.id.in_([run_id, whole])))
+        return await self._graphs_of(rows[0]) if rows else None
+
+    async def _graphs_of(self, row: Row[Any]) -> RunGraphs:
+        """Return the same facts by the row of a run. Rows of earlier versions do not have the graphs
+        inside, which then stand in the first event."""
+        if "inside" in row.summary:
+            graphs = dict.fromkeys([row.graph, *row.summary["inside"]])
+            of = tuple(each for each in graphs if each)
+            return RunGraphs(row.author_id, of, row.summary.get("unsighted", False))
+        if row.id not in self._old_runs:
+            try:
+                self._old_runs[row.id] = graphs_requested(await self._history.requested(row.id))
+            except (Archived, NotFound, msgspec.DecodeError):  # its contents cannot be read either
+                return RunGraphs(row.author_id, (row.graph,) if row.graph else ())
+        return self._old_runs[row.id]
+
+    async def _hidden(self, unseen: Unseen | None, rows: Sequence[Row[Any]]) -> set[str]:
+        """Return the ids of those of these runs that a person may not see."""
+        if unseen is None:
+            return set()
+        return {row.id for row in rows if unseen.hides(await self._graphs_of(row))}
 
     async def _said(self, run_id: str) -> list[str]:
         """Return the texts in the first events of a run that people may search for, in the order of
@@ -140,12 +171,13 @@ class StoredRuns:
                 continue
         return list(texts)
 
-    async def whole(self, run_id: str) -> views.RunWhole:
-        """Return a run that is over, with the graph as it was sent. Raise NotFound if there is no
-        such run."""
+    async def whole(self, run_id: str, is_all: bool = True) -> views.RunWhole:
+        """Return a run that is over, with the graph as it was sent; unless `is_all`, as somebody who
+        may not see its graph is shown it. Raise NotFound if there is no such run."""
         sent = await self.sent(run_id)
         found, place = await self.known(run_id), await self.place(run_id)
-        return views.whole_view(found, sent, place=place)
+        shown = views.whole_view(found, sent, place=place)
+        return shown if is_all else views.hidden(shown)
 
     async def shared(self, run_id: str) -> SharedRun:
         """Return a run that is over as a link shows it. Raise NotFound if there is no such run."""
@@ -368,10 +400,14 @@ class StoredRuns:
 
     # --- many runs ----------------------------------------------------------------------------
 
-    async def statistics(self, graph: str, engine: str | None, last: int) -> statistics.Statistics:
-        """Return statistics of the newest runs of a graph, at most `last` runs. With `engine`, only
-        runs on that engine count."""
+    async def statistics(
+        self, graph: str, engine: str | None, last: int, unseen: Unseen | None = None
+    ) -> statistics.Statistics:
+        """Return statistics of the newest runs of a graph, at most `last` runs, without those that the
+        person of `unseen` may not see. With `engine`, only runs on that engine count."""
         rows = await self._journal.query(statistics.runs_of(graph, engine, min(last, _LAST)))
+        hidden = await self._hidden(unseen, rows)
+        rows = [row for row in rows if row.id not in hidden]
         ids = [row.id for row in rows]
         sums: list[Row[Any]] = []
         for i in range(0, len(ids), _ROWS):
@@ -412,11 +448,16 @@ class StoredRuns:
         wanted: queries.Filter,
         limit: int,
         open_runs: Mapping[str, views.RunSummary],
+        unseen: Unseen | None = None,
     ) -> list[views.Listed]:
         """Return at most `limit` runs that fit the filter `wanted`, newest first. `open_runs`:
-        summaries of open runs by id, whose states the tables do not have."""
+        summaries of open runs by id, whose states the tables do not have. Runs that the person of
+        `unseen` may not see show little, and are left out if the filter asks for what they hide."""
         among = None if wanted.text is None else await numbers_with(wanted.text, self.rows)
-        rows = await self.rows(queries.listed(wanted, limit, among))
+        rows = await self.rows(queries.listed(wanted, limit, among, unseen))
+        hidden = await self._hidden(unseen, rows)
+        if wanted.asks_for_content:
+            rows = [row for row in rows if row.id not in hidden]
         labels = await self._labels(rows)
         shown = (
             views.list_entry(
@@ -424,7 +465,8 @@ class StoredRuns:
             )
             for row in rows
         )
-        return [each for each in shown if not wanted.states or each.state in wanted.states]
+        projected = (views.hidden(each) if each.id in hidden else each for each in shown)
+        return [each for each in projected if not wanted.states or each.state in wanted.states]
 
     async def _labels(self, rows: Sequence[Row[Any]]) -> dict[str, list[str]]:
         found: dict[str, list[str]] = {}
@@ -443,17 +485,44 @@ class StoredRuns:
         ]
         return events[-1].seq if events else after, b"".join(lines)
 
-    async def expectations(self) -> list[expected_runs.Expectation]:
-        """Return all expected courses, by name."""
-        return [expected_runs.expectation_view(saved) for saved in await self._all_saved()]
+    async def expectations(self, unseen: Unseen | None = None) -> list[expected_runs.Expectation]:
+        """Return all expected courses that the person of `unseen` may see, by name."""
+        saved = await self._seen(unseen, await self._all_saved())
+        return [expected_runs.expectation_view(each) for each in saved]
 
     async def checked_courses(
-        self, graph: str, umrf: bytes, subgraphs: Sequence[SentSubgraph] = ()
+        self,
+        graph: str,
+        umrf: bytes,
+        subgraphs: Sequence[SentSubgraph] = (),
+        unseen: Unseen | None = None,
     ) -> CheckedCourses:
         """Check the saved expected courses of a graph (its id) against this text of it and its
-        sub-graphs. Raise BadInput, NotUmrf or TooLarge if the text cannot be read."""
-        saved = await self._all_saved(expectation.c.graph == graph)
+        sub-graphs, as far as the person of `unseen` may see them. Raise BadInput, NotUmrf or TooLarge
+        if the text cannot be read."""
+        saved = await self._seen(unseen, await self._all_saved(expectation.c.graph == graph))
         return check_courses(saved, umrf, subgraphs=subgraphs)
+
+    async def hides_expectation(self, name: str, unseen: Unseen) -> bool:
+        """Return whether there is an expected course of this name which the person of `unseen` may not
+        see."""
+        saved = await self._all_saved(expectation.c.name == name)
+        return len(await self._seen(unseen, saved)) < len(saved)
+
+    async def _seen(
+        self, unseen: Unseen | None, saved: list[expected_runs.Expected]
+    ) -> list[expected_runs.Expected]:
+        """Return those expected courses whose graphs, and whose run, the person may see."""
+        if unseen is None:
+            return saved
+        found = []
+        for each in saved:
+            graphs = (each.graph, *(inside.graph for inside in each.subgraphs))
+            of = RunGraphs("", tuple(graph for graph in graphs if graph))
+            run_of = await self.run_graphs(each.run) if each.run else None
+            if not unseen.hides(of) and (run_of is None or not unseen.hides(run_of)):
+                found.append(each)
+        return found
 
     async def _all_saved(self, *where: ColumnElement[bool]) -> list[expected_runs.Expected]:
         asked = select(expectation).where(*where).order_by(expectation.c.name)

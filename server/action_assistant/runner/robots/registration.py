@@ -1,7 +1,7 @@
 """The registration of a robot, and the view of a robot that pages get."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import datetime
 from typing import Any, ClassVar, Final, Literal, TypeAlias
 
@@ -19,6 +19,7 @@ from action_assistant.runner.links.port import (
 )
 from action_assistant.runner.robots.engine import KnownEngine
 from action_assistant.runner.robots.rights import Drilled, RobotRights
+from action_assistant.runner.runs.sight import HIDDEN_NAME, RunGraphs, Unseen
 from action_assistant.runner.runs.views import time
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.facts import BadProfile, facts_of
@@ -240,6 +241,33 @@ def drill_view(drill: Drilled) -> DrillShown:
         hardware_stop=drill.hardware_stop,
         failure=drill.failure,
     )
+
+
+def seen_by(
+    robot: Robot, unseen: Unseen | None, graphs_of: Callable[[str], RunGraphs | None]
+) -> Robot:
+    """Return a robot without the names of graphs that a person may not see, and without sub-graphs of
+    these. While there are such graphs, those that others started have no names either: nobody knows
+    what these are. `graphs_of`: returns the facts about a run that decide who may see it, if they are known."""
+    if unseen is None or not robot.holds:
+        return robot
+    everywhere = not unseen.is_some
+    named = {}
+    for each in robot.holds:
+        if each.run is not None:
+            graphs = graphs_of(each.run)
+            named[each.graph] = everywhere if graphs is None else not unseen.hides(graphs)
+
+    def seen() -> Iterator[HeldGraph]:
+        for held in robot.holds:
+            top = next((name for name in named if held.graph.startswith(f"{name}__")), None)
+            if named.get(held.graph, everywhere if top is None else named[top]):
+                yield held
+            elif top is None or held.run is not None:
+                stopping = None if held.stopping is None else ""
+                yield replace(held, graph=HIDDEN_NAME, stopping=stopping)
+
+    return replace(robot, holds=tuple(seen()))
 
 
 def with_rights(

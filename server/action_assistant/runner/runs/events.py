@@ -17,6 +17,7 @@ from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.caller import stamped
+from action_assistant.web.auth.graph_seals import Sight
 
 End: TypeAlias = Literal["finished", "halted", "stopped", "error", "refused", "lost"]
 
@@ -119,6 +120,8 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     batons: tuple[str, ...] = ()  # the robots whose baton the author held
     watching: tuple[str, ...] = ()  # the robots that the author said to watch
     drill: bool = False  # the start was for a Stop drill
+    sight: Sight | None = None  # the rules of its graphs at the start, if the client sent them
+    unsighted: bool = False  # there were rules, and it did not: only its author and owners see it
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -60,6 +60,7 @@ from action_assistant.runner.runs.run import (
     go_on_press,
     outcome_press,
 )
+from action_assistant.runner.runs.sight import graphs_inside
 from action_assistant.runner.runs.visits import (
     KEPT,
     ActionRun,
@@ -120,6 +121,7 @@ def begin(event: Requested) -> Run:
             for name, aid in event.actions.items()
         },
         inner=event.inner_laps,
+        inside=graphs_inside(event.sight, event.subgraphs),
         needs=known.needs,
         stoppable=known.stops,
     )

@@ -25,6 +25,7 @@ from sqlalchemy import (
 from sqlalchemy.sql.selectable import TableValuedAlias
 
 from action_assistant.runner.links.port import CONDUCTED
+from action_assistant.runner.runs.sight import Unseen
 from action_assistant.schema.runner_tables import (
     FAILED,
     review,
@@ -93,13 +94,28 @@ class Filter(msgspec.Struct, frozen=True, kw_only=True):
     until: int | None = None
     before: str | None = None
 
+    @property
+    def asks_for_content(self) -> bool:
+        """Return whether a run fits only by something that is hidden from a person who may not see
+        its graph."""
+        named = (self.graph, self.version, self.text, self.label, self.pinned, self.failed)
+        return any(each is not None for each in named)
 
-def listed(wanted: Filter, limit: int, among: Iterable[int] | None = None) -> Select[Any]:
+
+def listed(
+    wanted: Filter,
+    limit: int,
+    among: Iterable[int] | None = None,
+    unseen: Unseen | None = None,
+) -> Select[Any]:
     """Return the query for at most `limit` of the `wanted` runs with their marks, newest first.
-    `among`: the numbers of the only possible runs, None for any. The table does not have the states
+    `among`: the numbers of the only possible runs, None for any; `unseen`: leave out runs that this
+    person may not see, if the filter asks for what these hide. The table does not have the states
     of open runs, so a filter by `states` returns all open ones, too."""
     query = select(run, review.c.pinned, review.c.note)
     query = query.outerjoin(review, review.c.run == run.c.id)
+    if unseen is not None and wanted.asks_for_content:
+        query = query.where(_seen_by(unseen))
     if among is not None:
         numbers = func.json_each(msgspec.json.encode(sorted(among)).decode()).table_valued("value")
         query = query.where(run.c.number.in_(select(numbers.c.value)))
@@ -185,10 +201,29 @@ def labels_of(runs: Sequence[str]) -> Select[Any]:
     return query.order_by(run_label.c.run, run_label.c.label)
 
 
-def all_labels() -> Select[Any]:
-    """Select up to 200 labels of runs, the most used first."""
+def all_labels(unseen: Unseen | None = None) -> Select[Any]:
+    """Select up to 200 labels of runs, the most used first. `unseen`: only of runs that this person
+    may see."""
     query = select(run_label.c.label).group_by(run_label.c.label)
+    if unseen is not None:
+        query = query.join(run, run.c.id == run_label.c.run).where(_seen_by(unseen))
     return query.order_by(func.count().desc(), run_label.c.label).limit(200)
+
+
+def _seen_by(unseen: Unseen) -> ColumnElement[bool]:
+    """Return a condition that holds for runs that a person may see. Rows of earlier versions do not
+    have the graphs inside."""
+    own = run.c.author_id == unseen.person
+    if unseen.everything:
+        return own
+    listed = func.json_each(msgspec.json.encode(sorted(unseen.graphs)).decode())
+    graphs = listed.table_valued("value", name="unseen")
+    ids = select(graphs.c.value)
+    inside = func.json_each(run.c.summary, "$.inside").table_valued("value", name="inside")
+    is_inside = select(inside.c.value).where(inside.c.value.in_(ids)).exists()
+    is_unsighted = func.json_extract(run.c.summary, "$.unsighted").is_not(None)
+    is_of = func.coalesce(run.c.graph.in_(ids), 0)
+    return or_(own, not_(or_(is_of, is_inside, is_unsighted)))
 
 
 def all_robots() -> Select[Any]:

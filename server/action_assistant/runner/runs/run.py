@@ -130,6 +130,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     batons: tuple[str, ...] = ()  # the robots whose baton the author held at the start
     watching: tuple[str, ...] = ()  # the robots that the author said to watch
     drill: bool = False  # it was started for a Stop drill
+    inside: tuple[str, ...] = ()  # the ids of further graphs whose rules say who may see it
+    unsighted: bool = False  # as in its request
     #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run

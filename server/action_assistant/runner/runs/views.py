@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import UTC, datetime, timedelta
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias, TypeVar
 
 import msgspec
 from msgspec.structs import replace
@@ -14,6 +14,7 @@ from action_assistant.runner.runs.durations import DurationBounds, of_run
 from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override, PieceRest
 from action_assistant.runner.runs.run import Desired, Result, Run, Said, State
 from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgraphs_shown
+from action_assistant.runner.runs.sight import HIDDEN_NAME
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.json.text import UmrfGraph
@@ -36,6 +37,41 @@ _SAME: Final = (
     "result",
 )
 _SAME_TIMES: Final = ("requested_at", "started_at", "ended_at")
+#: The texts of alarms that everybody is shown, whatever they may see of the run.
+_LOOKS: Final = {
+    "stop_unconfirmed": "STOP UNCONFIRMED: look at the robot.",
+    "moves_again": "MOVES AGAIN: look at the robot.",
+}
+_UNPROVEN: Final = "it is not proven that nothing moves: look at the robot"
+#: The fields that a reader who may not see the graph of a run gets without their content.
+_BLANK: Final[dict[str, Any]] = {
+    "hidden": True,
+    "graph": None,
+    "graph_name": HIDDEN_NAME,
+    "version": None,
+    "digest": "",
+    "result": None,
+    "took": None,
+    "detail": "",
+    "held": None,
+    "lead": msgspec.UNSET,
+    "batons": msgspec.UNSET,
+    "cause": "",
+    "pinned": False,
+    "note": "",
+    "labels": [],
+    "archived": None,
+    "like": None,
+    "behaviours": False,
+    "actions": {},
+    "log": [],
+    "umrf": msgspec.Raw(b"{}"),
+    "override": None,
+    "sent": {},
+    "despite": [],
+    "subgraphs": [],
+    "tree_digest": None,
+}
 RestState: TypeAlias = Literal[
     "unused",
     "going",
@@ -164,7 +200,8 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
     further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
-    held at the start; `watching`: those that they said to watch."""
+    held at the start; `watching`: those that they said to watch. `hidden`: the
+    reader may not see its graph, so that little else is given."""
 
     id: str
     number: int
@@ -197,9 +234,13 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     lead: Author | msgspec.UnsetType = msgspec.UNSET
     batons: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     watching: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
+    hidden: bool | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         hold_names(self, "unconfirmed", "detail")
+
+
+SummaryT = TypeVar("SummaryT", bound=RunSummary)
 
 
 class ArchivePlace(msgspec.Struct, frozen=True):
@@ -378,6 +419,29 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
         batons=tuple(more["batons"]) if "batons" in more else msgspec.UNSET,
         watching=tuple(more["watching"]) if "watching" in more else msgspec.UNSET,
     )
+
+
+def hidden(shown: SummaryT) -> SummaryT:
+    """Return the view of a run for a reader who may not see its graph: its robots and their rest, its
+    state, the persons who started and stopped it, and alarms that ask to look at a robot."""
+    values: dict[str, Any] = {
+        **_BLANK,
+        "unconfirmed": None if shown.unconfirmed is None else _UNPROVEN,
+        "at_rest": None if shown.at_rest is None else replace(shown.at_rest, how=""),
+        "alarms": [
+            AlarmShown(each.code, each.at, _LOOKS[each.code])
+            for each in shown.alarms
+            if each.code in _LOOKS
+        ],
+        "robots": None if shown.robots is None else {each: each for each in shown.robots.values()},
+    }
+    if isinstance(shown, RunShown) and isinstance(shown.rests, list):
+        values["rests"] = [
+            RobotRestShown(each.robot, each.state, each.since, by=each.by, stops=each.stops)
+            for each in shown.rests
+        ]
+    known = {name: value for name, value in values.items() if hasattr(shown, name)}
+    return replace(shown, **known)
 
 
 def with_newest_visits(run: Run) -> Run:

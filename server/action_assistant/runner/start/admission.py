@@ -42,6 +42,7 @@ from action_assistant.umrf.model import Action, Graph, Problem
 from action_assistant.umrf.pieces import Obstacle, handed_by, obstacles, piece_name
 from action_assistant.umrf.run_size import RunSize, excess
 from action_assistant.umrf.semantics import SCRIPT, Script, script_from
+from action_assistant.web.auth.graph_seals import Sight
 from action_assistant.web.http.plain_texts import require_plain
 
 T = TypeVar("T")
@@ -69,7 +70,9 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     the digest of the graph together with them. For the engine `conducted`, `robots` gives the robot
     of each actor ("" for actions without one); `lost`: see `Led`. `watching`: true for each robot of
     which the person says that they watch it, with its hardware stop within reach. `drill`: the start is
-    for a Stop drill of its robot, and so needs no earlier one.
+    for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
+    version, as the editor seals them; without it, where there are rules, the run is for its starter
+    and owners.
     """
 
     version: str
@@ -88,6 +91,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     lost: Literal["stop", "wait"] = "stop"
     watching: Watching = {}
     drill: bool = False
+    sight: Sight | None = None
 
 
 class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -137,6 +141,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     lost: Literal["stop", "wait"] = "stop"
     watching: Watching = {}
     drill: bool = False
+    sight: Sight | None = None
 
     def for_engine(self, engine: str) -> StartRequest:
         """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
@@ -158,6 +163,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             if engine == CONDUCTED
             else {name: said for name, said in self.watching.items() if name == engine},
             drill=self.drill,
+            sight=self.sight,
         )
 
 

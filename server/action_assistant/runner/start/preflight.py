@@ -100,7 +100,8 @@ class EngineView(msgspec.Struct, frozen=True, kw_only=True):
     """An engine at the moment of a pre-flight. `took_ms`: milliseconds until it answered a get sent
     for it; `open_runs`: ids of this runner's runs that have no end yet; `settled`: runs that are
     known to be at rest; `index_folder`: the folder that it indexes, where the runner may write
-    there."""
+    there; `names_graphs`: items may name graphs and actions of others, which they do where no graph has
+    a rule."""
 
     name: str
     facts: EngineFacts
@@ -111,6 +112,7 @@ class EngineView(msgspec.Struct, frozen=True, kw_only=True):
     open_runs: Collection[str] = ()
     settled: tuple[Settled, ...] = ()
     index_folder: Path | None = None
+    names_graphs: bool = True
 
 
 def with_verdict(engine: str, items: Sequence[Item], digest: str = "", tree: str = "") -> Preflight:
@@ -168,22 +170,26 @@ def free_item(
     graph_name: str = "",
     longest_loading_ms: int = 0,
     now_us: int = 0,
+    *,
+    names_graphs: bool = True,
 ) -> Item:
     """Return the item for another run on the engine: an engine has one run at a time.
 
     A run of which at most an action is still loading can be overridden, after the longest loading
     time that a person has set for the robot (`longest_loading_ms`, 0 for none), by a start of a
     graph of another name: the Stop of that run goes on. `graph_name` is that of the graph to start;
-    `now_us` is microseconds UTC.
+    `now_us` is microseconds UTC; `names_graphs`: as of `EngineView`.
     """
     if other is None:
         return Item(code="free", verdict="passed", text=f"{engine} has no other run from here.")
+    of = f" of {other.graph_name}" if names_graphs else ""
     text = (
-        f"{engine} is taken by run {other.number} of {other.graph_name}, started by "
+        f"{engine} is taken by run {other.number}{of}, started by "
         f"{other.author.name or 'somebody'}; it is {other.state}."
     )
     if doubt := other.lost or other.doubt:
-        text += f" {doubt.rstrip('.')}. Somebody has to see it at rest and confirm that in the run."
+        text += f" {doubt.rstrip('.')}." if names_graphs else ""
+        text += " Somebody has to see it at rest and confirm that in the run."
     if not _is_only_loading(other) or not longest_loading_ms:
         return Item(code="free", verdict="blocked", text=text)
     waited_s = (now_us - (other.loading_since or now_us)) / 1e6
@@ -385,7 +391,7 @@ def _quiet(view: EngineView, graph: Graph) -> Item:
         )
         return Item(code="quiet", verdict="blocked", text=text)
     if moving:
-        names = ", ".join(moving[:3])
+        names = ", ".join(moving[:3]) if view.names_graphs else "a graph"
         text = f"{view.name} runs {names}, which nobody started from here."
         return Item(code="quiet", verdict="blocked", text=text, codes=("quiet",), overridable=True)
     return Item(code="quiet", verdict="passed", text=f"Nothing else runs on {view.name}.")
@@ -406,7 +412,7 @@ def _rest(view: EngineView) -> Item:
         text = f"No action on {view.name} is known to have been given up by its engine."
         return Item(code="rest", verdict="passed", text=text)
     text = (
-        f"{', '.join(doubted[:3])} on {view.name} did not obey a stop, or failed while it was told to: "
+        f"{', '.join(doubted[:3]) if view.names_graphs else 'A graph'} on {view.name} did not obey a stop, or failed while it was told to: "
         "the engine says ERROR, but the code may still run. Look at the robot; restart its engine."
     )
     return Item(code="rest", verdict="blocked", text=text, codes=("rest",), overridable=True)

@@ -1,0 +1,264 @@
+"""Who may see a run, by the rules of its graphs. The runner verifies them without the editor.
+
+The rules come with the statement in the data folder, and with the sealed sights of starts: of both the
+newest counts for each graph. A run that somebody may not see shows its robot, its state,
+who started it, and Stop.
+"""
+
+import logging
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Final
+
+import msgspec
+from anyio import to_thread
+
+from action_assistant.errors import BadInput, Conflict, Forbidden, Unavailable
+from action_assistant.private_files import make_folder, replace_file
+from action_assistant.random_ids import random_id
+from action_assistant.runner.runs.events import Requested, RunSubgraph
+from action_assistant.runner.runs.run import Run
+from action_assistant.web.auth import graph_seals
+from action_assistant.web.auth.graph_rules import OPEN, Rule, may_see
+from action_assistant.web.auth.graph_seals import GraphSeals, RulesFile, Sight, Statement
+from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.keys import Keys
+from action_assistant.web.auth.roles import OWNER
+
+log: Final = logging.getLogger(__name__)
+
+FILE: Final = "graph-sights.json"
+#: Stands for the name of a graph that the reader may not see.
+HIDDEN_NAME: Final = "a graph that you may not see"
+HIDDEN_RUN: Final = (
+    "This is a run of a graph that you may not see. You may stop it, and nothing else."
+)
+HIDDEN_GRAPH: Final = "You may not see this graph, or a graph inside of it."
+HIDDEN_ON_ROBOT: Final = "This may hold graphs that you may not see."
+_MOST_RUNS: Final = 10_000  # that are remembered
+_MOST_KEPT: Final = 1_000  # identities of which it is remembered what they may not see
+
+
+class RunGraphs(msgspec.Struct, frozen=True):
+    """The facts that decide who may see a run: the id of the person who started it, the ids of its
+    graph and of all graphs inside, and whether it was started without a sight while there were
+    rules. Then only its starter and owners see it."""
+
+    author: str
+    graphs: tuple[str, ...]
+    unsighted: bool = False
+
+
+class Unseen(msgspec.Struct, frozen=True):
+    """The graphs that one person may not see. `everything`: the rules cannot be read, so that only
+    own runs are shown."""
+
+    person: str
+    graphs: frozenset[str] = frozenset()
+    everything: bool = False
+
+    @property
+    def is_some(self) -> bool:
+        """Return whether there is a graph that the person may not see."""
+        return self.everything or bool(self.graphs)
+
+    def hides(self, run: RunGraphs) -> bool:
+        """Return whether the person may not see a run."""
+        if run.author == self.person:
+            return False
+        return self.everything or run.unsighted or not self.graphs.isdisjoint(run.graphs)
+
+
+def names_seen(names: Mapping[str, list[str]], unseen: Unseen | None) -> dict[str, list[str]]:
+    """Return the names of graphs that others started, by robot; none is named to a person who may not
+    see some graph, since nobody knows what these are."""
+    if unseen is None or not unseen.is_some:
+        return dict(names)
+    return {robot: [HIDDEN_NAME] * len(graphs) for robot, graphs in names.items()}
+
+
+def run_graphs(run: Run) -> RunGraphs:
+    """Return the facts about a run that decide who may see it."""
+    return RunGraphs(run.author.id, _ids(run.graph, *run.inside), run.unsighted)
+
+
+def graphs_inside(sight: Sight | None, subgraphs: tuple[RunSubgraph, ...]) -> tuple[str, ...]:
+    """Return the ids of graphs that a run shows beside its own one, each once."""
+    return _ids(*(each.graph for each in subgraphs), *(sight.graphs if sight is not None else ()))
+
+
+def graphs_requested(first: Requested) -> RunGraphs:
+    """Return the facts about a run by its first event."""
+    inside = graphs_inside(first.sight, first.subgraphs)
+    return RunGraphs(first.author.id, _ids(first.graph, *inside), first.unsighted)
+
+
+def _ids(*graphs: str | None) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(each for each in graphs if each))
+
+
+class _Learned(msgspec.Struct, frozen=True, array_like=True):
+    """The rule of a graph that came with a start, and when it counted."""
+
+    at: int
+    rule: Rule
+
+
+class RunSight:
+    """Knows who may see which runs. Without a data folder there are no rules."""
+
+    def __init__(self, data: Path | None = None, keys: Keys | None = None) -> None:
+        self._rules = None if data is None or keys is None else RulesFile(data, keys)
+        self._seals = None if keys is None else GraphSeals(keys)
+        self._data = data
+        self._learned: dict[str, _Learned] = {}
+        self._is_unread = False
+        self._counted: tuple[Statement | None, dict[str, Rule]] | None = None
+        self._unseen: dict[tuple[str, frozenset[str]], Unseen] = {}
+        self._of_runs: dict[str, RunGraphs] = {}
+        if data is not None:
+            self._read_learned(data / FILE)
+
+    # --- what somebody may see ----------------------------------------------------------------
+
+    def unseen(self, identity: Identity | None) -> Unseen | None:
+        """Return the graphs that an identity may not see; None if it sees everything, as owners do,
+        and as everybody does while there are no rules. An identity of None has ended."""
+        if identity is not None and identity.person.role == OWNER:
+            return None
+        counting = self._counting()
+        if not counting and not self._is_dark():
+            return None
+        if identity is None:
+            return Unseen("", everything=True)
+        if self._is_dark():
+            return Unseen(identity.person.id, everything=True)
+        key = (identity.person.id, identity.groups)
+        if key not in self._unseen:
+            if len(self._unseen) >= _MOST_KEPT:
+                self._unseen.clear()
+            refused = {rule for rule in set(counting.values()) if not may_see(rule, identity)}
+            graphs = frozenset(graph for graph, rule in counting.items() if rule in refused)
+            self._unseen[key] = Unseen(identity.person.id, graphs)
+        return self._unseen[key]
+
+    def hides(self, run: RunGraphs, identity: Identity | None) -> bool:
+        """Return whether an identity may not see a run."""
+        unseen = self.unseen(identity)
+        return unseen is not None and unseen.hides(run)
+
+    def known(self, run: str) -> RunGraphs | None:
+        """Return what was remembered of a run; None for any other id."""
+        return self._of_runs.get(run)
+
+    def remember(self, run: str, graphs: RunGraphs) -> None:
+        """Remember the facts about a run that decide who may see it. They never change."""
+        if len(self._of_runs) >= _MOST_RUNS:
+            del self._of_runs[next(iter(self._of_runs))]
+        self._of_runs[run] = graphs
+
+    @property
+    def has_rules(self) -> bool:
+        """Return whether any graph has a rule. Then texts that several people read name no graphs of
+        others."""
+        return bool(self._counting()) or self._is_dark()
+
+    def require_graphs(self, identity: Identity, *graphs: str | None) -> None:
+        """Raise Forbidden if an identity may not see one of these graphs."""
+        unseen = self.unseen(identity)
+        if unseen is not None and not unseen.graphs.isdisjoint(_ids(*graphs)):
+            raise Forbidden(HIDDEN_GRAPH)
+
+    def _counting(self) -> dict[str, Rule]:
+        """Return the rules other than OPEN that count now, by the ids of graphs."""
+        newest = None if self._rules is None else self._rules.newest()
+        if self._counted is None or self._counted[0] is not newest:
+            since = 0 if newest is None else newest.at
+            rules = (
+                {} if newest is None else {graph: newest.rule_of(graph) for graph in newest.graphs}
+            )
+            rules |= {graph: each.rule for graph, each in self._learned.items() if each.at > since}
+            counting = {graph: rule for graph, rule in rules.items() if rule != OPEN}
+            self._counted = newest, counting
+            self._unseen.clear()
+        return self._counted[1]
+
+    def _is_dark(self) -> bool:
+        """Return whether there are rules that could not be read since this process began."""
+        if self._is_unread:
+            return True
+        if self._rules is None or self._rules.newest() is not None:
+            return False
+        return self._data is not None and (self._data / graph_seals.FILE).exists()
+
+    # --- starts ---------------------------------------------------------------------------------
+
+    async def accept(
+        self, sight: Sight | None, version: str, digests: tuple[str | None, ...], identity: Identity
+    ) -> None:
+        """Verify the sight that came with a version, and remember its rules. `digests`: those of the
+        version that was sent. Raise BadInput for a wrong seal, Conflict for the sight of another
+        version, Forbidden if the identity may not see one of its graphs, Unavailable if the rules
+        cannot be stored."""
+        if sight is None:
+            return
+        where: dict[str, object] = {"path": "/sight"}
+        if self._seals is None or not self._seals.holds(sight) or not _is_whole(sight):
+            raise BadInput("The sight does not have the seal of this server.", where=where)
+        if sight.version != version or sight.digest not in digests:
+            raise Conflict("The sight belongs to another version.", where=where)
+        await self._learn(sight)
+        self.require_graphs(identity, *sight.graphs)
+
+    async def store(self, statement: Statement) -> None:
+        """Store a newer statement. Raise BadInput for a wrong seal, Unavailable if it cannot be
+        written: it holds here then until this process ends."""
+        if self._rules is not None:
+            await to_thread.run_sync(self._rules.store, statement)
+
+    async def _learn(self, sight: Sight) -> None:
+        counting = self._counting()
+        newest = None if self._rules is None else self._rules.newest()
+        since = 0 if newest is None else newest.at
+        news: dict[str, _Learned] = {}
+        for graph, rule in zip(sight.graphs, sight.rules, strict=True):
+            known = self._learned.get(graph)
+            is_newer = sight.at > max(since, 0 if known is None else known.at)
+            if is_newer and counting.get(graph, OPEN) != rule:
+                news[graph] = _Learned(sight.at, rule)
+        if not news:
+            return
+        kept = {graph: each for graph, each in self._learned.items() if each.at > since}
+        self._learned = kept | news
+        self._counted = None
+        if self._data is None:
+            return
+        try:
+            await to_thread.run_sync(_write, self._data / FILE, dict(self._learned))
+        except OSError as error:
+            raise Unavailable(
+                f"The rules of the graph could not be stored, so nothing was started: {error.strerror}."
+            ) from error
+
+    def _read_learned(self, path: Path) -> None:
+        try:
+            self._learned = msgspec.json.decode(path.read_bytes(), type=dict[str, _Learned])
+        except FileNotFoundError:
+            pass
+        except (OSError, msgspec.DecodeError) as error:
+            log.error("%s cannot be read: %s", path, error)
+            self._is_unread = True
+
+
+def _is_whole(sight: Sight) -> bool:
+    return len(sight.graphs) == len(sight.rules)
+
+
+def _write(path: Path, learned: Mapping[str, _Learned]) -> None:
+    make_folder(path.parent)
+    part = path.with_name(f"{path.name}.{random_id()}.part")
+    replace_file(path, msgspec.json.encode(learned), part=part)
+
+
+#: Shows all runs to everybody: for tests and programs without a data folder.
+NO_RULES: Final = RunSight()
