@@ -116,6 +116,27 @@ PARTS: Final[dict[str, Part]] = {
         {"TEST_HOSTILE_STOPS": "1000", "TEST_HOSTILE_SILENT": "2000"},
         ("-s", "tests/test_nobody_delays_stop.py"),
     ),
+    "matrix": Part(
+        "each role and scope at every route and socket, before and after each kind of revocation",
+        {"TEST_MATRIX": "1"},
+        ("-s", "tests/web/auth/test_matrix.py"),
+    ),
+    "guesses": Part(
+        "codes, links and tokens guessed 1,000 times each from 100 addresses, beside the owner and Stops",
+        {"TEST_GUESSES": "1000"},
+        ("-s", "tests/web/auth/test_guesses.py"),
+    ),
+    "texts": Part(
+        "each hostile text at every place of both processes that takes one",
+        {"TEST_LONG": "1"},
+        ("tests/web/http/test_hostile_texts.py",),
+    ),
+    "schemas": Part(
+        "what schemathesis makes of both OpenAPI documents, as owner, operator and stranger",
+        {},
+        ("bench/schemas.py",),
+        (sys.executable,),
+    ),
     "robots": Part(
         "10,000 histories of runs with false confirmations, 1,000 stops and races, 300 clicks on Stop, "
         "12,000 races for a baton",

@@ -1,0 +1,73 @@
+"""Send what schemathesis makes of both OpenAPI documents, as an owner, an operator and a stranger:
+`make soak ARGS=schemas`. It needs the program `schemathesis` (PyPI), which nothing else here does.
+
+Fails if an answer is a server error. With a URL of a Postgres database the editor uses that one.
+"""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Final
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+
+from action_assistant.web.auth.keys import Keys
+from support.product import TOKEN, running
+
+EXAMPLES: Final = os.environ.get("SCHEMAS_EXAMPLES", "50")  # of each operation
+#: Streams that do not end, and what would sign the operator out.
+LEFT_OUT: Final = "(/events|/room|/api/live|/api/session|/api/devices/.*end)$"
+
+
+def main(database: str | None) -> int:
+    """Run it for each process and each who; return 1 if one fails, 2 without the program."""
+    program = shutil.which("schemathesis") or shutil.which("st")
+    if program is None:
+        sys.stderr.write("schemathesis is not installed: pip install schemathesis\n")
+        return 2
+    os.environ["ACTION_ASSISTANT_LIMITS"] = "off"
+    flags = ["--database", database] if database else []
+    failed = False
+    with (
+        tempfile.TemporaryDirectory() as folder,
+        running(Path(folder) / "data", *flags) as product,
+    ):
+        session = Keys(TOKEN).new_session("Olga", role="operator")
+        cookie = f"aa_{product.port}={Keys(TOKEN).sealed(session)}"
+        people = {
+            "owner": [f"authorization: Bearer {TOKEN}"],
+            "operator": [f"cookie: {cookie}", f"origin: {product.url}"],
+            "stranger": [],
+        }
+        for url in (product.url, product.runner_url):
+            document = Path(folder) / "openapi.json"
+            document.write_bytes(_document(url))
+            for who, headers in people.items():
+                words = [word for each in headers for word in ("--header", each)]
+                done = subprocess.run(
+                    [
+                        *(program, "run", str(document), "--url", url, *words),
+                        *("--checks", "not_a_server_error", "--max-examples", EXAMPLES),
+                        *("--exclude-path-regex", LEFT_OUT, "--request-timeout", "20"),
+                        *("--phases", "examples,coverage,fuzzing", "--continue-on-failure"),
+                    ],
+                    cwd=folder,
+                    check=False,
+                )
+                sys.stdout.write(f"{who} at {url}: exit code {done.returncode}\n")
+                failed = failed or done.returncode != 0
+    return 1 if failed else 0
+
+
+def _document(url: str) -> bytes:
+    import httpx
+
+    headers = {"authorization": f"Bearer {TOKEN}"}
+    return httpx.get(f"{url}/schema/openapi.json", headers=headers, trust_env=False).content
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else None))
