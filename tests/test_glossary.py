@@ -30,7 +30,7 @@ _SHOWN = re.compile(
 )
 _SENTENCE = re.compile(r"([\"'`])([A-Z][^\"'`\n]* [^\"'`\n]*)\1")
 _INSERTED = re.compile(r"\$\{[^}]*\}")
-_ROUTE = re.compile(r"((?:GET|POST|PATCH|DELETE)(?:, (?:GET|POST|PATCH|DELETE))*) (/api/[\w/{}]+)")
+_ROUTE = re.compile(r"((?:GET|POST|PATCH|DELETE)(?:, (?:GET|POST|PATCH|DELETE))*) (/api/[\w/{}-]+)")
 _SOCKETS = frozenset({"/api/graphs/{}/room", "/api/live"})
 
 

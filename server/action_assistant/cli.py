@@ -75,6 +75,11 @@ COMMANDS: Final[Mapping[str, CommandEntry]] = {
     "export": CommandEntry("remote", "print a graph as UMRF", described=True),
     "graphs": CommandEntry("remote", "list the graphs", described=True),
     "folders": CommandEntry("folders", "folders of graphs: list, new, rename, move, remove, put"),
+    "rights": CommandEntry(
+        "graph_rights",
+        "who may see and who may edit a graph, or the graphs in a folder",
+        described=True,
+    ),
     "drafts": CommandEntry("drafts", "drafts of a graph: list, new, merge", described=True),
     "runs": CommandEntry("runs", "list the runs, newest first", described=True),
     "release": CommandEntry(

@@ -95,8 +95,9 @@ export function createGraph(name: string, folder: Place): Promise<GraphSummary> 
 export type Preview = EditorApi["Preview"];
 
 /** Imports a file's text as it is. */
-export function importGraph(text: string, folder?: Place): Promise<GraphSummary> {
-  return editor.post("/api/graphs", { query: { folder }, body: text, status: 201 });
+export function importGraph(text: string, folder?: Place, of?: string): Promise<GraphSummary> {
+  const query = { folder, copy_of: of };
+  return editor.post("/api/graphs", { query, body: text, status: 201 });
 }
 
 /** An edit of the graph's own document: whoever has it open sees it. */
@@ -106,7 +107,7 @@ export function renameGraph(id: string, name: string): Promise<GraphSummary> {
 
 /** Copy a graph under another name into its folder; edits of one do not touch the other. */
 export async function duplicateGraph(graph: GraphSummary, name: string): Promise<GraphSummary> {
-  const made = await importGraph(await graphText(graph.id), graph.folder);
+  const made = await importGraph(await graphText(graph.id), graph.folder, graph.id);
   try {
     return await renameGraph(made.id, name);
   } catch (error) {
@@ -168,7 +169,8 @@ export function publishNamed(graph: string, body: EditorApi["Publishing"]): Prom
 
 /** A graph as it was after a change, as another one; edits of one do not touch the other. */
 export async function copyMoment(graph: string, at: number, name: string): Promise<GraphSummary> {
-  const made = await importGraph(await fetchText(`${below(graph)}/umrf?at=${at}`));
+  const text = await fetchText(`${below(graph)}/umrf?at=${at}`);
+  const made = await importGraph(text, null, graph);
   try {
     return await renameGraph(made.id, name);
   } catch (error) {

@@ -41,9 +41,16 @@ function ReadOnly() {
   if (readOnly === undefined) return null;
   return (
     <Notice icon={<IconLock size={16} />} tone="warn">
-      {readOnly} The page shows the graph as it was before that; you can download and run it. The
-      administrator of the server can check it with <code>action-assistant verify</code> and restore
-      a backup with <code>restore</code>.
+      {readOnly}{" "}
+      {readOnly.includes("is damaged") ? (
+        <>
+          The page shows the graph as it was before that; you can download and run it. The
+          administrator of the server can check it with <code>action-assistant verify</code> and
+          restore a backup with <code>restore</code>.
+        </>
+      ) : (
+        "An owner can change that."
+      )}
     </Notice>
   );
 }

@@ -11,8 +11,11 @@ import {
   renameFolder,
   useFolders,
 } from "../api/folders";
+import { tellRunnerRules } from "../api/graph-rights";
 import { refreshGraphs } from "../api/graphs";
 import { errorText } from "../api/http";
+import { useLive } from "../api/page-link";
+import { useMay } from "../api/people";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./folders.module.css";
@@ -20,6 +23,15 @@ import style from "./folders.module.css";
 interface Dialog {
   opened: boolean;
   onClose: () => void;
+}
+
+/** Return a function that brings the rules that count after a move to the runner, for owners. */
+function useTellRules(): () => Promise<void> {
+  const mayShare = useMay("share");
+  const { runner } = useLive();
+  return async () => {
+    if (mayShare) await tellRunnerRules(runner);
+  };
 }
 
 /** A change of folders: the dialog closes when it is done, and says why where it is refused. */
@@ -121,10 +133,12 @@ function MoveChoice({ from, not, move, onClose }: MoveProps) {
   const folders = useFolders().data ?? [];
   const [into, setInto] = useState(from ?? NONE);
   const [fresh, setFresh] = useState("");
+  const tellRules = useTellRules();
   const change = useChange(async () => {
     const chosen = into === NONE ? null : into;
     const made = fresh.trim() === "" ? null : await makeFolder(fresh.trim(), chosen);
     await move(made?.id ?? chosen);
+    await tellRules();
   }, onClose);
   const ready = fresh.trim() !== "" || into !== (from ?? NONE);
   return (
@@ -179,8 +193,9 @@ interface RemoveProps {
 }
 
 function Remove({ folder, folders, onRemoved, onClose }: RemoveProps) {
+  const tellRules = useTellRules();
   const change = useChange(
-    () => removeFolder(folder.id),
+    () => removeFolder(folder.id).then(tellRules),
     () => {
       onClose();
       onRemoved();

@@ -7,6 +7,7 @@ import {
   IconFolderMinus,
   IconFolderPlus,
   IconFolderSymlink,
+  IconLock,
   IconPencil,
 } from "@tabler/icons-react";
 import { Fragment, useState } from "react";
@@ -17,11 +18,13 @@ import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./folders.module.css";
+import { RestrictedMark } from "./graph-counts";
 
 const FolderNameDialog = lazyPart(() =>
   import("./folder-dialogs").then((part) => part.FolderNameDialog),
 );
 const MoveDialog = lazyPart(() => import("./folder-dialogs").then((part) => part.MoveDialog));
+const RuleDialog = lazyPart(() => import("./rule-dialog").then((part) => part.RuleDialog));
 const RemoveDialog = lazyPart(() => import("./folder-dialogs").then((part) => part.RemoveDialog));
 
 const placeOf = (id: string | null | undefined) => (id ? `/?folder=${id}` : "/");
@@ -35,8 +38,9 @@ interface MenuProps {
 
 function FolderMenu({ folder, folders, here = false }: MenuProps) {
   const [, go] = useLocation();
-  const [asked, setAsked] = useState<"rename" | "move" | "remove" | null>(null);
+  const [asked, setAsked] = useState<"rename" | "move" | "rule" | "remove" | null>(null);
   const [opened, setOpened] = useState(false);
+  const mayShare = useMay("share");
   const ask = (dialog: typeof asked) => {
     setAsked(dialog);
     setOpened(true);
@@ -61,6 +65,11 @@ function FolderMenu({ folder, folders, here = false }: MenuProps) {
           <Menu.Item leftSection={<IconFolderSymlink size={15} />} onClick={() => ask("move")}>
             Move to folder …
           </Menu.Item>
+          {mayShare && (
+            <Menu.Item leftSection={<IconLock size={15} />} onClick={() => ask("rule")}>
+              Who may see its graphs …
+            </Menu.Item>
+          )}
           <Menu.Item leftSection={<IconFolderMinus size={15} />} onClick={() => ask("remove")}>
             Remove the folder …
           </Menu.Item>
@@ -74,6 +83,14 @@ function FolderMenu({ folder, folders, here = false }: MenuProps) {
             from={folder.parent ?? null}
             not={foldersWithin(folders, folder.id)}
             move={(into) => moveFolder(folder.id, into)}
+            {...dialog}
+          />
+        )}
+        {asked === "rule" && (
+          <RuleDialog
+            ruled={{ kind: "folder", id: folder.id }}
+            name={folder.name}
+            isInside={folder.parent !== undefined}
             {...dialog}
           />
         )}
@@ -118,6 +135,7 @@ export function FolderHead({
           <span className="visually-hidden">Folder </span>
           {folder.name}
         </h2>
+        {folder.restricted && <RestrictedMark />}
         {mayEdit && <FolderMenu folder={folder} folders={folders} here />}
       </div>
     </div>
@@ -149,7 +167,10 @@ export function FolderCards({
                 <Link to={placeOf(each.id)} className={style.open}>
                   <IconFolder size={20} aria-hidden className="flex-none" />
                   <span className="fill">
-                    <bdi className="block truncate weight-600">{each.name}</bdi>
+                    <span className="row gap-25">
+                      <bdi className="truncate weight-600">{each.name}</bdi>
+                      {each.restricted && <RestrictedMark />}
+                    </span>
                     <span className="faint-11_5">
                       {counted(each.graphs ?? 0, "graph")}
                       {below > 0 && ` · ${counted(below, "folder")}`}

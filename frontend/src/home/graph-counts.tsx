@@ -1,5 +1,5 @@
 /** Counts of problems and of parts to fill in, for a graph in a list. */
-import { IconAlertTriangle, IconPencil } from "@tabler/icons-react";
+import { IconAlertTriangle, IconLock, IconPencil } from "@tabler/icons-react";
 import type { GraphSummary } from "../api/graphs";
 import { countWords, type ProblemCounts } from "../graph/problems/problem-kinds";
 import style from "./graph-counts.module.css";
@@ -9,17 +9,29 @@ function countsOfListed({ wrong = 0, to_fill_in = 0 }: GraphSummary): ProblemCou
   return { wrong, fillIn: to_fill_in, warnings: 0 };
 }
 
+/** Marks what not everybody may see or edit. */
+export function RestrictedMark() {
+  const words = "Not everybody may see or edit this";
+  return (
+    <span className="inline-flex flex-none ink3" title={words}>
+      <IconLock size={13} aria-hidden />
+      <span className="visually-hidden">{words}</span>
+    </span>
+  );
+}
+
 /** `brief`: numbers alone, where there is little room; they are told in words all the same. */
 export function GraphCounts({ graph, brief = false }: { graph: GraphSummary; brief?: boolean }) {
   const counts = countsOfListed(graph);
   const words = countWords(counts);
-  if (words.length === 0) return null;
+  if (words.length === 0) return graph.restricted ? <RestrictedMark /> : null;
   const { wrong, fillIn } = counts;
   return (
     <span
       className="inline-flex flex-none gap-40 nowrap text-11_5 weight-600"
       title={words.join(", ")}
     >
+      {graph.restricted && <RestrictedMark />}
       {wrong > 0 && (
         <span className={style.count} data-kind="wrong">
           <IconAlertTriangle size={13} aria-hidden /> {wrong}{" "}

@@ -5,6 +5,7 @@ import {
   IconCopy,
   IconDots,
   IconFolderSymlink,
+  IconLock,
   IconPencil,
   IconShare3,
   IconTrash,
@@ -77,6 +78,8 @@ const RenameDialog = lazyPart(() => import("./rename-dialog").then((part) => par
 
 const MoveDialog = lazyPart(() => import("./folder-dialogs").then((part) => part.MoveDialog));
 
+const RuleDialog = lazyPart(() => import("./rule-dialog").then((part) => part.RuleDialog));
+
 const RenamedUses = lazyPart(() =>
   import("../canvas/renamed-uses").then((part) => part.RenamedUses),
 );
@@ -86,6 +89,8 @@ type Renamed = Pick<ComponentProps<typeof RenamedUses>, "before" | "name" | "use
 export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readonly string[] }) {
   const client = useQueryClient();
   const mayEdit = useMay("edit");
+  const mayShare = useMay("share");
+  const [ruling, setRuling] = useState<boolean | null>(null);
   const [renaming, setRenaming] = useState<boolean | null>(null);
   const [moving, setMoving] = useState<boolean | null>(null);
   const [renamed, setRenamed] = useState<Renamed | null>(null);
@@ -144,6 +149,11 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
           >
             Move to folder …
           </Menu.Item>
+          {mayShare && (
+            <Menu.Item leftSection={<IconLock size={15} />} onClick={() => setRuling(true)}>
+              Who may see it …
+            </Menu.Item>
+          )}
           <Menu.Item
             component="a"
             href={serverPath(`/api/graphs/${encodeURIComponent(graph.id)}/umrf`)}
@@ -178,6 +188,15 @@ export function GraphMenu({ graph, names }: { graph: GraphSummary; names: readon
             move={(into) => fileGraph(graph.id, into)}
             opened={moving}
             onClose={() => setMoving(false)}
+          />
+        )}
+        {ruling !== null && (
+          <RuleDialog
+            ruled={{ kind: "graph", id: graph.id }}
+            name={graph.name}
+            isInside={graph.folder !== undefined}
+            opened={ruling}
+            onClose={() => setRuling(false)}
           />
         )}
         {renamed !== null && (

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from action_assistant.commands.client import Server, command, decoded, print_json, running
-from action_assistant.errors import RequestRefused
+from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.safe_text import one_line
 
 if TYPE_CHECKING:  # slow to load, and most calls do not need it
@@ -103,6 +103,25 @@ def _names(path: str) -> list[str]:
     return [name for name in path.split("/") if name.strip()]
 
 
+def tell_runner_rules(server: Server) -> None:
+    """Bring the rules of who may see graphs to a runner that may have a data folder of its own, if
+    there was ever one and this client is an owner's. Only owners change who may see a graph."""
+    try:
+        rules = server.editor("GET", "/api/graph-rules").json()
+    except RequestRefused as refused:
+        if refused.status != 403:
+            raise
+        return
+    if rules["at"] == 0:
+        return
+    try:
+        server.runner("PUT", "/api/graph-rules", json=rules)
+    except (RequestRefused, CannotStart) as error:
+        raise RequestRefused(
+            f"Done, but a runner with a data folder of its own has not been told: {error}"
+        ) from error
+
+
 def _list(options: argparse.Namespace) -> int:
     with running(options) as server:
         folders = known_folders(server)
@@ -158,12 +177,14 @@ def _move(options: argparse.Namespace) -> int:
         folder = _chosen(server, options.folder)
         into = folder_id(known_folders(server), options.into)
         server.editor("PUT", f"/api/folders/{folder}/parent", json={"parent": into})
+        tell_runner_rules(server)
     return 0
 
 
 def _remove(options: argparse.Namespace) -> int:
     with running(options) as server:
         server.editor("DELETE", f"/api/folders/{_chosen(server, options.folder)}")
+        tell_runner_rules(server)
     return 0
 
 
@@ -173,4 +194,5 @@ def _put(options: argparse.Namespace) -> int:
         graphs = [server.graph_id(graph) for graph in options.graphs]
         for graph in graphs:
             server.editor("PUT", f"/api/graphs/{graph}/folder", json={"folder": into})
+        tell_runner_rules(server)
     return 0

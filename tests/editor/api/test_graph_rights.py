@@ -437,7 +437,11 @@ def test_what_is_made_of_a_graph_is_for_those_who_see_it(
         body = {"seq": seq, "actions": [aid], "name": f"A part {ruled_by(owner, things)}"}
         part = http.post(f"/api/graphs/{graph}/subgraphs", json=body)
         assert part.status_code == 201, part.text
-        for made in (flat.json()["id"], part.json()["graph"]["id"]):
+        copy = http.post(
+            f"/api/graphs?copy_of={graph}", json=http.get(f"/api/graphs/{graph}/umrf").json()
+        )
+        assert copy.status_code == 201, copy.text
+        for made in (flat.json()["id"], part.json()["graph"]["id"], copy.json()["id"]):
             assert http.get(f"/api/graphs/{made}").status_code == 200
             answer = httpx.get(f"{product.url}/api/graphs/{made}", headers=nobody.headers)
             assert answer.status_code == 404

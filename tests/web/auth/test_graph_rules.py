@@ -9,9 +9,11 @@ from action_assistant.web.auth.graph_rules import (
     OPEN,
     Rule,
     RuledFolder,
+    combined,
     may_edit,
     may_see,
     rule_at,
+    with_person,
 )
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Person
@@ -62,3 +64,26 @@ def test_the_nearest_rule_counts(data: st.DataObject, chain: list[Rule | None]) 
     assert rule_at(own, str(at), folders) == nearest
     assert rule_at(own, None, folders) == (own or OPEN)
     assert rule_at(own, "removed", folders) == (own or OPEN)
+
+
+@given(st.lists(rules, max_size=3), identities)
+def test_what_is_made_of_graphs_is_for_those_who_may_see_all_of_them(
+    every: list[Rule], identity: Identity
+) -> None:
+    made = combined(every)
+    if may_see(made, identity):
+        assert all(may_see(rule, identity) for rule in every)
+    if may_edit(made, identity):
+        assert all(may_edit(rule, identity) for rule in every)
+    if all(rule == OPEN for rule in every):
+        assert made == OPEN
+
+
+@given(rules, identities)
+def test_whoever_makes_it_may_edit_it_and_nobody_else_may_more(
+    rule: Rule, identity: Identity
+) -> None:
+    made = with_person(rule, "dee")
+    assert may_edit(made, Identity(Person("dee", "dee", "editor")))
+    assert may_see(made, identity) == may_see(rule, identity)
+    assert may_edit(made, identity) == may_edit(rule, identity)

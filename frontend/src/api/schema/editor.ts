@@ -2063,11 +2063,13 @@ export interface EditorApi {
     };
     /**
      * RuleView
-     * @description The own rule of a graph or folder, if any, and the rule that counts for it.
+     * @description The own rule of a graph or folder, if any, the rule that counts for it, and the one that would
+     *     count without an own one.
      */
     RuleView: {
         own: EditorApi["Rule"] | null;
         counts: EditorApi["Rule"];
+        around: EditorApi["Rule"];
     };
     /**
      * Ruling
@@ -3233,6 +3235,7 @@ interface EditorOperations {
             query?: {
                 preview?: boolean;
                 folder?: string | null;
+                copy_of?: string | null;
             };
         };
         requestBody: {

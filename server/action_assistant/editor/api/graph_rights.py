@@ -23,10 +23,12 @@ class Ruling(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class RuleView(msgspec.Struct, frozen=True):
-    """The own rule of a graph or folder, if any, and the rule that counts for it."""
+    """The own rule of a graph or folder, if any, the rule that counts for it, and the one that would
+    count without an own one."""
 
     own: Rule | None
     counts: Rule
+    around: Rule
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:

@@ -122,7 +122,8 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
     @post(
         "/api/graphs",
         summary="Make a graph of a UMRF file of any dialect, or an empty one of {name}, in a "
-        "`folder`; with `preview` only say what a file would become, and store nothing",
+        "`folder`, with the rights of the graph `copy_of`; with `preview` only say what a file would "
+        "become, and store nothing",
         operation_id="createGraph",
         guards=[Needs("edit")],
         opt=reads(JsonObject),
@@ -133,7 +134,10 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         request_max_body_size=BODY_LIMIT,
     )
     async def create_graph(
-        request: Asking, preview: bool = False, folder: str | None = None
+        request: Asking,
+        preview: bool = False,
+        folder: str | None = None,
+        copy_of: str | None = None,
     ) -> Response[MadeGraph] | Response[Preview]:
         if preview:
             found = await _previewed(app_state.services, await request.body())
@@ -142,8 +146,12 @@ def _catalogue(app_state: EditorState) -> list[ControllerRouterHandler]:
         if folder is not None:
             await services.rights.check("folder", folder, identity_of(request), edits=True)
             await services.folders.require(folder)
+        rule = None
+        if copy_of is not None:
+            await services.rights.check("graph", copy_of, identity_of(request), edits=False)
+            rule = await services.rights.rule_for_copy([copy_of], folder, person.id)
         body = await request.body()
-        made, told = await services.catalogue.create(body, person.id, folder=folder)
+        made, told = await services.catalogue.create(body, person.id, folder=folder, rule=rule)
         return made_graph(made, told)
 
     @get(

@@ -151,7 +151,7 @@ class Folders:
         """Raise Forbidden if a change of place would change who may see or edit something, since
         only owners decide that. `into`: the folder into which a thing, or the contents of a folder,
         go. `keeps`: the thing keeps its own rule, if it has one."""
-        own, counts = await self._rights.rules_of(kind, thing)
+        own, counts, _ = await self._rights.rules_of(kind, thing)
         after = self._rights.rule_in(into, own if keeps else None)
         if after != counts and not self._rights.caller_is_owner():
             raise Forbidden("Other people would then see or edit it. Ask an owner to do this.")

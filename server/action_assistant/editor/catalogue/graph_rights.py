@@ -56,10 +56,12 @@ _VERSION: Final = select(editor_tables.version.c.graph).where(
 
 
 class Rules(NamedTuple):
-    """The own rule of a thing, if any, and the rule that counts for it."""
+    """The own rule of a thing, if any, the rule that counts for it, and the one that would count
+    without an own one."""
 
     own: Rule | None
     counts: Rule
+    around: Rule
 
 
 class GraphRights:
@@ -72,6 +74,7 @@ class GraphRights:
         self._file = file
         self._seals = GraphSeals(keys)
         self._folders: dict[str, RuledFolder] = {}
+        self._counts: dict[str, Rule] = {}  # by graph, as far as is known; the rest is read
         self._is_ruled = False
         self._generation = 0  # of what is known here
         self._last_at = 0  # of statements and sights
@@ -83,6 +86,7 @@ class GraphRights:
         change of a rule or a place. Return the error if the statement could not be written."""
         async with self._refreshing:
             self._generation += 1  # before anybody is put out: see `admit`
+            self._counts = {}
             folder = editor_tables.folder.c
             rows = await self._journal.query(select(folder.id, folder.parent, folder.rule))
             ruled = select(_GRAPH.c.id).where(_GRAPH.c.rule.is_not(None)).limit(1)
@@ -104,6 +108,7 @@ class GraphRights:
         rows = await self._journal.query(_COLUMNS) if self._is_ruled else []
         by_id = {row.id: row for row in rows}
         counting = {row.id: self._of_row(row, by_id).counts for row in rows}
+        self._counts = counting
         known = self._file.newest() or Statement(0, (), {})
         now = statement_of(counting, known)
         if (now.rules, now.graphs) == (known.rules, known.graphs):
@@ -148,6 +153,9 @@ class GraphRights:
         """Return the rule that counts for a graph; CLOSED if there is none with this id."""
         if not self._is_ruled:
             return OPEN
+        known = self._counts.get(graph)
+        if known is not None:
+            return known
         rules = await self._rule_of("graph", graph)
         return CLOSED if rules is None else rules.counts
 
@@ -286,7 +294,9 @@ class GraphRights:
         """Return the rules of a thing; None if it does not exist."""
         if kind == "folder":
             found = self._folders.get(thing)
-            return None if found is None else Rules(found.rule, self.rule_in(thing))
+            if found is None:
+                return None
+            return Rules(found.rule, self.rule_in(thing), self.rule_in(found.parent))
         if kind == "version":
             rows = await self._journal.query(_VERSION, {"id": thing})
             if not rows:
@@ -309,10 +319,10 @@ class GraphRights:
         while row.draft_of is not None:
             passed.add(row.id)
             if row.draft_of not in rows or row.draft_of in passed:
-                return Rules(None, CLOSED)
+                return Rules(None, CLOSED, CLOSED)
             row = rows[row.draft_of]
         own = _rule(row.rule)
-        return Rules(own, self.rule_in(row.folder, own))
+        return Rules(own, self.rule_in(row.folder, own), self.rule_in(row.folder))
 
 
 def _everything(_: str) -> bool:

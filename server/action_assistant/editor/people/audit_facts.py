@@ -18,6 +18,7 @@ from action_assistant.web.audit import events as audit
 from action_assistant.web.audit.facts import described
 from action_assistant.web.audit.rows import AuditFilter, AuditKind, AuditPage, Fact, audit_page
 from action_assistant.web.auth.caller import Origin
+from action_assistant.web.auth.graph_rules import Rule, rule_words
 
 #: Events that are no facts about people: most of the log. A sitting of edits has an event of its own.
 _NEVER: Final = (h.UPDATED, h.DEFERRED, h.IMPORTED)
@@ -42,6 +43,7 @@ class _Body(msgspec.Struct, frozen=True):
     person: str = ""
     browser: str = ""
     address: str | None = None
+    rule: Rule | None = None
     until: int | None = None
 
 
@@ -63,7 +65,7 @@ _ABOUT: Final[Mapping[str, str]] = {
     h.RELEASED: "released version {id} of {graph}",
     h.RELEASE_WITHDRAWN: "withdrew the release of version {id} of {graph}",
     "graph.filed.v1": "moved {graph} to another folder",
-    "graph.ruled.v1": "changed who may see or edit {graph}",
+    h.RULED: "said who may see {graph}: {rule}",
 }
 _PEOPLE: Final[Mapping[str, tuple[AuditKind, str]]] = {
     h.NAMED: ("people", "goes by the name {name}"),
@@ -87,7 +89,7 @@ _PEOPLE: Final[Mapping[str, tuple[AuditKind, str]]] = {
     "folder.made.v1": ("graphs", "made the folder {name}"),
     "folder.changed.v1": ("graphs", "renamed or moved the folder {name}"),
     "folder.removed.v1": ("graphs", "removed a folder"),
-    "folder.ruled.v1": ("graphs", "changed who may see or edit a folder"),
+    h.FOLDER_RULED: ("graphs", "said who may see the graphs in the folder {folder}: {rule}"),
 }
 
 
@@ -127,7 +129,11 @@ class EditorFacts:
         ends = (
             f", who may start until {moment(body.until):%Y-%m-%d %H:%M} UTC" if body.until else ""
         )
-        words = {**_words(body), "who": self._person(about).name or about, "ends": ends}
+        words = {
+            **self._words(event.kind, body),
+            "who": self._person(about).name or about,
+            "ends": ends,
+        }
         told = None if body.address is None else Origin(address=body.address)
         return Fact(kind=kind, text=sentence.format_map(words), origin=told)
 
@@ -137,10 +143,31 @@ class EditorFacts:
         if kind == h.ANSWERED:
             text = f"said {'yes' if body.yes else 'no'} to merging {name}"
         elif kind in _ABOUT:
-            text = _ABOUT[kind].format_map({**_words(body), "graph": name})
+            text = _ABOUT[kind].format_map({**self._words(kind, body), "graph": name})
         else:
             return None
         return Fact(kind="graphs", text=text, graph=graph, graph_name=name, seq=seq)
+
+    def _words(self, kind: str, body: _Body) -> dict[str, Any]:
+        """Return the fields of a body, with the rule of a graph or folder in words."""
+        words: dict[str, Any] = msgspec.structs.asdict(body)
+        if kind in {h.RULED, h.FOLDER_RULED}:
+            folder, group = editor_tables.folder.c, editor_tables.people_group.c
+            groups = self._names(group.id, group.name)
+            words["folder"] = self._names(folder.id, folder.name).get(body.id, body.id)
+            words["rule"] = (
+                "as the folder around says"
+                if body.rule is None
+                else rule_words(
+                    body.rule,
+                    "it" if kind == h.RULED else "them",
+                    lambda each: groups.get(each) or self._person(each).name,
+                )
+            )
+        return words
+
+    def _names(self, key: Any, name: Any) -> dict[str, str]:
+        return {row[0]: row[1] for row in self._connection.execute(select(key, name))}
 
     def _graph_name(self, graph: str) -> str:
         """Return the present name of a graph; its id if it has none."""
@@ -153,10 +180,6 @@ class EditorFacts:
 
 def _body(event: Event) -> _Body:
     return msgspec.json.decode(event.body, type=_Body) if event.body else _Body()
-
-
-def _words(body: _Body) -> dict[str, Any]:
-    return msgspec.structs.asdict(body)
 
 
 def page(wanted: AuditFilter, connection: Connection) -> AuditPage:

@@ -1,6 +1,6 @@
 """Rules that say who may see and who may edit graphs, and how folders pass them on. Pure."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
 
 import msgspec
@@ -80,6 +80,28 @@ def with_person(rule: Rule, person: str) -> Rule:
         return rule
     editors = rule.readers if rule.editors == "all" else rule.editors
     return Rule(rule.readers, (*(() if editors == "all" else editors), person))
+
+
+def rule_words(rule: Rule, what: str, name_of: Callable[[str], str]) -> str:
+    """Return a rule as sentences about `what`, "it" or "them". `name_of`: the name of a person or
+    group, "" for one that is not known."""
+
+    def listed(ids: tuple[str, ...]) -> str:
+        called = [name_of(each) or f"somebody who was removed ({each})" for each in ids]
+        head, last = ", ".join(called[:-1]), called[-1] if called else "owners"
+        return f"{head} and {last}" if head else last
+
+    readers, editors = rule.readers, rule.editors
+    if readers == "all":
+        if editors == "all":
+            return f"Everybody may see and edit {what}."
+        return f"Everybody may see {what}. Only {listed(editors)} may edit {what}."
+    named = readers if editors == "all" else tuple(dict.fromkeys((*readers, *editors)))
+    if not named:
+        return f"Only owners may see {what}."
+    if editors == "all" or set(named) <= set(editors):
+        return f"Only {listed(named)} may see and edit {what}."
+    return f"Only {listed(named)} may see {what}. Only {listed(editors)} may edit {what}."
 
 
 def _all_readers(rule: Rule) -> Who:
