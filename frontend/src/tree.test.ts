@@ -88,6 +88,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
   account: ["clock", "words", "ui", "api"],
   administration: ["clock", "words", "ui", "api"],
   programs: ["words", "ui", "api"],
+  view: ["clock", "words", "graph", "ui", "api", "status", "canvas"],
   app: [
     "clock",
     "words",
@@ -109,6 +110,7 @@ const LAYERS: Readonly<Record<string, readonly string[]>> = {
     "account",
     "administration",
     "programs",
+    "view",
   ]),
 };
 
@@ -354,6 +356,8 @@ const UNDRAFTED: Readonly<Record<string, string>> = {
   "account/name-prompt.tsx NamePrompt": DIALOG,
   "account/share-dialog.tsx NewLink": DIALOG,
   "account/share-dialog.tsx ShareLink": "read only: a link to copy",
+  "account/view-links.tsx ViewLinks": DIALOG,
+  "account/view-links.tsx OneLink": "read only: a link to copy",
   "account/sign-in.tsx SignInBar": "a secret: never kept",
   "account/sign-in.tsx SignIn": "a secret: never kept",
   "library/action-list.tsx ActionList": "a search",

@@ -1,13 +1,6 @@
 /** Share: links with a role, who came in by them, and their end. For owners. */
 import { Button, Group, Modal, Select, Text, TextInput } from "@mantine/core";
-import {
-  IconCheck,
-  IconCopy,
-  IconLock,
-  IconLockOpen2,
-  IconPlugConnectedX,
-  IconQrcode,
-} from "@tabler/icons-react";
+import { IconLock, IconLockOpen2, IconPlugConnectedX, IconQrcode } from "@tabler/icons-react";
 import { useState } from "react";
 import { Link } from "wouter";
 import { errorText } from "../api/http";
@@ -22,14 +15,15 @@ import {
   useRevoke,
   useSharing,
 } from "../api/sharing";
+import type { ViewedThing } from "../api/view-links";
 import { ConfirmRow } from "../ui/confirm-row";
-import { copyText } from "../ui/copy-text";
 import { useIsPhone } from "../ui/hooks";
 import { Segments } from "../ui/segments";
 import { ago, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import style from "./share-dialog.module.css";
+import { CopyButton, ViewLinks } from "./view-links";
 
 const INVITED = ["viewer", "editor", "operator"] as const satisfies readonly Role[];
 const LABELS: Record<(typeof INVITED)[number], string> = {
@@ -132,16 +126,17 @@ function NewLink() {
   );
 }
 
-function Body() {
+/** Kinds of links: with a role and a name, or to one thing without a name. */
+type Kind = "role" | "thing";
+
+function Body({ thing }: { thing: ViewedThing | null }) {
   const sharing = useSharing();
-  const revoke = useRevoke(useLive().runner);
+  const [kind, setKind] = useState<Kind>("role");
   const [chosen, setChosen] = useState<string | null>(null);
   if (sharing.isError) return <Text>{errorText(sharing.error)}</Text>;
   if (!sharing.data) return <div className={style.waiting} aria-busy="true" />;
   const origins = originsOf(sharing.data, { page: pageUrl(), hostname: location.hostname });
   const origin = origins.find((each) => each === chosen) ?? origins[0] ?? pageUrl();
-  const open = sharing.data.invitations.filter((each) => each.path !== undefined);
-  const over = sharing.data.invitations.filter((each) => each.path === undefined);
   return (
     <div className={style.body}>
       <Where
@@ -149,6 +144,45 @@ function Body() {
         proxied={sharing.data.proxied === true}
         reached={origins.length > 0}
       />
+      {thing !== null && (
+        <Segments
+          fullWidth
+          label="Kind of link"
+          data={[
+            { value: "role", label: "To work here" },
+            { value: "thing", label: `To look at this ${thing.kind} only` },
+          ]}
+          value={kind}
+          onChange={setKind}
+        />
+      )}
+      {thing !== null && kind === "thing" ? (
+        <ViewLinks thing={thing} origin={origin} />
+      ) : (
+        <RoleLinks
+          origins={origins}
+          origin={origin}
+          onOrigin={setChosen}
+          invitations={sharing.data.invitations}
+        />
+      )}
+    </div>
+  );
+}
+
+interface RoleLinksProps {
+  origins: readonly string[];
+  origin: string;
+  onOrigin: (origin: string | null) => void;
+  invitations: Sharing["invitations"];
+}
+
+function RoleLinks({ origins, origin, onOrigin, invitations }: RoleLinksProps) {
+  const revoke = useRevoke(useLive().runner);
+  const open = invitations.filter((each) => each.path !== undefined);
+  const over = invitations.filter((each) => each.path === undefined);
+  return (
+    <>
       <NewLink />
       {open.length > 0 && (
         <section className={style.links} aria-label="Links">
@@ -160,7 +194,7 @@ function Body() {
                 size="xs"
                 data={origins}
                 value={origin}
-                onChange={setChosen}
+                onChange={onOrigin}
               />
             )}
           </div>
@@ -193,11 +227,18 @@ function Body() {
           Revoked: {over.map((each) => each.label || `a link for ${each.role}s`).join(", ")}
         </Text>
       )}
-    </div>
+    </>
   );
 }
 
-export function ShareDialog({ opened, onClose }: { opened: boolean; onClose: () => void }) {
+interface Props {
+  opened: boolean;
+  onClose: () => void;
+  /** The graph or run on screen, to which links without a name can be made. */
+  thing: ViewedThing | null;
+}
+
+export function ShareDialog({ opened, onClose, thing }: Props) {
   const phone = useIsPhone();
   return (
     <Modal
@@ -209,7 +250,7 @@ export function ShareDialog({ opened, onClose }: { opened: boolean; onClose: () 
       centered
       closeButtonProps={{ "aria-label": "Close" }}
     >
-      <Body />
+      <Body thing={thing} />
     </Modal>
   );
 }
@@ -222,22 +263,6 @@ export function guestWords(guests: Invitation["guests"]): string {
   const names = guests.slice(0, MOST_GUESTS).map(({ person }) => person.name || "Guest");
   const more = guests.length - names.length;
   return `${names.map(isolated).join(", ")}${more > 0 ? ` and ${more} more` : ""} came in`;
-}
-
-function Copy({ link, label }: { link: string; label: string }) {
-  const [state, setState] = useState<"idle" | "done" | "failed">("idle");
-  const copy = async () => setState((await copyText(link)) ? "done" : "failed");
-  const words = { idle: "Copy", done: "Copied", failed: "Select and copy it by hand" }[state];
-  return (
-    <Button
-      className={style.copy ?? ""}
-      leftSection={state === "done" ? <IconCheck size={15} /> : <IconCopy size={15} />}
-      aria-label={`${words}: the link for ${isolated(label)}`}
-      onClick={() => void copy()}
-    >
-      {words}
-    </Button>
-  );
 }
 
 function Code({ src, label }: { src: string; label: string }) {
@@ -281,7 +306,7 @@ export function ShareLink({ invitation, origin, revoke }: ShareLinkProps) {
           value={link}
           onFocus={(event) => event.currentTarget.select()}
         />
-        <Copy link={link} label={label} />
+        <CopyButton text={link} what={`the link for ${isolated(label)}`} />
         <Button
           leftSection={<IconQrcode size={15} />}
           aria-expanded={code}

@@ -3,6 +3,7 @@ import { credentialIn } from "../api/session";
 import type { Guest, Sharing } from "../api/sharing";
 import { guestWords, originsOf } from "./share-dialog";
 import { pastedCredential } from "./sign-in";
+import { frameText } from "./view-links";
 
 const at = "2026-01-01T00:00:00Z";
 const guest = (name: string): Guest => ({ person: { id: name, name }, at });
@@ -40,4 +41,11 @@ test("who came in is said by name, and many as a number", () => {
   expect(guestWords([guest("Ada"), guest("")])).toBe("Ada, Guest came in");
   const many = Array.from({ length: 9 }, (_, i) => guest(`P${i}`));
   expect(guestWords(many)).toBe("P0, P1, P2, P3, P4, P5 and 3 more came in");
+});
+
+test("the frame of a link quotes its title, and lets the page open no windows", () => {
+  const text = frameText("https://lab.example/view#run=view_a_b", '"><script>&');
+  expect(text).toContain('title="&quot;>&lt;script>&amp;"');
+  expect(text).toContain('sandbox="allow-scripts allow-same-origin"');
+  expect(text).not.toContain("<script");
 });

@@ -50,6 +50,8 @@ export interface RequestOptions {
   timeoutMs?: number;
   /** Goes on when the page is closed meanwhile; only for small bodies. */
   keepalive?: boolean;
+  /** The key of a link that shows one thing, sent in place of the session of this browser. */
+  viewKey?: string;
 }
 
 const PATIENCE = 20_000; // ms
@@ -110,10 +112,11 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
   const patience = AbortSignal.timeout(ask.timeoutMs ?? PATIENCE);
   const init: RequestInit = {
     method: ask.method ?? "GET",
-    credentials: "include",
+    credentials: ask.viewKey === undefined ? "include" : "omit",
     keepalive: ask.keepalive ?? false,
     signal: ask.signal ? AbortSignal.any([ask.signal, patience]) : patience,
   };
+  if (ask.viewKey !== undefined) init.headers = { authorization: `Bearer ${ask.viewKey}` };
   if (ask.body !== undefined) {
     init.headers = { "content-type": "application/json" };
     init.body = typeof ask.body === "string" ? ask.body : JSON.stringify(ask.body);
@@ -122,7 +125,7 @@ async function send(url: string, ask: RequestOptions): Promise<Response> {
     const asked = tick();
     const response = await fetch(isEditor ? serverPath(url) : url, init);
     if (isEditor) hearAnswer(response.headers.get("date"), asked); // others hide it from this page
-    if (response.status === 401) void heard401(isEditor);
+    if (response.status === 401 && ask.viewKey === undefined) void heard401(isEditor);
     return response;
   } catch (error) {
     if (ask.signal?.aborted) throw error;

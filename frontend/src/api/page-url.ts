@@ -17,6 +17,12 @@ export function serverPath(path: string): string {
   return basePath + path;
 }
 
+/** The path of the page that shows one thing by a link, as the server's `VIEW`. */
+const VIEW = "/view";
+
+/** Set if this is the page of a link: it has no session, and no STOP. */
+export const isViewPage: boolean = globalThis.location?.pathname === serverPath(VIEW);
+
 /** Return the address of the page without a slash at its end. */
 export function pageUrl(): string {
   return globalThis.location.origin + basePath;

@@ -12,7 +12,7 @@ import { NewVersionNotice } from "../offline/page-version";
 import { UnansweredStartNotice } from "../runs/start/unanswered-starts";
 import { RestQuestion } from "../runs/stop/rest-question";
 import { LiveRegion } from "../ui/announcer";
-import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
+import { lazyPart, OverlayBoundary, PartBoundary } from "../ui/lazy-part";
 import { theme, variables } from "../ui/theme";
 import type { Crumb } from "../ui/top-bar";
 import { useWatched } from "../ui/watched";
@@ -33,6 +33,7 @@ import {
   RunsScreen,
   Screen,
   StatisticsScreen,
+  ViewScreen,
 } from "./screens";
 
 /**
@@ -186,6 +187,17 @@ export function App() {
           </SignInGate>
         </Router>
       </QueryClientProvider>
+    </MantineProvider>
+  );
+}
+
+/** The page of a link that shows one thing: without a session, menus, shortcuts and STOP. */
+export function ViewApp() {
+  return (
+    <MantineProvider theme={theme} cssVariablesResolver={variables} defaultColorScheme="auto">
+      <PartBoundary frame={(notice) => <main>{notice}</main>}>
+        <ViewScreen />
+      </PartBoundary>
     </MantineProvider>
   );
 }

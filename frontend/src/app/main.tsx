@@ -8,14 +8,16 @@ import "../ui/utilities.css";
 import { StrictMode } from "react";
 import { createRoot } from "react-dom/client";
 import { errorText } from "../api/http";
+import { isViewPage } from "../api/page-url";
 import { keepPage } from "../offline/page-version";
 import { pageError } from "../runs/stop/stop-surroundings";
 import { restAfterLostFields } from "../ui/focus-field";
-import { App } from "./app";
-import { preloadAt, preloadWhenIdle } from "./screens";
+import { App, ViewApp } from "./app";
+import { preloadAt, preloadWhenIdle, ViewScreen } from "./screens";
 
 restAfterLostFields(() => void import("../ui/messages").then((part) => part.tellKeysRest()));
-void preloadAt(location.pathname).then(preloadWhenIdle).then(keepPage);
+if (isViewPage) void ViewScreen.preload();
+else void preloadAt(location.pathname).then(preloadWhenIdle).then(keepPage);
 
 const root = document.getElementById("root");
 if (root === null) throw new Error("index.html has no #root");
@@ -24,7 +26,5 @@ const onUncaughtError = (error: unknown) => {
   reportError(error);
 };
 createRoot(root, { onUncaughtError }).render(
-  <StrictMode>
-    <App />
-  </StrictMode>,
+  <StrictMode>{isViewPage ? <ViewApp /> : <App />}</StrictMode>,
 );

@@ -1,10 +1,11 @@
 /** Frame of every screen: the bar on top, with room for STOP, and the screen below. */
 import { Button } from "@mantine/core";
 import { IconBolt, IconHistory, IconMapOff, IconRobot, IconShare } from "@tabler/icons-react";
-import { memo, type ReactNode, useEffect, useLayoutEffect, useState } from "react";
+import { memo, type ReactNode, useEffect, useLayoutEffect, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { AccountMenu } from "../account/account-menu";
 import { useMay } from "../api/people";
+import type { ViewedThing } from "../api/view-links";
 import { MovesNowLine } from "../runs/moves-now";
 import { graphOnScreen } from "../runs/stop/stop-surroundings";
 import { Empty } from "../ui/empty";
@@ -26,6 +27,8 @@ interface Props {
   start?: ReactNode;
   /** The graph on screen. */
   graph?: string;
+  /** The run on screen. */
+  run?: string;
   /** The screen is one of those that the bar leads to. */
   at?: "runs" | "robots" | "actions";
 }
@@ -66,8 +69,14 @@ const Way = memo(function Way({ to, icon: Icon, name, tight, beside }: WayProps)
   );
 });
 
-export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
+function thingOf(graph: string | undefined, run: string | undefined): ViewedThing | null {
+  if (graph !== undefined) return { kind: "graph", id: graph };
+  return run === undefined ? null : { kind: "run", id: run };
+}
+
+export function PageBar({ crumbs, status, actions, start, graph, run, at }: Props) {
   const mayShare = useMay("share");
+  const thing = useMemo(() => thingOf(graph, run), [graph, run]);
   useLayoutEffect(() => {
     graphOnScreen.set(graph ?? null);
     return () => graphOnScreen.set(null);
@@ -109,7 +118,9 @@ export function PageBar({ crumbs, status, actions, start, graph, at }: Props) {
           )}
           {mayShare && (
             <OverlayBoundary>
-              {sharing !== null && <Sharing opened={sharing} onClose={closeSharing} />}
+              {sharing !== null && (
+                <Sharing opened={sharing} onClose={closeSharing} thing={thing} />
+              )}
             </OverlayBoundary>
           )}
         </>

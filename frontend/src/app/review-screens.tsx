@@ -8,6 +8,7 @@ import { RunsPage } from "../review/runs-page";
 import { StatisticsPage } from "../review/statistics-page";
 import { nextLabel } from "../runs/start/use-start";
 import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
+import { ViewPage } from "../view/view-page";
 import { PageBar, PageFrame, useTitle } from "./page-frame";
 
 const StartDialog = lazyPart(() =>
@@ -30,7 +31,7 @@ export function RunScreen({ id }: { id: string }) {
     <PageFrame>
       <RunPage
         id={id}
-        bar={(parts) => <PageBar at="runs" {...parts} />}
+        bar={(parts) => <PageBar at="runs" run={id} {...parts} />}
         start={(again, onClose) => <Again {...again} onClose={onClose} />}
       />
     </PageFrame>
@@ -71,4 +72,9 @@ export function StatisticsScreen() {
       <StatisticsPage bar={(parts) => <PageBar at="runs" {...parts} />} />
     </PageFrame>
   );
+}
+
+/** One graph or run of a link, which is looked back at too. */
+export function ViewScreen() {
+  return <ViewPage />;
 }

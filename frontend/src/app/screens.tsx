@@ -30,6 +30,8 @@ export const RunsScreen = lazyPart(() => review().then((part) => part.RunsScreen
 export const RunScreen = lazyPart(() => review().then((part) => part.RunScreen));
 export const CompareScreen = lazyPart(() => review().then((part) => part.CompareScreen));
 export const StatisticsScreen = lazyPart(() => review().then((part) => part.StatisticsScreen));
+/** The page of a link that shows one thing: no screen leads there. */
+export const ViewScreen = lazyPart(() => review().then((part) => part.ViewScreen));
 
 /** By how the path begins below the page's root; the last one is whatever is left. */
 const PLACES: readonly (readonly [start: string, part: Pick<LazyPart<never>, "preload">])[] = [

@@ -7,7 +7,15 @@ const asked = (path: string, mode = "cors", method = "GET") =>
   handlingOf({ method, mode, url: new URL(path, SCOPE).href }, SCOPE);
 
 test("answers of the API and the help are never the worker's, however they are asked for", () => {
-  for (const path of ["api/graphs", "runner/api/runs", "healthz", "metrics", "help", "help/"]) {
+  for (const path of [
+    "api/graphs",
+    "runner/api/runs",
+    "healthz",
+    "metrics",
+    "help",
+    "help/",
+    "view",
+  ]) {
     for (const mode of ["cors", "navigate", "no-cors"]) expect(asked(path, mode)).toBe("pass");
   }
 });

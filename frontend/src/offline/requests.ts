@@ -1,7 +1,7 @@
 /** Decides what the service worker does with a request: pure, for the worker and its tests. */
 
 /** Beside the page on its origin: answered by the server or by nobody, and never kept. */
-const NOT_THE_PAGE = ["api/", "runner/", "schema", "help", "healthz", "readyz", "metrics"];
+const NOT_THE_PAGE = ["api/", "runner/", "schema", "help", "view", "healthz", "readyz", "metrics"];
 
 export type Handling =
   /** The browser asks the server, as if there were no worker. */

@@ -17,6 +17,7 @@ from action_assistant.editor.documents import contents
 from action_assistant.editor.log.graph_events import graph_of
 from action_assistant.editor.services import EditorState
 from action_assistant.editor.workers import encoded
+from action_assistant.umrf.files import codec
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.access import OfLink, Open, view_of
@@ -86,7 +87,7 @@ def routes(
         view, reader = view_of(request), app_state.services.graph_reader
         await require(view.thing)
         now = await reader.now(view.thing)
-        text = await reader.ask(contents.umrf, now)
+        text = await reader.ask(contents.umrf, now, codec.Stamp(view.thing, None, None))
         problems = await reader.ask(contents.problems, now)
         if not again:
             links.note_opening(view)
