@@ -21,6 +21,8 @@ WITHOUT_BODY = frozenset(
         "/api/members/{person}/end",
         "/api/devices/end",
         "/api/devices/codes",
+        "/api/passkeys/challenge",
+        "/api/passkeys/confirm/challenge",
         "/api/devices/{session}/end",
         "/api/tokens/{token}/revoke",
         "/api/view-links/{link}/revoke",

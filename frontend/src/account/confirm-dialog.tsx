@@ -1,11 +1,12 @@
 /** Asks the person to confirm who they are, by another device, where something was refused for that. */
 import { Button, Group, Modal, Text } from "@mantine/core";
-import { IconDevices } from "@tabler/icons-react";
+import { IconDevices, IconKey } from "@tabler/icons-react";
 import { useQueryClient } from "@tanstack/react-query";
 import { useEffect, useRef, useState } from "react";
 import { bringConfirmation, confirmByDevice } from "../api/confirmations";
 import { errorText, unconfirmed } from "../api/http";
 import { useLive } from "../api/page-link";
+import { confirmByPasskey, offersPasskeys } from "../api/passkeys";
 import { useStableCallback } from "../ui/hooks";
 import { useWatched } from "../ui/watched";
 import { isolated } from "../words/isolated";
@@ -80,6 +81,15 @@ function Means({ robots, onDone }: { robots: readonly string[]; onDone: () => vo
     }
     setWaiting(null);
   };
+  const show = async () => {
+    setProblem("");
+    try {
+      await confirmByPasskey(runner ?? "");
+      finish();
+    } catch (error) {
+      setProblem(errorText(error));
+    }
+  };
   if (confirmed) return <p role="status">Confirmed. Now do again what you wanted to do.</p>;
   if (waiting !== null) {
     return (
@@ -111,8 +121,17 @@ function Means({ robots, onDone }: { robots: readonly string[]; onDone: () => vo
         </p>
       )}
       <Group gap="sm">
+        {offersPasskeys() && (
+          <Button
+            variant="filled"
+            leftSection={<IconKey size={15} aria-hidden />}
+            onClick={() => void show()}
+          >
+            With a passkey
+          </Button>
+        )}
         <Button
-          variant="filled"
+          variant={offersPasskeys() ? "default" : "filled"}
           leftSection={<IconDevices size={15} aria-hidden />}
           onClick={() => void ask()}
         >

@@ -31,6 +31,7 @@ import { ago, dateText, instant, useNow } from "../ui/times";
 import { counted } from "../words/counted";
 import { isolated } from "../words/isolated";
 import { AddDevice } from "./add-device";
+import { Passkeys } from "./passkeys";
 import style from "./people-page.module.css";
 import { originsOf } from "./share-dialog";
 
@@ -54,6 +55,7 @@ export function PeoplePage() {
       <div className={style.inner}>
         <h2 className="page-title">{shares ? "People and devices" : "Your devices"}</h2>
         <Devices />
+        <Passkeys />
         {shares && <Persons />}
       </div>
     </main>

@@ -1,6 +1,5 @@
 /** Requests to editor and runner, and how they refuse. */
 import { hearAnswer, tick } from "../clock/server-clock";
-import { Watched } from "../ui/watched";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
 
@@ -147,19 +146,6 @@ export async function fetchText(url: string, request: RequestOptions = {}): Prom
   return (await fetchAnswer(url, request)).text();
 }
 
-/** Robots that want to know that it is this person; null if nothing has asked for that. */
-export const unconfirmed = new Watched<readonly string[] | null>(null);
-
-/** Have the page ask the person to confirm who they are, if that is why something was refused. */
-function noteUnconfirmed({ where }: ProblemDetails): void {
-  const { item, engines, robots } = { ...where } as Readonly<Record<string, unknown>>;
-  const each = Object.entries(engines ?? {}) as [string, { item?: string; robots?: object }][];
-  const asking = each.filter(([, why]) => why.item === "confirm");
-  const led = asking.flatMap(([name, why]) => (why.robots ? Object.keys(why.robots) : [name]));
-  if (item === "confirm") unconfirmed.set(Object.keys(robots ?? {}));
-  else if (led.length > 0) unconfirmed.set(led);
-}
-
 /** One sentence for people, whatever went wrong. */
 export function errorText(error: unknown): string {
   return error instanceof Error ? error.message : String(error);
@@ -183,7 +169,33 @@ function placeInFile(error: Refusal): string {
   return where?.path ? `at ${where.path}` : "";
 }
 
+/** Have the page ask the person to confirm who they are, if that is why something was refused. */
+function noteUnconfirmed({ where }: ProblemDetails): void {
+  const { item, engines, robots } = { ...where } as Readonly<Record<string, unknown>>;
+  const each = Object.entries(engines ?? {}) as [string, { item?: string; robots?: object }][];
+  const asking = each.filter(([, why]) => why.item === "confirm");
+  const led = asking.flatMap(([name, why]) => (why.robots ? Object.keys(why.robots) : [name]));
+  if (item === "confirm") unconfirmed.set(Object.keys(robots ?? {}));
+  else if (led.length > 0) unconfirmed.set(led);
+}
+
 type Listener = () => void;
+
+const confirmListeners = new Set<Listener>();
+let asking: readonly string[] | null = null;
+
+/** Robots that want to know that it is this person, none of them for other things; null if nothing asks. */
+export const unconfirmed = {
+  now: (): readonly string[] | null => asking,
+  subscribe: (listener: Listener): (() => void) => {
+    confirmListeners.add(listener);
+    return () => confirmListeners.delete(listener);
+  },
+  set: (robots: readonly string[] | null): void => {
+    asking = robots;
+    for (const listener of [...confirmListeners]) listener();
+  },
+};
 
 const listeners = new Set<Listener>();
 let ended = false;

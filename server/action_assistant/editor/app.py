@@ -27,6 +27,7 @@ from action_assistant.editor.api import (
     library,
     members,
     packages,
+    passkeys,
     provider,
     room,
     subgraphs,
@@ -53,6 +54,7 @@ from action_assistant.web.auth.confirmation_routes import confirmation_routes
 from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.device_codes import DeviceCodes
 from action_assistant.web.auth.keys import Keys, ScrapeToken, Session
+from action_assistant.web.auth.passkeys import PasskeyFiles, Passkeys
 from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.provider_settings import provider_of
 from action_assistant.web.auth.revocations import Revocations
@@ -144,7 +146,10 @@ def create_app(settings: EditorSettings) -> ASGIApp:
     confirmations = Confirmations(settings.data, keys)
     confirmations.prune()
     session_limits = limits_of(settings.sessions)
-    standings = Standings(people_files, browsers, session_limits, confirmations=confirmations)
+    passkey_files = PasskeyFiles(settings.data)
+    standings = Standings(
+        people_files, browsers, session_limits, confirmations=confirmations, passkeys=passkey_files
+    )
     browsers.every()  # forgets those that are over
     token_files = TokenFiles(settings.data, keys, revoked, most_days=settings.token_days)
     view_links = ViewLinks(settings.data, keys, revoked, "graph")
@@ -196,6 +201,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
             *_routes(app_state, addresses, browsers),
             *devices.routes(codes, browsers, addresses, audit, keys),
             *confirmation_routes(confirmations, limits=settings.limits),
+            *passkeys.routes(Passkeys(passkey_files), confirmations, audit),
             *tokens.routes(app_state, token_files, limits=settings.limits),
             *view.routes(app_state, view_links, addresses, audit, settings.frames),
             *doctor.routes(settings),

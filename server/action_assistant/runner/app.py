@@ -57,6 +57,7 @@ from action_assistant.web.auth.confirmation_routes import confirmation_routes
 from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, ScrapeToken
+from action_assistant.web.auth.passkeys import PasskeyFiles
 from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.released_versions import ReleasedVersions
 from action_assistant.web.auth.revocations import Revocations
@@ -292,7 +293,10 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
     confirmations = Confirmations(settings.data, keys)
     confirmations.prune()
     limits = limits_of(settings.sessions)
-    standings = Standings(people_files, browsers, limits, confirmations=confirmations)
+    passkey_files = PasskeyFiles(settings.data)
+    standings = Standings(
+        people_files, browsers, limits, confirmations=confirmations, passkeys=passkey_files
+    )
     services.identity_now = partial(_identity_now, standings, revoked)
     services.sight = RunSight(settings.data, keys)
     return application(

@@ -1451,6 +1451,14 @@ export interface EditorApi {
         hours?: number;
     };
     /**
+     * NewPasskey
+     * @description A passkey that a browser has made: its `PublicKeyCredential` as JSON.
+     */
+    NewPasskey: {
+        name: string;
+        credential: Record<string, unknown>;
+    };
+    /**
      * NewViewLink
      * @description The graph or run that a new link shows, by its id, and for how many days.
      */
@@ -1595,6 +1603,22 @@ export interface EditorApi {
         };
     };
     /**
+     * OwnPasskeys
+     * @description The passkeys of the person, and after how many minutes what only owners do needs a new
+     *     confirmation of them; 0: never.
+     */
+    OwnPasskeys: {
+        passkeys: EditorApi["PasskeyShown"][];
+        ask_again: number;
+    };
+    /**
+     * OwnerAsked
+     * @description Minutes after which what only owners do needs a new confirmation of this owner; 0: never.
+     */
+    OwnerAsked: {
+        ask_again: number;
+    };
+    /**
      * PackageContents
      * @description All files of the package of an action.
      */
@@ -1648,6 +1672,41 @@ export interface EditorApi {
         id: string;
         name: string;
         color: string;
+    };
+    /**
+     * PasskeyName
+     * @description The new name of a passkey.
+     */
+    PasskeyName: {
+        name: string;
+    };
+    /**
+     * PasskeyOptions
+     * @description The options for `navigator.credentials`, as its functions for JSON take them.
+     */
+    PasskeyOptions: {
+        options: Record<string, unknown>;
+    };
+    /**
+     * PasskeyProof
+     * @description The answer of a passkey to a challenge, as JSON.
+     */
+    PasskeyProof: {
+        credential: Record<string, unknown>;
+    };
+    /**
+     * PasskeyShown
+     * @description A passkey in a list. `rp`: the host name at which it works; `counts_at`: from when on it
+     *     confirms.
+     */
+    PasskeyShown: {
+        id: string;
+        name: string;
+        rp: string;
+        /** Format: date-time */
+        made_at: string;
+        /** Format: date-time */
+        counts_at: string;
     };
     /**
      * PastDocument
@@ -2754,6 +2813,26 @@ export interface EditorPaths {
     };
     "/api/confirmations/records": {
         post: EditorOperations["adoptConfirmation"];
+    };
+    "/api/passkeys": {
+        get: EditorOperations["listPasskeys"];
+        post: EditorOperations["registerPasskey"];
+    };
+    "/api/passkeys/challenge": {
+        post: EditorOperations["beginPasskey"];
+    };
+    "/api/passkeys/{passkey}": {
+        delete: EditorOperations["removePasskey"];
+        patch: EditorOperations["renamePasskey"];
+    };
+    "/api/passkeys/confirm/challenge": {
+        post: EditorOperations["beginPasskeyConfirmation"];
+    };
+    "/api/passkeys/confirm": {
+        post: EditorOperations["confirmByPasskey"];
+    };
+    "/api/passkeys/ask-again": {
+        put: EditorOperations["setOwnerAsked"];
     };
     "/api/tokens": {
         get: EditorOperations["listTokens"];
@@ -4561,6 +4640,102 @@ interface EditorOperations {
         requestBody: {
             content: {
                 "application/json": EditorApi["Confirmation"];
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    listPasskeys: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["OwnPasskeys"];
+                };
+            };
+        };
+    };
+    registerPasskey: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["NewPasskey"];
+            };
+        };
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["PasskeyShown"];
+                };
+            };
+        };
+    };
+    beginPasskey: {
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["PasskeyOptions"];
+                };
+            };
+        };
+    };
+    removePasskey: {
+        parameters: {
+            path: {
+                passkey: string;
+            };
+        };
+        responses: {
+            204: {
+            };
+        };
+    };
+    renamePasskey: {
+        parameters: {
+            path: {
+                passkey: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": EditorApi["PasskeyName"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["PasskeyShown"];
+                };
+            };
+        };
+    };
+    beginPasskeyConfirmation: {
+        responses: {
+            201: {
+                content: {
+                    "application/json": EditorApi["PasskeyOptions"];
+                };
+            };
+        };
+    };
+    confirmByPasskey: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["PasskeyProof"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["Confirmation"];
+                };
+            };
+        };
+    };
+    setOwnerAsked: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["OwnerAsked"];
             };
         };
         responses: {

@@ -48,7 +48,8 @@ MERGED: Final = frozenset({revocations.FOLDER, RECORDINGS})
 WHOLE: Final = frozenset(
     {
         *(keys.TOKEN_FILE, certificate.FOLDER, graph_seals.FILE, sight.FILE),
-        *("people", released_versions.FOLDER, "sessions", "sessions.db", "tokens", "views"),
+        *("people", "passkeys", "sessions", "sessions.db", "tokens", "views"),
+        released_versions.FOLDER,
     }
 )
 #: Files that are created again, or that belong to this data folder only.

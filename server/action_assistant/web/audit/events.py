@@ -114,6 +114,17 @@ class Confirmed(msgspec.Struct, frozen=True, omit_defaults=True):
     refused: bool = False
 
 
+class PasskeyChanged(msgspec.Struct, frozen=True):
+    """The author registered or removed one of their passkeys, or set after how many minutes they are
+    asked again for what only owners do (`what` "asked"; `name` has the minutes)."""
+
+    kind: ClassVar[str] = "audit.passkey_changed.v1"
+
+    passkey: str
+    name: str
+    what: Literal["registered", "removed", "asked"]
+
+
 class StartRefused(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """The author asked for a start, a change or a go-on that was refused, with the reason `why`.
     `engines`: the robots, or the simulator; `times`: how often within a minute."""

@@ -44,6 +44,7 @@ _EVENTS: Final = {
         events.PersonStored,
         events.ReleaseTold,
         events.Confirmed,
+        events.PasskeyChanged,
         events.StartRefused,
         events.StopPressed,
         events.StrangersRefused,
@@ -97,6 +98,12 @@ def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | No
             else:
                 text = f"confirmed {_CONFIRMED.get(how, how)} who uses the session {session}"
             return Fact(kind="sessions", text=text)
+        case events.PasskeyChanged(name=name, what=what):
+            if what == "asked":
+                text = f"set to {name} min after what time they are asked again as an owner"
+            else:
+                text = f"{what} the passkey {name}"
+            return Fact(kind="people", text=text)
         case events.StartRefused() as refused:
             return _refused(refused)
         case events.StopPressed(robot=robot, run=run, times=times):

@@ -46,7 +46,7 @@ from action_assistant.web.auth.revocations import (
     SessionGuards,
     sealed_standing,
 )
-from action_assistant.web.auth.rights import Denied, Thing, may
+from action_assistant.web.auth.rights import Denied, Thing, may, unconfirmed
 from action_assistant.web.auth.roles import OWNER, Permission
 from action_assistant.web.auth.standing import Standings
 from action_assistant.web.http.plain_texts import require_plain_address
@@ -119,10 +119,15 @@ def require(
     permission: Permission,
     thing: Thing | None = None,
 ) -> None:
-    """Raise Forbidden, with the reason, if the identity of this connection may not do this."""
-    decision = may(identity_of(connection), permission, thing, now=time.time())
+    """Raise Forbidden, with the reason, if the identity of this connection may not do this, or has to
+    confirm first who they are. Reading asks for no confirmation."""
+    identity = identity_of(connection)
+    decision = may(identity, permission, thing, now=time.time())
     if isinstance(decision, Denied):
         raise Forbidden(decision.reason)
+    is_change = connection.scope.get("method", "GET") not in _SAFE
+    if is_change and (reason := unconfirmed(identity, permission)):
+        raise Forbidden(reason, where={"item": "confirm"})
 
 
 class DeclaredRight:
@@ -418,6 +423,7 @@ class Access:
                 address=address,
                 confirmed_at=standing.confirmed_at,
                 asked_at=time.time(),
+                ask_again=standing.ask_again,
             )
             state["is_expired"] = lambda: self._standing(session).expired
             return

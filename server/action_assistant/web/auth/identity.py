@@ -68,12 +68,14 @@ Credential: TypeAlias = Session | Token | View
 
 class Standing(NamedTuple):
     """The present worth of a credential. `expired`: good for nothing but Stop. `confirmed_at`: when
-    the person of the session was last confirmed, in seconds since 1970; None if never."""
+    the person of the session was last confirmed, in seconds since 1970; None if never. `ask_again`:
+    minutes after which what only owners do needs a newer one; 0: never."""
 
     person: Person
     groups: frozenset[str]
     expired: bool
     confirmed_at: float | None = None
+    ask_again: int = 0
 
 
 class Identity(msgspec.Struct, frozen=True):
@@ -84,7 +86,8 @@ class Identity(msgspec.Struct, frozen=True):
     address of the client on the network; "" for this computer itself. `confirmed_at`: when the person
     last proved, in this session, that it is they, in seconds since 1970; None if never, and always
     for programs. `asked_at`: when the request was made, the moment at which a confirmation must not
-    be too old, in seconds since 1970; None for now.
+    be too old, in seconds since 1970; None for now. `ask_again`: minutes after which what only owners
+    do needs a newer confirmation; 0: never.
     """
 
     person: Person
@@ -95,6 +98,7 @@ class Identity(msgspec.Struct, frozen=True):
     address: str = ""
     confirmed_at: float | None = None
     asked_at: float | None = None
+    ask_again: int = 0
 
     @property
     def scopes(self) -> frozenset[Scope] | None:

@@ -22,6 +22,9 @@ SCOPES_FOR: Final[Mapping[Permission, frozenset[Scope]]] = {
 }
 
 
+_OF_OWNERS: Final = frozenset({"share", "restore"})
+
+
 class Allowed(msgspec.Struct, frozen=True):
     """The identity may do it."""
 
@@ -62,6 +65,17 @@ def may(
         return Allowed()
     reason = thing.refusal(identity, permission, now)
     return Allowed() if reason is None else Denied(reason)
+
+
+def unconfirmed(identity: Identity, permission: Permission) -> str:
+    """Return why an owner has to confirm first that it is they; "" if they need not. Only for what
+    owners alone may change, and only where this owner wants to be asked."""
+    if permission not in _OF_OWNERS or not identity.ask_again or identity.session is None:
+        return ""
+    at, last = identity.asked_at or 0.0, identity.confirmed_at
+    if last is not None and last >= at - identity.ask_again * 60:
+        return ""
+    return f"You want to be asked again after {identity.ask_again} min: confirm that it is you."
 
 
 def _out_of_scope(name: str, permission: Permission, scopes: list[Scope]) -> str:

@@ -11,15 +11,16 @@ from typing import Final
 from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.identity import Credential, Standing, Token, View
 from action_assistant.web.auth.keys import Person, Session
+from action_assistant.web.auth.passkeys import PasskeyFiles
 from action_assistant.web.auth.people_files import PeopleFiles
-from action_assistant.web.auth.roles import Role, rank
+from action_assistant.web.auth.roles import OWNER, Role, rank
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.session_limits import DEFAULTS, Limit
 
 
 class Standings:
-    """Knows the present standing of all credentials. `confirmations`: None where nobody is asked to
-    confirm anything."""
+    """Knows the present standing of all credentials. `confirmations`, `passkeys`: None where nobody is
+    asked to confirm anything."""
 
     def __init__(
         self,
@@ -28,7 +29,9 @@ class Standings:
         limits: Mapping[Role, Limit] = DEFAULTS,
         clock: Callable[[], float] = time.time,
         confirmations: Confirmations | None = None,
+        passkeys: PasskeyFiles | None = None,
     ) -> None:
+        self.passkeys: Final = passkeys
         self.confirmations: Final = confirmations
         self.people: Final = people
         self.browsers: Final = browsers
@@ -56,8 +59,11 @@ class Standings:
         confirmed_at = None
         if self.confirmations is not None and not isinstance(credential, Token):
             confirmed_at = self.confirmations.confirmed_at(credential.id)
+        ask_again = 0
+        if self.passkeys is not None and person.role == OWNER and not isinstance(credential, Token):
+            ask_again = self.passkeys.of(person.id).ask_again
         groups = frozenset(file.groups if file is not None else ())
-        return Standing(person, groups, over, confirmed_at)
+        return Standing(person, groups, over, confirmed_at, ask_again)
 
     def _is_idle(self, session: Session, role: Role, now: float) -> bool:
         """Return whether a session was not used for too long. One whose last use is unknown, as on
