@@ -1,10 +1,9 @@
 /** Sign-in by the identity provider of the server, where one is set. */
-import { Button, Paper, Text, Title } from "@mantine/core";
+import { Button, Text } from "@mantine/core";
 import { useEffect, useState } from "react";
 import { errorText } from "../api/http";
 import { pageUrl } from "../api/page-url";
-import { providerName, visitProvider } from "../api/session";
-import { Logo } from "../ui/top-bar";
+import { providerName, visitProvider } from "../api/provider";
 import style from "./sign-in.module.css";
 
 /** Return the name of the provider; null while it is not known, and where none is set. */
@@ -81,40 +80,5 @@ export function ProviderLink() {
       </a>
       .
     </>
-  );
-}
-
-/** The page on which a person who is signed in proves by the provider that it is they. `done`: they have;
- * `why`: what came of the last visit. */
-export function ProviderProof({ done, why }: { done: boolean; why: string }) {
-  return (
-    <main className={style.page}>
-      <Paper className={style.card} withBorder radius="lg">
-        <Logo />
-        <Title order={1} size="h3" mt="md">
-          {done ? "It is confirmed that it is you" : "Confirm that it is you"}
-        </Title>
-        <Text c="dimmed" mt="xs">
-          {done
-            ? "Close this tab, and go on in the one before."
-            : "You are asked for your password there, also if you are signed in."}
-        </Text>
-        {!done && <ProviderButton why={why} again />}
-      </Paper>
-    </main>
-  );
-}
-
-/** The page while the answer of the provider is examined. */
-export function ProviderWaiting() {
-  return (
-    <main className={style.page}>
-      <Paper className={style.card} withBorder radius="lg">
-        <Logo />
-        <Text mt="md" role="status">
-          Signing in …
-        </Text>
-      </Paper>
-    </main>
   );
 }

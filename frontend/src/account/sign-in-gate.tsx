@@ -5,17 +5,16 @@ import { useQueryClient } from "@tanstack/react-query";
 import { type ReactNode, useCallback, useEffect, useLayoutEffect, useMemo, useState } from "react";
 import { errorText, isOutcomeUnknown, Refusal, sessionEnd } from "../api/http";
 import { pageLink } from "../api/page-link";
+import { basePath } from "../api/page-url";
 import { PersonContext } from "../api/people";
 import {
   type Credential,
   credentialIn,
   currentPerson,
-  handInProviderAnswer,
   type InvitationPreview,
   identityOf,
   openSession,
   type Person,
-  type ProviderReturn,
   readInvitation,
   rememberedName,
   rememberedPerson,
@@ -23,7 +22,6 @@ import {
   renamePerson,
   takeCredential,
   takeFarewell,
-  takeProviderReturn,
 } from "../api/session";
 import { boundedPart } from "../ui/lazy-part";
 import { useRootMark } from "../ui/use-root-mark";
@@ -34,50 +32,26 @@ const SignIn = boundedPart(() => import("./sign-in").then((part) => part.SignIn)
 const Invitation = boundedPart(() => import("./sign-in").then((part) => part.Invitation));
 const DeviceSignIn = boundedPart(() => import("./sign-in").then((part) => part.DeviceSignIn));
 const SignInBar = boundedPart(() => import("./sign-in").then((part) => part.SignInBar));
-const ProviderProof = boundedPart(() =>
-  import("./provider-sign-in").then((part) => part.ProviderProof),
-);
-const ProviderWaiting = boundedPart(() =>
-  import("./provider-sign-in").then((part) => part.ProviderWaiting),
+const ProviderReturn = boundedPart(() =>
+  import("./provider-return").then((part) => part.ProviderReturn),
 );
 
 type Gate =
   | { at: "knocking" }
-  /** `provider`: the reason is about a sign-in by the provider of the server. */
-  | { at: "outside"; why: string; provider?: true }
-  /** The answer of the provider is examined. */
-  | { at: "returning" }
-  /** Somebody who is signed in proves by the provider that it is they, or has done so. */
-  | { at: "proving"; done: boolean; why: string }
+  | { at: "outside"; why: string }
+  /** Back from the provider of the server, or about to prove by it that it is they. */
+  | { at: "returned" }
   | { at: "invited"; key: Credential; invited: InvitationPreview }
   | { at: "device"; code: Credential }
   /** `offline`: no server has said who this is; it is who was here last. */
   | { at: "inside"; person: Person; visit: number; offline?: true };
 
-/** Return what came of a visit to the provider. */
-async function knockReturned(found: ProviderReturn): Promise<Gate> {
-  if (found.kind === "again") return { at: "proving", done: false, why: "" };
-  try {
-    const person = await handInProviderAnswer(found.answer);
-    return person === null
-      ? { at: "proving", done: true, why: "" }
-      : { at: "inside", person, visit: 0 };
-  } catch (error) {
-    const why = errorText(error);
-    // Whoever is signed in wanted to prove that it is they.
-    const known = await currentPerson().catch(() => null);
-    return known === null
-      ? { at: "outside", why, provider: true }
-      : { at: "proving", done: false, why };
-  }
-}
+/** Whether the address is that of `provider-return.tsx`, with something for it. */
+const isReturned = () =>
+  location.pathname === `${basePath}/signed-in` && /[?&](state|again)\b/.test(location.search);
 
-async function knock(onReturn: () => void): Promise<Gate> {
-  const returned = takeProviderReturn();
-  if (returned !== null) {
-    onReturn();
-    return knockReturned(returned);
-  }
+async function knock(): Promise<Gate> {
+  if (isReturned()) return { at: "returned" };
   const key = takeCredential();
   const before = rememberedPerson();
   try {
@@ -180,7 +154,7 @@ export function SignInGate({ children }: { children: ReactNode }) {
   useEffect(() => {
     let gone = false;
     const enter = () =>
-      void knock(() => setGate({ at: "returning" })).then((next) => {
+      void knock().then((next) => {
         if (gone) return;
         if (next.at === "inside") sessionEnd.clear();
         setGate((now) => {
@@ -235,8 +209,7 @@ export function SignInGate({ children }: { children: ReactNode }) {
     [gate, takeName],
   );
   if (gate.at === "knocking") return <div aria-busy="true" />;
-  if (gate.at === "returning") return <ProviderWaiting />;
-  if (gate.at === "proving") return <ProviderProof done={gate.done} why={gate.why} />;
+  if (gate.at === "returned") return <ProviderReturn onOpen={letIn} />;
   if (gate.at === "invited") {
     return <Invitation key={gate.key.text} link={gate.key} invited={gate.invited} onOpen={letIn} />;
   }
@@ -244,12 +217,7 @@ export function SignInGate({ children }: { children: ReactNode }) {
     return <DeviceSignIn key={gate.code.text} code={gate.code} onOpen={letIn} />;
   }
   if (hold === null) {
-    const { why, provider } = gate.at === "outside" ? gate : { why: "", provider: undefined };
-    return provider ? (
-      <SignIn why="" providerWhy={why} onOpen={letIn} />
-    ) : (
-      <SignIn why={why} onOpen={letIn} />
-    );
+    return <SignIn why={gate.at === "outside" ? gate.why : ""} onOpen={letIn} />;
   }
   return (
     <PersonContext value={hold}>

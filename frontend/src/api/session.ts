@@ -1,7 +1,6 @@
 /** Session of this browser: trades the token of the link for a cookie. */
 import { editor, runnerAt } from "./client";
 import { errorText, Refusal } from "./http";
-import { basePath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
 
 /** `personal`: an owner has given the name, since the person came by a personal link. */
@@ -86,7 +85,10 @@ export async function openSession(key: Credential, name = rememberedName()): Pro
   return personIn(await editor.post("/api/session", { body }));
 }
 
-const personIn = ({ person, personal }: EditorApi["SignedIn"]): Person => ({ ...person, personal });
+export const personIn = ({ person, personal }: EditorApi["SignedIn"]): Person => ({
+  ...person,
+  personal,
+});
 
 const DEVICE_LOOK = 1_000; // ms between two questions whether this device is confirmed
 
@@ -104,50 +106,6 @@ export async function signInByCode(
     if (signed_in) return personIn(signed_in);
     await new Promise((resolve) => setTimeout(resolve, DEVICE_LOOK));
   }
-}
-
-/** The place to which an identity provider sends the browser back. */
-const RETURN_PATH = `${basePath}/signed-in`;
-
-/** What stands in the address after a visit to the provider; `again`: a person wants to prove that it is
- * they, and has not been there yet. */
-export type ProviderReturn =
-  | { readonly kind: "answer"; readonly answer: EditorApi["ProviderAnswer"] }
-  | { readonly kind: "again" };
-
-/** Return what the provider sent the browser back with, and erase it from the address; null elsewhere. */
-export function takeProviderReturn(): ProviderReturn | null {
-  if (location.pathname !== RETURN_PATH) return null;
-  const said = new URLSearchParams(location.search);
-  const state = said.get("state");
-  if (state === null) return said.has("again") ? { kind: "again" } : null;
-  history.replaceState(history.state, "", RETURN_PATH);
-  const part = (name: string) => said.get(name)?.replace(/\p{Cc}/gu, " ") ?? null;
-  const [code, iss, error] = [part("code"), part("iss"), part("error")];
-  const answer = { state, code, iss, error, error_description: part("error_description") };
-  return { kind: "answer", answer };
-}
-
-/** Hand in the answer of the provider. Throws `Refusal` when it signs nobody in. Shows the page that the
- * person wanted to see in the address, which never leads to another site. */
-export async function handInProviderAnswer(answer: EditorApi["ProviderAnswer"]) {
-  const { goal, signed_in } = await editor.post("/api/session/provider/answer", { body: answer });
-  const back = goal.startsWith(RETURN_PATH) ? `${basePath}/` : goal;
-  if (signed_in) history.replaceState(history.state, "", back);
-  return signed_in ? personIn(signed_in) : null;
-}
-
-/** Return the name of the provider by which people may sign in at this address; null without one. */
-export async function providerName(): Promise<string | null> {
-  return (await editor.get("/api/session/provider", {})).name ?? null;
-}
-
-/** Send the browser to the provider; it comes back to the page of now. Throws `Refusal` when the
- * provider does not answer. */
-export async function visitProvider(again = false): Promise<void> {
-  const goal = location.pathname + location.search + location.hash;
-  const { url } = await editor.post("/api/session/provider", { body: { goal, again } });
-  location.assign(url);
 }
 
 /** Return the person of the cookie. Throws a `Refusal` with status 401 without one. */
