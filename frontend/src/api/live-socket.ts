@@ -464,6 +464,7 @@ function isOurs(now: LiveState, robot: Robot, held: HeldGraph): boolean {
   return openRuns(now).some(
     (run) =>
       isPieceOf(run, robot.name, held.graph) ||
+      held.run?.startsWith(`${run.id}.`) ||
       (run.engine === robot.name && (run.id === held.run || isPart(held.graph, run.graph_name))),
   );
 }

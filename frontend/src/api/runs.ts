@@ -3,7 +3,7 @@
 import { useQuery } from "@tanstack/react-query";
 import { newAid } from "../graph/document-keys";
 import { isolated } from "../words/isolated";
-import { runnerAt } from "./client";
+import { editor, runnerAt } from "./client";
 import { isOutcomeUnknown } from "./http";
 import { enginesOf, type LedOrder } from "./led-runs";
 import { getRun, type Run } from "./run-stop";
@@ -82,6 +82,22 @@ export interface StartOrder {
 /** `failed`: robots that nothing was sent to, and why. */
 export type Started = Pick<RunnerApi["GroupShown"], "runs" | "failed">;
 
+/**
+ * The rules of a version as the editor seals them, for the runner. Nothing if the editor has none or
+ * does not answer: where there are rules, only its starter and owners see the run then.
+ */
+async function sightOf(version: string): Promise<{ sight?: RunnerApi["Sight"] }> {
+  if (version === "") return {};
+  try {
+    const path = { version_id: version };
+    return {
+      sight: await editor.get("/api/versions/{version_id}/sight", { path, timeoutMs: 3000 }),
+    };
+  } catch {
+    return {};
+  }
+}
+
 /** Starts a version by value. The same `request` never starts twice. */
 export async function startRun(order: StartOrder): Promise<Started> {
   const [engine = "", ...others] = order.engines;
@@ -95,6 +111,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(order.script === undefined ? {} : { script: order.script }),
     ...(order.behaviours === true ? { behaviours: true } : {}),
     ...order.led,
+    ...(await sightOf(order.version)),
     umrf: order.umrf,
     ...order.inside,
   };
@@ -124,12 +141,13 @@ export function pauseOrResume(runner: string, run: string, way: "pause" | "resum
 }
 
 /** Gives a run another version of its graph, by value. Its engine pauses it for that. */
-export function modifyRun(
+export async function modifyRun(
   runner: string,
   run: string,
   version: { id: string; digest: string; umrf: string },
 ): Promise<Run> {
-  const body = { version: version.id, digest: version.digest, umrf: version.umrf };
+  const sight = await sightOf(version.id);
+  const body = { version: version.id, digest: version.digest, umrf: version.umrf, ...sight };
   return runnerAt(runner).post("/api/runs/{run}/modify", { path: { run }, body });
 }
 

@@ -29,6 +29,7 @@ import { instant, useNow } from "../ui/times";
 import type { Crumb } from "../ui/top-bar";
 import { isolated } from "../words/isolated";
 import { FailureCauses } from "./causes";
+import { HiddenRun } from "./hidden-run";
 import { graphsOn, LevelBar, type LevelCursor, useLevel } from "./levels";
 import { type ReplayCursor, useReplay } from "./replay";
 import { PlayerControls, silentTimesOf, timelineSignsOf } from "./replay-controls";
@@ -333,6 +334,23 @@ export function RunPage({ id, bar, start }: Props) {
     if (!stored.data) return null;
     return live ? { ...stored.data, ...live, umrf: stored.data.umrf } : stored.data;
   }, [stored.data, live]);
+  const { refetch } = stored;
+  const isHidden = (live ?? stored.data)?.hidden === true;
+  const isBack = stored.data?.hidden === true && live !== undefined && !isHidden;
+  useEffect(() => {
+    if (isBack) void refetch();
+  }, [isBack, refetch]);
+  if (run !== null && (isHidden || isBack)) {
+    const crumbs = [{ label: "Runs", to: "/runs" }, { label: `Run ${run.number}` }];
+    return (
+      <>
+        {bar({ crumbs, status: <RunStatus newest={run} run={run} past={false} /> })}
+        <main className="page">
+          <HiddenRun run={run} />
+        </main>
+      </>
+    );
+  }
   if (run !== null) return <Shown run={run} bar={bar} start={start} />;
   const crumbs = [{ label: "Runs", to: "/runs" }, { label: "Run" }];
   return (

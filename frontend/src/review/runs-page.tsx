@@ -43,7 +43,9 @@ const PAGE = 100;
 function overlaid(stored: readonly ListedRun[], live: ReadonlyMap<string, Run>): ListedRun[] {
   return stored.map((run) => {
     const now = live.get(run.id);
-    return now === undefined ? run : { ...run, ...now, archived: now.archived ?? run.archived };
+    if (now === undefined) return run;
+    const archived = now.archived ?? run.archived;
+    return { ...run, ...now, archived, hidden: now.hidden === true };
   });
 }
 
@@ -64,6 +66,21 @@ interface RunRowProps {
   onChoose: (chosen: boolean) => void;
 }
 
+/** What people, and the runner after its end, have noted of a run. */
+function Marks({ run }: { run: ListedRun }) {
+  return (
+    <>
+      {run.pinned && <IconPinFilled size={12} aria-label="pinned" className={style.pin} />}
+      {run.labels?.map((each) => (
+        <span key={each} className={style.label}>
+          {each}
+        </span>
+      ))}
+      {run.cause && <span className={style.cause}>{run.cause}</span>}
+    </>
+  );
+}
+
 function Row({ run, now, chosen, onChoose }: RunRowProps) {
   const [, go] = useLocation();
   const by = useCurrentName(run.author);
@@ -82,6 +99,7 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
           size="xs"
           aria-label={`Choose run ${run.number} to compare`}
           checked={chosen}
+          disabled={run.hidden === true}
           onChange={(event) => onChoose(event.currentTarget.checked)}
         />
       </td>
@@ -94,19 +112,12 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
           className="ink-inherit weight-500 no-underline rounded-4"
           onClick={(event) => event.stopPropagation()}
         >
-          <span className={style.number}>Run {run.number}</span> {run.graph_name}
+          <span className={style.number}>Run {run.number}</span>{" "}
+          {run.hidden ? <span className="ink3">of {run.graph_name}</span> : run.graph_name}
         </Link>
-        {run.pinned && <IconPinFilled size={12} aria-label="pinned" className={style.pin} />}
-        {run.labels?.map((each) => (
-          <span key={each} className={style.label}>
-            {each}
-          </span>
-        ))}
-        {run.cause && <span className={style.cause}>{run.cause}</span>}
+        {!run.hidden && <Marks run={run} />}
       </td>
-      <td>
-        <span className={style.version}>{label}</span>
-      </td>
+      <td>{!run.hidden && <span className={style.version}>{label}</span>}</td>
       <td className="ink2">{runPlace(run)}</td>
       <td>{by}</td>
       <td className="ink2">{start !== null && `${day(start, now)} ${clock(start)}`}</td>

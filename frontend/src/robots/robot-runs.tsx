@@ -76,9 +76,11 @@ function LedRun({ run, robot }: { run: Run; robot: string }) {
   const further =
     run.desired === "stopped"
       ? "it is being stopped, no further action begins here"
-      : run.held
-        ? "further actions begin here once a person lets it go on"
-        : "further actions begin here until it ends";
+      : run.hidden
+        ? "more of it may begin here until it ends"
+        : run.held
+          ? "further actions begin here once a person lets it go on"
+          : "further actions begin here until it ends";
   return (
     <li className={style.line}>
       {rest && <StateLabel still tone={rest.tone} word={rest.words} />}

@@ -148,3 +148,12 @@ test("what a robot ran when it last answered is not said to move while it does n
     { kind: "unknown", words: "not known, ran patrol when it last answered" },
   ]);
 });
+
+test("of a hidden run nothing is said to rest or to move, and its pieces are not foreign", () => {
+  const graph_name = "a graph that you may not see";
+  const hidden = run({ hidden: true, graph_name, robots: { atlas: "atlas" } });
+  const held = { graph: graph_name, state: "RUNNING", active: true, run: "r.1", stopping: null };
+  const engines = [{ name: "atlas", state: "answering", simulated: false, holds: [held] }];
+  const now = { ...live([hidden]), engines: engines as unknown as LiveState["engines"] };
+  expect(movesNow(now)).toEqual([{ robot: "atlas", run: "r", kind: "unknown", words: graph_name }]);
+});

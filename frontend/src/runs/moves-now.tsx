@@ -109,6 +109,10 @@ function ofRobot(run: Run, robot: string, silent = false): Moving {
   ) {
     return { ...base, kind: "unknown", words: "not known" };
   }
+  if (run.hidden) {
+    const words = AT_NO_WORD[run.state] ?? run.graph_name;
+    return { ...base, kind: "unknown", words };
+  }
   const names = movingActions(run);
   if (names.length > 0) return { ...base, kind: "moves", words: names.join(", ") };
   const waits = run.robots ? "waits" : "no action seen to run";

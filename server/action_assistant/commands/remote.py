@@ -207,6 +207,7 @@ def _run(options: argparse.Namespace) -> int:
             "request_id": str(uuid.uuid4()),
             "graph": graph,
         }
+        order["sight"] = server.editor("GET", f"/api/versions/{version['id']}/sight").json()
         if version.get("subgraphs"):
             order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
         if options.robots is not None:
