@@ -187,6 +187,11 @@ def _action(name: str) -> dict[str, Any]:
     return {"name": name, "type": "sync", "instance_id": 0}
 
 
+def _view_link(walk: Walk, process: str, thing: str) -> None:
+    link = walk(process, "post", "/api/view-links", {"thing": thing})["id"]
+    walk(process, "post", "/api/view-links/{link}/revoke", link=link)
+
+
 def _graphs(walk: Walk) -> None:
     def made(name: str, *actions: str) -> str:
         graph: str = walk("editor", "post", "/api/graphs", _file(name, *actions or "AB"))["id"]
@@ -199,6 +204,7 @@ def _graphs(walk: Walk) -> None:
     walk("editor", "put", "/api/versions/{version_id}/release", version_id=version)
     walk("editor", "delete", "/api/versions/{version_id}/release", version_id=version)
     walk("editor", "post", "/api/graphs/{graph_id}/restore", {"seq": 1}, graph_id=graph)
+    _view_link(walk, "editor", graph)
     other = made("other")
     walk("editor", "patch", "/api/graphs/{graph_id}", {"name": "new"}, graph_id=other)
     undo = {"author": "local", "from_seq": 2, "seq": 2}
@@ -289,6 +295,7 @@ def _runs(walk: Walk) -> None:
         return run
 
     run = started("one")
+    _view_link(walk, "runner", run)
     walk("runner", "post", "/api/runs/{run}/pause", run=run)
     walk("runner", "post", "/api/runs/{run}/resume", run=run)
     changed = {"version": "v2", "digest": start_of("", "")["digest"], "umrf": GRAPH}
