@@ -38,21 +38,21 @@ export function ruleWords(rule: Rule, what: "it" | "them", nameOf: NameOf): stri
   const editing = editors === "all" || editors.length > 0;
   if (readers === "all") {
     if (editors === "all") return `Everybody may see and edit ${what}.`;
-    const who = editing ? listed(editors, nameOf) : "owners";
-    return `Everybody may see ${what}. Only ${who} may edit ${what}.`;
+    const changers = editing ? listed(editors, nameOf) : "owners";
+    return `Everybody may see ${what}. Only ${changers} may edit ${what}.`;
   }
   const named = editors === "all" ? readers : [...new Set([...readers, ...editors])];
   if (named.length === 0) return `Only owners may see ${what}.`;
-  const who = listed(named, nameOf);
+  const viewers = listed(named, nameOf);
   if (editors === "all" || named.every((id) => editors.includes(id))) {
-    return `Only ${who} may see and edit ${what}.`;
+    return `Only ${viewers} may see and edit ${what}.`;
   }
-  const only = editing ? listed(editors, nameOf) : "owners";
-  return `Only ${who} may see ${what}. Only ${only} may edit ${what}.`;
+  const changers = editing ? listed(editors, nameOf) : "owners";
+  return `Only ${viewers} may see ${what}. Only ${changers} may edit ${what}.`;
 }
 
 interface ChoiceProps {
-  label: string;
+  question: string;
   /** The word for "all". */
   all: string;
   who: Who;
@@ -61,7 +61,7 @@ interface ChoiceProps {
 }
 
 /** Chooses everybody, or persons and groups. */
-function Choice({ label, all, who, nameOf, onChange }: ChoiceProps) {
+function Choice({ question, all, who, nameOf, onChange }: ChoiceProps) {
   const { groups, people } = useEntitled();
   // Kept while "everybody" is chosen, so that trying that out loses nobody.
   const [some, setSome] = useState<readonly string[]>(who === "all" ? [] : who);
@@ -72,11 +72,11 @@ function Choice({ label, all, who, nameOf, onChange }: ChoiceProps) {
   return (
     <Stack gap={6}>
       <Text fw={550} size="sm" component="span">
-        {label}
+        {question}
       </Text>
       <SegmentedControl
         fullWidth
-        aria-label={label}
+        aria-label={question}
         value={who === "all" ? "all" : "some"}
         onChange={(value) => onChange(value === "all" ? "all" : [...some])}
         data={[
@@ -86,7 +86,7 @@ function Choice({ label, all, who, nameOf, onChange }: ChoiceProps) {
       />
       {who !== "all" && (
         <MultiSelect
-          aria-label={`${label}: persons and groups`}
+          aria-label={`${question}: persons and groups`}
           placeholder={who.length === 0 ? "Nobody but owners yet" : ""}
           searchable
           data={[
@@ -154,14 +154,14 @@ function Form({ ruled, isInside, view, onClose }: Omit<Props, "name"> & { view: 
         {!inherits && (
           <>
             <Choice
-              label={`Who may see ${what}`}
+              question={`Who may see ${what}`}
               all="Everybody"
               who={rule.readers}
               nameOf={nameOf}
               onChange={(readers) => setRule({ ...rule, readers })}
             />
             <Choice
-              label={`Who may edit ${what}`}
+              question={`Who may edit ${what}`}
               all={rule.readers === "all" ? "Everybody" : "All who may see"}
               who={rule.editors}
               nameOf={nameOf}
