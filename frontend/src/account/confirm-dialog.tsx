@@ -11,6 +11,7 @@ import { useStableCallback } from "../ui/hooks";
 import { useWatched } from "../ui/watched";
 import { isolated } from "../words/isolated";
 import style from "./people-page.module.css";
+import { ProofLink } from "./provider-sign-in";
 
 export function ConfirmDialog() {
   const robots = useWatched(unconfirmed);
@@ -138,6 +139,7 @@ function Means({ robots, onDone }: { robots: readonly string[]; onDone: () => vo
           On another device
         </Button>
       </Group>
+      <ProofLink />
       <Text size="xs" c="dimmed">
         Stop never asks for this. A device that you add now can confirm from tomorrow on.
       </Text>

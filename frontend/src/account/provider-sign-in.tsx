@@ -3,28 +3,30 @@ import { Button, Text } from "@mantine/core";
 import { useEffect, useState } from "react";
 import { errorText } from "../api/http";
 import { pageUrl } from "../api/page-url";
-import { providerName, visitProvider } from "../api/provider";
+import { PROOF_URL, providerOffer, visitProvider } from "../api/provider";
 import style from "./sign-in.module.css";
 
-/** Return the name of the provider; null while it is not known, and where none is set. */
-function useProvider(): string | null {
-  const [name, setName] = useState<string | null>(null);
+const NONE = { name: null, mine: false } as const;
+
+/** Return the provider; one without a name while it is not known, and where none is set. */
+function useProvider() {
+  const [offer, setOffer] = useState<Awaited<ReturnType<typeof providerOffer>>>(NONE);
   useEffect(() => {
     let gone = false;
-    providerName().then(
-      (found) => !gone && setName(found),
+    providerOffer().then(
+      (found) => !gone && setOffer(found),
       () => {}, // the other ways to sign in say it when the server does not answer
     );
     return () => {
       gone = true;
     };
   }, []);
-  return name;
+  return offer;
 }
 
 /** The button that leads to the provider; nothing where none is set. `why`: what came of the last visit. */
 export function ProviderButton({ why, again = false }: { why: string; again?: boolean }) {
-  const name = useProvider();
+  const { name } = useProvider();
   const [problem, setProblem] = useState(why);
   const [busy, setBusy] = useState(false);
   useEffect(() => {
@@ -48,7 +50,7 @@ export function ProviderButton({ why, again = false }: { why: string; again?: bo
           {problem}
         </Text>
       )}
-      {name !== null && (
+      {name != null && (
         <>
           <Button variant="filled" fullWidth mt="md" loading={busy} onClick={go}>
             <span className={style.provider}>
@@ -69,8 +71,8 @@ export function ProviderButton({ why, again = false }: { why: string; again?: bo
 /** A link to the page in another tab, where a person signs in by the provider while edits stay in this
  * one. */
 export function ProviderLink() {
-  const name = useProvider();
-  if (name === null) return null;
+  const { name } = useProvider();
+  if (name == null) return null;
   return (
     <>
       {" "}
@@ -80,5 +82,21 @@ export function ProviderLink() {
       </a>
       .
     </>
+  );
+}
+
+/** A link to the page in another tab on which a person who came by the provider proves by it that it is
+ * they; nothing for others. */
+export function ProofLink() {
+  const { name, mine } = useProvider();
+  if (name == null || !mine) return null;
+  return (
+    <Text size="sm">
+      Or{" "}
+      <a href={PROOF_URL} target="_blank" rel="noopener">
+        sign in with <bdi>{name}</bdi> again
+      </a>
+      , in a new tab, and come back to this one.
+    </Text>
   );
 }

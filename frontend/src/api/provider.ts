@@ -35,10 +35,13 @@ export async function handInProviderAnswer(answer: EditorApi["ProviderAnswer"]) 
   return signed_in ? personIn(signed_in) : null;
 }
 
-/** Return the name of the provider by which people may sign in at this address; null without one. */
-export async function providerName(): Promise<string | null> {
-  return (await editor.get("/api/session/provider", {})).name ?? null;
+/** Return the provider by which people may sign in at this address; its name is null without one. */
+export function providerOffer(): Promise<EditorApi["ProviderOffer"]> {
+  return editor.get("/api/session/provider", {});
 }
+
+/** The address of the page on which a person proves by the provider that it is they. */
+export const PROOF_URL = `${RETURN_PATH}?again`;
 
 /** Send the browser to the provider; it comes back to the page of now. Throws `Refusal` when the
  * provider does not answer. */

@@ -192,7 +192,8 @@ def create_app(settings: EditorSettings) -> ASGIApp:
         settings.port,
         addresses,
         browsers,
-        lambda session: confirmations.confirm(session, "oidc"),
+        confirmations,
+        audit,
     )
     return application(
         [

@@ -115,7 +115,7 @@ def test_a_person_comes_in_with_the_role_of_their_groups(
     editor: Editor, provider: Provider, browser: Open
 ) -> None:
     mari = browser()
-    assert mari.http.get("/api/session/provider").json() == {"name": "Lab login"}
+    assert mari.http.get("/api/session/provider").json() == {"name": "Lab login", "mine": False}
     came = mari.hand_in(mari.begin("/graphs/g1?level=2#x"))
     assert came.status_code == 200, came.text
     assert came.json()["goal"] == "/graphs/g1?level=2#x"
@@ -379,6 +379,7 @@ def test_a_person_proves_again_that_it_is_they(
 ) -> None:
     here = browser()
     here.come("vera", "lab")
+    assert here.http.get("/api/session/provider").json()["mine"] is True
     session = here.http.get("/api/devices").json()["this"]
     kept = Confirmations(editor.data, Keys(TOKEN))
     now = int(time.time())
@@ -401,6 +402,10 @@ def test_a_person_proves_again_that_it_is_they(
     found = kept.last(session)
     assert found is not None
     assert (found.how, abs(found.at - time.time()) < 60) == ("oidc", True)
+    with editor.client() as owner:
+        rows = owner.get("/api/audit").json()["rows"]
+    mine = [each["text"] for each in rows if each.get("person", {}).get("name") == "Vera"]
+    assert sum("confirmed" in each for each in mine) == 1, mine
     # It is the proof of the session that began, and of no other one.
     answer = here.begin(again=True)
     here.come("vera", "lab")

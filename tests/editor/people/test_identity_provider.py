@@ -294,5 +294,5 @@ async def test_secrets_stand_in_no_refusal(server: Provider) -> None:
 
 
 def test_without_the_setting_nothing_is_offered(http: httpx.Client) -> None:
-    assert http.get("/api/session/provider").json() == {"name": None}
+    assert http.get("/api/session/provider").json() == {"name": None, "mine": False}
     assert http.post("/api/session/provider", json={}).status_code == 409

@@ -1929,10 +1929,11 @@ export interface EditorApi {
     /**
      * ProviderOffer
      * @description The provider by which people may sign in from the address that they came to. `name`: null where
-     *     there is none.
+     *     there is none. `mine`: the person who asks came by it, and can prove by it that it is they.
      */
     ProviderOffer: {
         name: string | null;
+        mine: boolean;
     };
     /**
      * ProviderResult

@@ -31,13 +31,17 @@ from action_assistant.errors import Conflict, Forbidden, Unauthenticated
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import one_line
 from action_assistant.settings import LOOPBACK
+from action_assistant.web.audit.events import Confirmed
+from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import (
     Open,
     client_address,
     cookie_values,
     live_session,
+    session_of,
 )
 from action_assistant.web.auth.caller import Origin, acting_for
+from action_assistant.web.auth.confirmations import Confirmations
 from action_assistant.web.auth.keys import Keys, Session
 from action_assistant.web.auth.session_files import SessionFiles
 from action_assistant.web.auth.sessions import (
@@ -63,9 +67,10 @@ _Asking = Request[Any, Any, Any]
 
 class ProviderOffer(msgspec.Struct, frozen=True):
     """The provider by which people may sign in from the address that they came to. `name`: null where
-    there is none."""
+    there is none. `mine`: the person who asks came by it, and can prove by it that it is they."""
 
     name: str | None
+    mine: bool = False
 
 
 class ProviderBegin(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -122,7 +127,8 @@ class ProviderSignIn:
         page_port: int,
         addresses: Addresses,
         browsers: SessionFiles,
-        confirm: Callable[[str], object],
+        confirmations: Confirmations,
+        audit: AuditLog,
         clock: Callable[[], float] = time.time,
     ) -> None:
         self._provider = provider
@@ -133,7 +139,8 @@ class ProviderSignIn:
         self._port = page_port
         self._addresses = addresses
         self._browsers = browsers
-        self._confirm = confirm
+        self._confirmations = confirmations
+        self._audit = audit
         self._clock = clock
         self._answered: dict[str, float] = {}  # states, until when they are kept
 
@@ -141,7 +148,9 @@ class ProviderSignIn:
         """Return the provider that is offered at the address that the person came to."""
         if self._provider is None or self._page(request) is None:
             return ProviderOffer(None)
-        return ProviderOffer(self._provider.settings.name)
+        session = session_of(request)
+        mine = session is not None and self._knows(session.person.id)
+        return ProviderOffer(self._provider.settings.name, mine)
 
     async def begin(self, data: ProviderBegin, request: _Asking) -> Response[ProviderVisit]:
         """Return the address of the provider, with the cookie of this sign-in. Raise Unavailable if
@@ -151,8 +160,7 @@ class ProviderSignIn:
         session = ""
         if data.again:
             asking = live_session(request)
-            _, record = self._app_state.services.members.known(asking.person.id)
-            if record is None or record.issuer != provider.settings.issuer:
+            if not self._knows(asking.person.id):
                 raise Conflict(f"You did not come by {provider.settings.name}.")
             session = asking.id
         under_way = _UnderWay(
@@ -205,6 +213,12 @@ class ProviderSignIn:
                 "computer of the server itself."
             )
         return self._provider, page
+
+    def _knows(self, person: str) -> bool:
+        """Return whether a person came by this provider."""
+        _, record = self._app_state.services.members.known(person)
+        known = None if self._provider is None else self._provider.settings.issuer
+        return record is not None and record.issuer == known
 
     def _page(self, request: _Asking) -> str | None:
         """Return the address of the page as the person came to it; None unless the way is encrypted or
@@ -278,7 +292,8 @@ class ProviderSignIn:
         since = self._clock() - under_way.begun + _ASKED_S
         if found.asked_s is None or not -_SKEW_S <= found.asked_s <= since:
             raise Forbidden(f"{name} did not ask you again, so this proves nothing.")
-        await to_thread.run_sync(self._confirm, session.id)
+        await to_thread.run_sync(self._confirmations.confirm, session.id, "oidc")
+        self._audit.note(Confirmed(session.id, "oidc"), session.person.id)
 
     def _baked(self, request: _Asking, state: str, value: str = "") -> Cookie:
         """Return the cookie of a sign-in; without a value, one that deletes it. It comes along when
