@@ -29,6 +29,8 @@ import { useMay, usePerson } from "../api/people";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { useOpening } from "../ui/late-opening";
 import { Segments } from "../ui/segments";
+import { InboxList } from "./inbox";
+import { NotificationSwitch } from "./notifier";
 
 const schemes = [
   { value: "light", label: <IconSun size={15} aria-label="Light" /> },
@@ -115,6 +117,7 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
             You are here as {person.role}: you may {ROLE_WORDS[person.role]}.
           </Text>
         )}
+        <InboxList onClose={onClose} />
         {onShare !== null && (
           <Button
             leftSection={<IconShare size={15} aria-hidden />}
@@ -173,6 +176,7 @@ export function AccountPanel({ onShare, onClose, onLeave }: Props) {
           </Text>
         )}
         <Appearance />
+        <NotificationSwitch />
         <Button
           component="a"
           href={helpUrl("")}

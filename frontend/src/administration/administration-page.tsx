@@ -6,6 +6,7 @@ import { Empty } from "../ui/empty";
 import { ago, instant } from "../ui/times";
 import style from "./administration.module.css";
 import { Findings } from "./findings";
+import { MessagesCard } from "./messages";
 import { Facts, ProcessCard, type StatusFact } from "./process-card";
 import { type Backups, bytes, type ProcessStatus, span, useStatus } from "./status";
 
@@ -23,6 +24,7 @@ function Inside() {
       {ofEditor.data && (
         <BackupsCard backups={ofEditor.data.backups ?? null} at={ofEditor.data.at} />
       )}
+      <MessagesCard runner={runner} />
       <Findings />
     </>
   );

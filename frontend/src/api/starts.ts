@@ -1,5 +1,5 @@
 /** Before a start: what is looked at, and who has said yes. */
-import { runnerAt } from "./client";
+import { editor, runnerAt } from "./client";
 import type { LedOrder } from "./led-runs";
 import type { Preflight } from "./robots";
 import type { Inside } from "./runs";
@@ -14,6 +14,18 @@ export function fetchApprovals(
   signal: AbortSignal,
 ): Promise<Approval[]> {
   return runnerAt(runner).get("/api/approvals", { query: { digest }, signal });
+}
+
+/** Ask others for their yes by mail or webhook. Returns to how many receivers the question goes. */
+export async function askApproval(
+  runner: string,
+  question: Omit<RunnerApi["ApprovalQuestion"], "graph_name" | "graph"> & { graph: string },
+): Promise<number> {
+  const { name } = await editor.get("/api/graphs/{graph_id}", {
+    path: { graph_id: question.graph },
+  });
+  const body = { ...question, graph_name: name };
+  return (await runnerAt(runner).post("/api/approvals/asked", { body })).receivers;
 }
 
 export function approve(runner: string, body: RunnerApi["ApprovalRequest"]): Promise<Approval> {

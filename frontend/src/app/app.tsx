@@ -3,6 +3,7 @@ import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { useEffect, useState } from "react";
 import { Route, Router, Switch } from "wouter";
+import { Notifier } from "../account/notifier";
 import { SignInGate } from "../account/sign-in-gate";
 import { Refusal, unconfirmed } from "../api/http";
 import { useLive } from "../api/page-link";
@@ -183,6 +184,7 @@ export function App() {
               <DragPreview />
               <NewVersionNotice />
               <LiveRegion />
+              <Notifier />
             </DropFiles>
           </SignInGate>
         </Router>

@@ -3,9 +3,11 @@
 import { Button, NativeSelect } from "@mantine/core";
 import { IconMessageCircle } from "@tabler/icons-react";
 import { useState } from "react";
+import { useSearch } from "wouter";
 import { usePerson } from "../api/people";
 import { serverNow } from "../clock/server-clock";
 import { selectedActions, useEditorContext } from "../edit-actions/editor-context";
+import { commentIn } from "../edit-actions/graph-links";
 import { beginThread, type Thread } from "../graph/edit/comments";
 import { pathWords } from "../graph/field-words";
 import type { Action, Key } from "../graph/model";
@@ -33,8 +35,9 @@ function Begin({ action, name }: { action: Action; name: string }) {
     ...action.outputs.map(({ path }) => `out/${path}`),
   ];
   const author = { id: person.id, name: person.name };
-  const say = (text: string) => {
-    beginThread(doc, action.key, { author, at: serverNow(), text }, parameter || null);
+  const say = (text: string, mentions: readonly string[]) => {
+    const words = { author, at: serverNow(), text, mentions };
+    beginThread(doc, action.key, words, parameter || null);
     setParameter("");
   };
   return (
@@ -84,11 +87,14 @@ interface Props {
 
 export function Comments({ threads, only }: Props) {
   const context = useEditorContext();
-  const [done, setDone] = useState(false);
+  const [isDoneShown, setDone] = useState(false);
   const [chosen = null] = selectedActions(context);
   const action = only ?? chosen;
   const here = threads.filter((thread) => action === null || thread.about === action.key);
   const open = here.filter((thread) => !thread.resolved);
+  const asked = commentIn(useSearch());
+  // A link to a comment shows it, also where its thread is resolved.
+  const done = isDoneShown || here.some(({ id, resolved }) => resolved && id === asked);
   const resolved = here.length - open.length;
   const go = (about: Key) => {
     context.select([about]);

@@ -65,7 +65,12 @@ export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
   const [answering, setAnswering] = useState(() => waits);
   const me = () => ({ author: { id: person.id, name: person.name }, at: serverNow() });
   return (
-    <li className={style.thread} data-resolved={thread.resolved || undefined}>
+    <li
+      className={style.thread}
+      data-thread={thread.id}
+      tabIndex={-1}
+      data-resolved={thread.resolved || undefined}
+    >
       {place !== null &&
         (onPlace ? (
           <button type="button" className={style.place} onClick={onPlace}>
@@ -90,8 +95,8 @@ export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
             button="Answer"
             autoFocus
             onCancel={() => setAnswering(false)}
-            onSay={(text) => {
-              reply(doc, thread.id, { ...me(), text });
+            onSay={(text, mentions) => {
+              reply(doc, thread.id, { ...me(), text, mentions });
               setAnswering(false);
             }}
           />

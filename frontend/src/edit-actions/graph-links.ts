@@ -65,6 +65,11 @@ export function asksForHistory(search: string): boolean {
   return new URLSearchParams(search).has("history");
 }
 
+/** Return the thread of the comment (`THREAD/MESSAGE`) that an address points at; null for none. */
+export function commentIn(search: string): string | null {
+  return new URLSearchParams(search).get("comment")?.split("/")[0] || null;
+}
+
 const SEQ = /^[1-9]\d{0,14}$/;
 const RUN = /^run\/[\w-]{1,80}$/;
 

@@ -9,8 +9,16 @@ import { useSearch } from "wouter";
 import { ChangeMarked } from "../canvas/marks/change-marks";
 import { NO_PROBLEM_MARKS, type ProblemMarks } from "../canvas/marks/problem-marks";
 import { type EditorContext, useEditorContext } from "../edit-actions/editor-context";
-import { asksForHistory, present, targetOf, withPast } from "../edit-actions/graph-links";
+import {
+  asksForHistory,
+  commentIn,
+  present,
+  targetOf,
+  withPast,
+} from "../edit-actions/graph-links";
 import { shownKeys } from "../edit-actions/view";
+import { rootOf } from "../graph/document-keys";
+import { readThreads } from "../graph/edit/comments";
 import { EMPTY_GRAPH, type Key, type Position } from "../graph/model";
 import type { SeenPast } from "../history/past-bar";
 import { RobotFilter } from "../outline/robot-filter";
@@ -291,6 +299,25 @@ function useGraphLink(context: EditorContext, begun: boolean): void {
   now.current = context;
   useEffect(() => {
     if (begun && asksForHistory(search)) now.current.setPanel("history");
+  }, [search, begun]);
+  useEffect(() => {
+    const asked = begun ? commentIn(search) : null;
+    if (asked === null) return;
+    const { doc, select, setPanel, view } = now.current;
+    const thread = readThreads(rootOf(doc, "comments").entries()).find(({ id }) => id === asked);
+    setPanel("comments");
+    if (thread === undefined) {
+      notifications.show({ message: "The comment is not there any more." });
+      return;
+    }
+    const about = present(now.current.graph, [thread.about]);
+    select(about);
+    const timer = setTimeout(() => {
+      if (about.length > 0) view.show(about);
+      const card = document.querySelector<HTMLElement>(`[data-thread="${CSS.escape(asked)}"]`);
+      card?.focus();
+    }, SETTLED);
+    return () => clearTimeout(timer);
   }, [search, begun]);
   useEffect(() => {
     const target = begun ? targetOf(search) : null;

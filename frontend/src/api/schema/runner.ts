@@ -197,6 +197,13 @@ export interface RunnerApi {
         why: string;
     };
     /**
+     * AskedOthers
+     * @description The number of receivers to which the question is sent.
+     */
+    AskedOthers: {
+        receivers: number;
+    };
+    /**
      * AtRestShown
      * @description The observation that a run is at rest, where no answer of the engine could prove it: by whom
      *     (null: the runner saw the engine's process end), when, and how.
@@ -3497,6 +3504,9 @@ interface RunnerOperations {
         };
         responses: {
             202: {
+                content: {
+                    "application/json": RunnerApi["AskedOthers"];
+                };
             };
         };
     };

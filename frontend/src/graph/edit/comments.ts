@@ -111,24 +111,30 @@ interface Words {
   readonly author: CommentAuthor;
   readonly at: number;
   readonly text: string;
+  /** The ids of the persons whom the text mentions. */
+  readonly mentions?: readonly string[];
 }
 
 /** Begins a thread about an action, or one of its parameters. Returns its id. */
 export function beginThread(
   doc: Y.Doc,
   about: Key,
-  { author, at, text: words }: Words,
+  { author, at, text: words, mentions }: Words,
   parameter: string | null = null,
 ): string {
   const thread = newAid();
   const place = parameter === null ? { about } : { about, parameter };
-  write(doc, thread, { ...place, author, at, text: words });
+  write(doc, thread, { ...place, author, at, text: words, ...named(mentions) });
   return thread;
 }
 
-export function reply(doc: Y.Doc, thread: string, { author, at, text: words }: Words): void {
-  write(doc, thread, { author, at, text: words });
+export function reply(doc: Y.Doc, thread: string, words: Words): void {
+  const { author, at, text: said, mentions } = words;
+  write(doc, thread, { author, at, text: said, ...named(mentions) });
 }
+
+/** Only a comment that mentions somebody has the field: the server looks for its name. */
+const named = (mentions: readonly string[] = []) => (mentions.length > 0 ? { mentions } : {});
 
 /** Says that a thread is done, or that it is not. */
 export function resolve(

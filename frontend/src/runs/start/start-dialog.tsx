@@ -1,6 +1,6 @@
 /** Before a start: where it goes, what was looked at there, and exactly what will be sent. */
 import { Button, Modal, Text, Textarea } from "@mantine/core";
-import { IconPlayerPlayFilled, IconRefresh, IconUserCheck } from "@tabler/icons-react";
+import { IconPlayerPlayFilled, IconRefresh, IconSend, IconUserCheck } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
@@ -13,7 +13,13 @@ import { useMay, usePerson } from "../../api/people";
 import { useRight } from "../../api/rights";
 import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
 import type { Run } from "../../api/runs";
-import { type Approval, approve, fetchApprovals, runPreflight } from "../../api/starts";
+import {
+  type Approval,
+  approve,
+  askApproval,
+  fetchApprovals,
+  runPreflight,
+} from "../../api/starts";
 import { HelpLink } from "../../status/help-link";
 import { batonWords } from "../../status/robot-rights";
 import { EngineLabel } from "../../status/state-label";
@@ -526,7 +532,14 @@ export function SecondPerson({ graph, label, looks }: SecondPersonProps) {
     mutationFn: () => approve(runner, { digest, graph, version: label, note: "" }),
     onSettled: () => client.invalidateQueries({ queryKey: key }),
   });
+  const robots = (looks ?? [])
+    .filter(({ items }) => items.some(({ code }) => code === "approved"))
+    .map(({ engine }) => engine);
+  const ask = useMutation({
+    mutationFn: () => askApproval(runner, { digest, robots, graph, version: label }),
+  });
   if (digest === "") return null;
+  const isMissing = given.data?.every(({ author }) => author.id === person.id) ?? false;
   const mine = given.data?.some(({ author }) => author.id === person.id) ?? true;
   return (
     <section className={style.second} aria-label="A second person">
@@ -541,10 +554,32 @@ export function SecondPerson({ graph, label, looks }: SecondPersonProps) {
           Say yes to {isolated(label)}, for somebody else to start it
         </Button>
       )}
-      {say.error !== null && (
-        <Text size="sm" c="var(--error)" role="alert">
-          {errorText(say.error)}
+      {may && isMissing && (
+        <Button
+          size="compact-sm"
+          variant="default"
+          loading={ask.isPending}
+          disabled={ask.isSuccess}
+          leftSection={<IconSend size={14} aria-hidden />}
+          onClick={() => ask.mutate()}
+        >
+          Ask others by a message
+        </Button>
+      )}
+      {ask.isSuccess && (
+        <Text size="sm" role="status">
+          {ask.data > 0
+            ? "Others are asked by mail or webhook."
+            : "No receiver of such messages is set here: ask somebody yourself."}
         </Text>
+      )}
+      {[say.error, ask.error].map(
+        (error) =>
+          error !== null && (
+            <Text key={error.message} size="sm" c="var(--error)" role="alert">
+              {errorText(error)}
+            </Text>
+          ),
       )}
     </section>
   );

@@ -510,6 +510,12 @@ class Approval(msgspec.Struct, frozen=True, kw_only=True):
     note: str
 
 
+class AskedOthers(msgspec.Struct, frozen=True):
+    """The number of receivers to which the question is sent."""
+
+    receivers: int
+
+
 def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
     @get(
         "/api/approvals",
@@ -551,7 +557,10 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def ask(data: ApprovalQuestion, request: _Asking) -> None:
         services.control.sight.require_graphs(identity_of(request), data.graph)
+    async def ask(data: ApprovalQuestion, request: _Asking) -> AskedOthers:
         await services.control.approvals.ask(data, author_of(request))
+        receivers = services.notifications.receivers
+        return AskedOthers(sum("approval.asked" in each.kinds for each in receivers))
 
     return [approvals, approve, ask]
 

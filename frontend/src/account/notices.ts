@@ -1,0 +1,84 @@
+/**
+ * Facts of which a page that is not looked at notifies by the browser: the sentences are those of
+ * messages by mail (`web/notifications/messages.py`).
+ */
+import type { LiveState } from "../api/live-socket";
+import { type Inbox, mentionPath } from "../api/mentions";
+import { isolated } from "../words/isolated";
+
+export interface Notice {
+  /** The same for the same fact. */
+  readonly key: string;
+  readonly text: string;
+  /** The place on the page. */
+  readonly path: string;
+}
+
+const FAILED: Readonly<Record<string, string>> = {
+  error: "an error",
+  refused: "refused by the engine",
+  lost: "nothing proves its end",
+  halted: "nothing was left to run",
+};
+const LOST: Readonly<Record<string, string>> = {
+  gone: "does not answer any more",
+  restarted: "has a new engine process",
+};
+
+type Live = Pick<LiveState, "runs" | "engines">;
+
+/** Return all facts that hold now, of runs on robots and of unread mentions. */
+export function noticesOf({ runs, engines }: Live, inbox: Inbox | undefined): Notice[] {
+  const found: Notice[] = [];
+  for (const run of runs.values()) {
+    if (run.simulated) continue;
+    const robots = run.robots ? [...new Set(Object.values(run.robots))] : [run.engine];
+    const words = `un ${run.number} of ${isolated(run.graph_name)} on ${robots.map(isolated).join(", ")}`;
+    const path = `/runs/${run.id}`;
+    const end = FAILED[run.state] ?? (run.result === "on_error" ? "an error" : "");
+    if (run.ended_at !== null && end !== "") {
+      const text = `R${words} has failed: ${end}. ${run.detail}`.trim();
+      found.push({ key: `run.ended:${run.id}`, text, path });
+    }
+    const alarm = run.alarms.find(({ code }) => code === "stop_unconfirmed");
+    if (alarm !== undefined && run.ended_at === null) {
+      const text = `A Stop is unconfirmed: r${words} may still move. ${alarm.text}`;
+      found.push({ key: `run.stop_unconfirmed:${run.id}`, text, path });
+    }
+    if (run.held && run.held.by === null && run.ended_at === null) {
+      const text = `R${words} waits for a person, who lets it go on or stops it. ${run.held.why}`;
+      found.push({ key: `run.held:${run.id}:${run.held.since}`, text, path });
+    }
+    for (const robot of run.ended_at === null ? robots : []) {
+      const how = LOST[engines.find(({ name }) => name === robot)?.state ?? ""];
+      if (how === undefined) continue;
+      const rest = `run ${run.number} of ${isolated(run.graph_name)} is not over.`;
+      const text = `${isolated(robot)} ${how}, and ${rest}`;
+      found.push({ key: `robot.lost:${robot}:${run.id}`, text, path });
+    }
+  }
+  for (const mention of inbox?.mentions ?? []) {
+    if (mention.is_read) continue;
+    const { author, graph_name } = mention;
+    const place = `in a comment on ${isolated(graph_name)}`;
+    const text = `${isolated(author.name || "Somebody")} has mentioned you ${place}.`;
+    found.push({ key: `mention:${mention.key}`, text, path: mentionPath(mention) });
+  }
+  return found;
+}
+
+/** Finds new facts: those that hold when it is made, and those that were found before, are none. */
+export class NewNotices {
+  readonly #known: Set<string>;
+
+  constructor(known: readonly Notice[]) {
+    this.#known = new Set(known.map(({ key }) => key));
+  }
+
+  /** Return the facts that were not there before; each is returned once. */
+  take(now: readonly Notice[]): Notice[] {
+    const fresh = now.filter(({ key }) => !this.#known.has(key));
+    for (const { key } of fresh) this.#known.add(key);
+    return fresh;
+  }
+}

@@ -1,0 +1,63 @@
+/** The inbox of the signed-in person, and the people whom a comment can mention. */
+import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { useMemo } from "react";
+import { editor } from "./client";
+import { useKnownPeople } from "./people";
+import type { EditorApi } from "./schema/editor";
+
+export type Inbox = EditorApi["Inbox"];
+export type Mention = EditorApi["Mention"];
+
+const MENTIONS = ["mentions"] as const;
+const LOOK = 20_000; // ms; also while the page is not looked at, for notifications
+const NO_IDS: readonly string[] = [];
+
+export function useInbox() {
+  return useQuery({
+    queryKey: MENTIONS,
+    queryFn: ({ signal }) => editor.get("/api/mentions", { signal }),
+    refetchInterval: LOOK,
+    refetchIntervalInBackground: true,
+    retry: false,
+  });
+}
+
+/** Marks mentions as read, on the page at once. */
+export function useReadMentions() {
+  const client = useQueryClient();
+  return useMutation({
+    mutationFn: (keys: readonly string[]) => editor.post("/api/mentions/read", { body: { keys } }),
+    onMutate: (keys) => {
+      client.setQueryData<Inbox>(MENTIONS, (inbox) => {
+        if (inbox === undefined) return inbox;
+        const mentions = inbox.mentions.map((each) =>
+          keys.includes(each.key) ? { ...each, is_read: true } : each,
+        );
+        return { mentions, unread: mentions.filter(({ is_read }) => !is_read).length };
+      });
+    },
+    onError: () => client.invalidateQueries({ queryKey: MENTIONS }),
+  });
+}
+
+/** The place of a comment on the page. */
+export const mentionPath = ({ graph, key }: Pick<Mention, "graph" | "key">): string =>
+  `/graphs/${graph}?comment=${encodeURIComponent(key)}`;
+
+/** Everyone whom a comment can mention: who has acted here, and persons with personal links. */
+export function useMentionable(me: string): readonly { id: string; name: string }[] {
+  const known = useKnownPeople(NO_IDS);
+  const { data } = useQuery({
+    queryKey: ["members", "mentionable"],
+    queryFn: ({ signal }) => editor.get("/api/members", { signal }),
+    staleTime: 60_000,
+    retry: false,
+  });
+  return useMemo(() => {
+    const ended = new Set(data?.people.filter((each) => each.ended_at != null).map((e) => e.id));
+    const all = new Map(
+      [...known, ...(data?.people ?? [])].map(({ id, name }) => [id, { id, name }]),
+    );
+    return [...all.values()].filter(({ id, name }) => name && id !== me && !ended.has(id));
+  }, [known, data, me]);
+}
