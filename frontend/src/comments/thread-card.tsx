@@ -2,10 +2,12 @@
 
 import { Button } from "@mantine/core";
 import { IconCheck, IconRotate2 } from "@tabler/icons-react";
-import { useState } from "react";
+import { useEffect, useRef, useState } from "react";
+import { useSearch } from "wouter";
 import { usePerson } from "../api/people";
 import { serverNow } from "../clock/server-clock";
 import { useEditorContext } from "../edit-actions/editor-context";
+import { commentIn } from "../edit-actions/graph-links";
 import { deleteMessage, reply, resolve, type Thread } from "../graph/edit/comments";
 import { usePersonColors } from "../sync/use-room";
 import { textScope, useWaitingTexts } from "../ui/kept-texts";
@@ -63,9 +65,15 @@ export function ThreadCard({ thread, place, onPlace }: ThreadCardProps) {
   const waits = useWaitingTexts(`${textScope(id, person.id)}comment/${thread.id}`) > 0;
   const colorOf = usePersonColors(thread.messages.map(({ author }) => author.id));
   const [answering, setAnswering] = useState(() => waits);
+  const card = useRef<HTMLLIElement>(null);
+  const isAsked = commentIn(useSearch()) === thread.id;
+  useEffect(() => {
+    if (isAsked) card.current?.focus();
+  }, [isAsked]);
   const me = () => ({ author: { id: person.id, name: person.name }, at: serverNow() });
   return (
     <li
+      ref={card}
       className={style.thread}
       data-thread={thread.id}
       tabIndex={-1}

@@ -312,11 +312,7 @@ function useGraphLink(context: EditorContext, begun: boolean): void {
     }
     const about = present(now.current.graph, [thread.about]);
     select(about);
-    const timer = setTimeout(() => {
-      if (about.length > 0) view.show(about);
-      const card = document.querySelector<HTMLElement>(`[data-thread="${CSS.escape(asked)}"]`);
-      card?.focus();
-    }, SETTLED);
+    const timer = setTimeout(() => about.length > 0 && view.show(about), SETTLED);
     return () => clearTimeout(timer);
   }, [search, begun]);
   useEffect(() => {
