@@ -555,9 +555,8 @@ def _approvals(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="askApproval",
         guards=[PersonOnly(), Needs("operate")],
     )
-    async def ask(data: ApprovalQuestion, request: _Asking) -> None:
-        services.control.sight.require_graphs(identity_of(request), data.graph)
     async def ask(data: ApprovalQuestion, request: _Asking) -> AskedOthers:
+        services.control.sight.require_graphs(identity_of(request), data.graph)
         await services.control.approvals.ask(data, author_of(request))
         receivers = services.notifications.receivers
         return AskedOthers(sum("approval.asked" in each.kinds for each in receivers))
