@@ -408,9 +408,10 @@ def test_a_person_proves_again_that_it_is_they(
     assert sum("confirmed" in each for each in mine) == 1, mine
     # It is the proof of the session that began, and of no other one.
     answer = here.begin(again=True)
-    here.come("vera", "lab")
     here.http.delete("/api/session")
+    here.come("vera", "lab")
     assert here.hand_in(answer).status_code == 401
+    here.http.delete("/api/session")
     other = browser()
     assert other.http.post("/api/session/provider", json={"again": True}).status_code == 401
     with editor.client() as owner:
