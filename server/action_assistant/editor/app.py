@@ -200,6 +200,7 @@ def create_app(settings: EditorSettings) -> ASGIApp:
             *signing_in,
             *provider.routes(by_provider),
             *_routes(app_state, addresses, browsers),
+            *notification_routes(lambda: app_state.services.notifications, audit.receiver_tested),
             *devices.routes(codes, browsers, addresses, audit, keys),
             *confirmation_routes(confirmations, limits=settings.limits),
             *passkeys.routes(Passkeys(passkey_files), confirmations, audit),
@@ -244,7 +245,6 @@ def _routes(
     return [
         *invitations.routes(app_state, addresses, browsers),
         *members.routes(app_state, addresses, browsers),
-        *notification_routes(lambda: app_state.services.notifications),
         *guarded(_graph_routes(app_state, addresses), app_state),
         *audit_routes(lambda wanted: _audit(app_state.services, wanted)),
     ]

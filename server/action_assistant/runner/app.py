@@ -305,7 +305,7 @@ def create_app(settings: RunnerSettings) -> ASGIApp:
             *view.routes(services, view_links),
             *revocation(keys, revoked, people_files, services.audit, limits=settings.limits),
             *shared_token_routes(tokens, revoked=partial(_note_token, services.audit)),
-            *notification_routes(lambda: services.notifications),
+            *notification_routes(lambda: services.notifications, services.audit.receiver_tested),
             *adoption(tokens, limits=settings.limits),
             *confirmation_routes(confirmations, limits=settings.limits),
             *device_confirmations(services, confirmations),

@@ -2588,12 +2588,6 @@ export interface EditorPaths {
         delete: EditorOperations["removeGroup"];
         patch: EditorOperations["renameGroup"];
     };
-    "/api/notifications": {
-        get: EditorOperations["listReceivers"];
-    };
-    "/api/notifications/{name}/test": {
-        post: EditorOperations["testReceiver"];
-    };
     "/api/config": {
         get: EditorOperations["getConfig"];
     };
@@ -2786,6 +2780,12 @@ export interface EditorPaths {
     };
     "/api/audit": {
         get: EditorOperations["listAudit"];
+    };
+    "/api/notifications": {
+        get: EditorOperations["listReceivers"];
+    };
+    "/api/notifications/{name}/test": {
+        post: EditorOperations["testReceiver"];
     };
     "/api/devices": {
         get: EditorOperations["listDevices"];
@@ -3228,29 +3228,6 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["Group"];
-                };
-            };
-        };
-    };
-    listReceivers: {
-        responses: {
-            200: {
-                content: {
-                    "application/json": EditorApi["ReceiverState"][];
-                };
-            };
-        };
-    };
-    testReceiver: {
-        parameters: {
-            path: {
-                name: string;
-            };
-        };
-        responses: {
-            200: {
-                content: {
-                    "application/json": EditorApi["ReceiverState"];
                 };
             };
         };
@@ -4531,6 +4508,29 @@ interface EditorOperations {
             200: {
                 content: {
                     "application/json": EditorApi["AuditPage"];
+                };
+            };
+        };
+    };
+    listReceivers: {
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ReceiverState"][];
+                };
+            };
+        };
+    };
+    testReceiver: {
+        parameters: {
+            path: {
+                name: string;
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": EditorApi["ReceiverState"];
                 };
             };
         };

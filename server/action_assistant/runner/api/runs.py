@@ -63,7 +63,7 @@ from action_assistant.runner.start.approvals import (
     ApprovalRequest,
 )
 from action_assistant.umrf.semantics import Script
-from action_assistant.web.audit.events import StartRefused
+from action_assistant.web.audit.events import OwnerDid, StartRefused
 from action_assistant.web.audit.routes import audit_routes
 from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.access import (
@@ -413,8 +413,9 @@ def _rules(services: RunnerServices) -> ControllerRouterHandler:
         guards=[Needs("share")],
         request_max_body_size=_RULES_BODY,
     )
-    async def store(data: JSONBody[Statement]) -> None:
+    async def store(data: JSONBody[Statement], request: _Asking) -> None:
         await services.control.sight.store(data)
+        services.audit.note(OwnerDid("rules_told"), person_of(request).id)
 
     return store
 

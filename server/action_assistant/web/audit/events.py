@@ -82,6 +82,15 @@ class EndedHere(msgspec.Struct, frozen=True):
     id: str
 
 
+class OwnerDid(msgspec.Struct, frozen=True, omit_defaults=True):
+    """The author told this process the rules of graphs, or sent a test to the receiver `of`."""
+
+    kind: ClassVar[str] = "audit.owner_did.v1"
+
+    what: Literal["rules_told", "receiver_tested"]
+    of: str = ""
+
+
 class ReleaseTold(msgspec.Struct, frozen=True, omit_defaults=True):
     """The author told this process that a version was released, or that its release was withdrawn."""
 

@@ -41,6 +41,7 @@ _EVENTS: Final = {
         events.ViewLinkMade,
         events.ViewLinkRevoked,
         events.EndedHere,
+        events.OwnerDid,
         events.PersonStored,
         events.ReleaseTold,
         events.Confirmed,
@@ -85,6 +86,10 @@ def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | No
         case events.EndedHere() as end:
             text = f"told this process that the {end.what} {end.id} has ended"
             return Fact(kind="sessions" if end.what == "session" else "people", text=text)
+        case events.OwnerDid(what="rules_told"):
+            return Fact(kind="graphs", text="told this process who may see which graphs")
+        case events.OwnerDid(of=of):
+            return Fact(kind="other", text=f"sent a test to the receiver {of}")
         case events.ReleaseTold(version=version, withdrawn=withdrawn):
             what = (
                 "the release of version {} was withdrawn" if withdrawn else "version {} is released"

@@ -24,6 +24,7 @@ from action_assistant.web.audit.events import (
     STREAM,
     AuditEvent,
     EndedHere,
+    OwnerDid,
     PersonStored,
     SessionEnded,
     SignedIn,
@@ -229,6 +230,10 @@ class AuditLog:
         """Queue that a person told this process the state of somebody."""
         stored = PersonStored(person.id, person.name, person.role, person.groups, person.until)
         self.note(stored, author)
+
+    def receiver_tested(self, receiver: str, author: str) -> None:
+        """Queue that a person sent a test to a receiver of messages."""
+        self.note(OwnerDid("receiver_tested", receiver), author)
 
     def refused_stranger(self, address: str, what: str) -> None:
         """Count a refused request without valid credentials. `what`: its method and path."""

@@ -12,10 +12,11 @@ from action_assistant.web.notifications.sender import Notifications
 
 
 def notification_routes(
-    notifications: Callable[[], Notifications],
+    notifications: Callable[[], Notifications], tested: Callable[[str, str], None]
 ) -> list[ControllerRouterHandler]:
     """Return the routes under `/api/notifications`, for owners. `notifications` returns those of the
-    open process."""
+    open process; `tested` keeps who sent a test: it gets the name of the
+    receiver and the id of the person."""
 
     @get(
         "/api/notifications",
@@ -34,6 +35,8 @@ def notification_routes(
         guards=[Needs("share")],
     )
     async def test_receiver(name: str, request: Request[Any, Any, Any]) -> ReceiverState:
-        return await notifications().test(name, person_of(request).name)
+        state = await notifications().test(name, person_of(request).name)
+        tested(name, person_of(request).id)
+        return state
 
     return [list_receivers, test_receiver]
