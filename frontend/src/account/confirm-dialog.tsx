@@ -6,7 +6,7 @@ import { useEffect, useRef, useState } from "react";
 import { bringConfirmation, confirmByDevice } from "../api/confirmations";
 import { errorText, unconfirmed } from "../api/http";
 import { useLive } from "../api/page-link";
-import { confirmByPasskey, offersPasskeys } from "../api/passkeys";
+import { confirmByPasskey, offersPasskeys, usePasskeys } from "../api/passkeys";
 import { useStableCallback } from "../ui/hooks";
 import { useWatched } from "../ui/watched";
 import { isolated } from "../words/isolated";
@@ -61,6 +61,7 @@ function Means({ robots, onDone }: { robots: readonly string[]; onDone: () => vo
   const [waiting, setWaiting] = useState<Waiting | null>(null);
   const [problem, setProblem] = useState("");
   const [confirmed, setConfirmed] = useState(false);
+  const hasPasskeys = (usePasskeys().data?.passkeys.length ?? 0) > 0 && offersPasskeys();
   const asking = useRef<AbortController | null>(null);
   useEffect(() => () => asking.current?.abort(), []);
   useElsewhere(() => finish());
@@ -122,7 +123,7 @@ function Means({ robots, onDone }: { robots: readonly string[]; onDone: () => vo
         </p>
       )}
       <Group gap="sm">
-        {offersPasskeys() && (
+        {hasPasskeys && (
           <Button
             variant="filled"
             leftSection={<IconKey size={15} aria-hidden />}
@@ -132,7 +133,7 @@ function Means({ robots, onDone }: { robots: readonly string[]; onDone: () => vo
           </Button>
         )}
         <Button
-          variant={offersPasskeys() ? "default" : "filled"}
+          variant={hasPasskeys ? "default" : "filled"}
           leftSection={<IconDevices size={15} aria-hidden />}
           onClick={() => void ask()}
         >
