@@ -112,7 +112,7 @@ test("who is mentioned finds it, is notified, and comes to the comment", async (
 
   await expect.poll(() => got).toEqual(["Ada has mentioned Ben in a comment on chain_2."]);
   await ada.page.goto(`${product.url}/admin`);
-  const messages = ada.page.getByRole("region", { name: "Messages" });
+  const messages = ada.page.getByRole("region", { name: "Messages", exact: true });
   await messages.getByRole("button", { name: "Send a test to chat, by the runner" }).click();
   await expect(messages.getByText("It has arrived.")).toBeVisible();
   expect(got[1]).toBe("This is a test of the receiver chat, sent by Ada.");

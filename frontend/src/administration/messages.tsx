@@ -118,7 +118,7 @@ export function MessagesCard({ runner }: { runner: string | undefined }) {
           file with receivers; the administrator’s guide in <i>Help</i> says how.
         </p>
       )}
-      <div className="stack gap-100">
+      <div className="stack gap-75">
         {asked.flatMap(({ process, at, query }) =>
           (query.data ?? []).map((receiver) => (
             <Receiver
