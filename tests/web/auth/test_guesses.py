@@ -129,7 +129,7 @@ def test_a_code_and_a_claim_that_are_sent_at_once_let_one_in(
         url = product.url + path
         return httpx.post(url, json=body, headers=headers, trust_env=False, timeout=30)
 
-    for _ in range(3):
+    for _ in range(6):
         made = guest.http.post("/api/devices/codes").json()
         claims: list[str] = []
 
@@ -144,7 +144,7 @@ def test_a_code_and_a_claim_that_are_sent_at_once_let_one_in(
         if not claims:  # the guesses before have used up the tries of a minute
             assert set(statuses) == {429}
             break
-        assert statuses == [200, *[401] * 5]
+        assert set(statuses[1:]) <= {401, 429}  # the guesses before count, too
         path = f"/api/devices/codes/{made['id']}/answer"
         assert guest.http.post(path, json={"yes": True}).status_code == 204
         claim = claims[0]

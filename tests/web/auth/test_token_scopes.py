@@ -47,6 +47,8 @@ FOR_PEOPLE = {
     ("post", "/api/runs/{run}/outcome"),
     ("post", "/api/robots/{name}/drills"),
 }
+#: Paths of which every route is for people, or for links that show one thing.
+OF_OTHERS = ("/api/devices", "/api/view/", "/api/confirmations", "/api/passkeys")
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +98,7 @@ def expected(
     """The refusal that a cell of the matrix has to have; None where it must be none."""
     if end in {"revoked", "person", "link"} or (end == "expired" and needed != "stop"):
         return 401
-    if (method, path) in FOR_PEOPLE or path.startswith(("/api/devices", "/api/view/")):
+    if (method, path) in FOR_PEOPLE or path.startswith(OF_OTHERS):
         return 403
     if needed is None:
         return None

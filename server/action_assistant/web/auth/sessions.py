@@ -433,9 +433,13 @@ def _new_device(
     )
     async def collect(data: JSONBody[ClaimOfDevice], request: _Asking) -> Response[DeviceAnswer]:
         confirmed = codes.confirmed(data.claim)
+        if confirmed is not None:
+            await to_thread.run_sync(standings.browsers.require_room, confirmed.session.person.id)
+            # Another request may have used the claim meanwhile: from here on nothing waits until it
+            # is used up.
+            confirmed = codes.confirmed(data.claim)
         if confirmed is None:
             return Response(DeviceAnswer(), status_code=200)
-        await to_thread.run_sync(standings.browsers.require_room, confirmed.session.person.id)
         session = sessions.follow(confirmed.session)
         codes.collected(data.claim)
         with acting_for(session.person.id, connection_of(session, request)):
