@@ -28,7 +28,6 @@ WITHOUT_BODY = frozenset(
         "/api/view-links/{link}/revoke",
         "/api/notifications/{name}/test",
         "/api/runs/{run}/pause",
-        "/api/runs/{run}/resume",
         "/api/robots/{name}/stop",
         "/api/robots/{name}/baton/drop",
         "/api/examples",
@@ -107,5 +106,5 @@ def test_bodies_that_are_read_by_hand_are_described_by_the_type_that_reads_them(
 def test_the_messages_of_the_live_socket_are_described(found: dict[str, dict[str, Any]]) -> None:
     schemas = found["runner"]["components"]["schemas"]
     kinds = schemas["RunnerMessage"]["discriminator"]["mapping"]
-    assert set(kinds) == {"hello", "run", "engines", "beat", "stopping", "refused"}
+    assert set(kinds) == {"hello", "run", "engines", "confirm", "beat", "stopping", "refused"}
     assert msgspec.json.encode(schemas["PageMessage"]).endswith(b'/StopMessage"}')
