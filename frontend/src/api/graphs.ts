@@ -1,7 +1,7 @@
 /** Graphs, versions and problems as the editor answers them. */
 import { type QueryClient, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useEffect } from "react";
-import { editor } from "./client";
+import { editor, runnerAt } from "./client";
 import { fetchAnswer, fetchText } from "./http";
 import type { EditorApi } from "./schema/editor";
 
@@ -165,6 +165,25 @@ const below = (graph: string) => `/api/graphs/${encodeURIComponent(graph)}`;
 
 export function publishNamed(graph: string, body: EditorApi["Publishing"]): Promise<Version> {
   return editor.post("/api/graphs/{graph_id}/versions", { path: inGraph(graph), body });
+}
+
+/** Releases a version, or withdraws that, at the editor and at a runner with a data folder of its own. */
+export async function setReleased(
+  runner: string | undefined,
+  { id, digest, tree_digest }: Version,
+  isReleased: boolean,
+): Promise<void> {
+  const path = { version_id: id };
+  const at = runner === undefined ? undefined : runnerAt(runner);
+  if (!isReleased) {
+    await editor.delete("/api/versions/{version_id}/release", { path });
+    await at?.delete("/api/releases/{version}", { path: { version: id } });
+    return;
+  }
+  const { released } = await editor.put("/api/versions/{version_id}/release", { path });
+  if (!released) throw new Error("The editor has not released it.");
+  const body = { version: id, digest: tree_digest ?? digest, ...released };
+  await at?.put("/api/releases/{version}", { path: { version: id }, body });
 }
 
 /** A graph as it was after a change, as another one; edits of one do not touch the other. */

@@ -16,12 +16,13 @@ export type AllowedOperator = RunnerApi["OperatorShown"];
 export function useRights() {
   const { runner, now } = useLive();
   const { person, visit } = usePerson();
-  const known = now.engines.map(({ name, operators, baton, holder, locks }) => [
+  const known = now.engines.map(({ name, operators, baton, holder, locks, drill_due }) => [
     name,
     operators,
     baton,
     holder,
     locks,
+    drill_due,
   ]);
   return useQuery({
     queryKey: ["robots", "rights", person.id, person.role, visit, JSON.stringify(known)],
@@ -84,6 +85,15 @@ export function lockRobot(runner: string, name: string, reason: string): Promise
 /** Takes off one's own lock, or as an owner that of the person `of`. */
 export function unlockRobot(runner: string, name: string, of: string): Promise<Robot> {
   return runnerAt(runner).post("/api/robots/{name}/unlock", { path: { name }, body: { of } });
+}
+
+/** Records a Stop drill: a run on the robot that was stopped, and what the person saw. */
+export function recordDrill(
+  runner: string,
+  name: string,
+  body: RunnerApi["DrillRequest"],
+): Promise<Robot> {
+  return runnerAt(runner).post("/api/robots/{name}/drills", { path: { name }, body });
 }
 
 export function setRights(runner: string, name: string, rights: RightsWanted): Promise<Robot> {

@@ -9,6 +9,8 @@ export const SIMULATOR = "simulator";
 /** A robot, or the simulator. `servers`: how many answer on the path of its get, where one makes answers
  * a proof; `others`: programs beside this one that publish starts. */
 export type Robot = RunnerApi["Robot"];
+/** `failure`: why it failed, "" if it passed; `proof_ms`: null where nothing proved the Stop. */
+export type Drill = RunnerApi["DrillShown"];
 export type EngineState = Robot["state"];
 /** A graph that an engine holds, ended ones too. `stopping`: why a stop of it is not proven yet, "" at
  * first; null when nobody wants that. */

@@ -77,7 +77,14 @@ export interface StartOrder {
   behaviours?: boolean;
   override?: RunnerApi["Override"];
   inside?: Inside;
+  /** The robots that the person says to watch. */
+  watching?: Watching;
+  /** Set for a start by which a Stop drill is made. */
+  drill?: boolean;
 }
+
+/** True for each robot that a person says to watch. */
+export type Watching = Readonly<Record<string, true>>;
 
 /** `failed`: robots that nothing was sent to, and why. */
 export type Started = Pick<RunnerApi["GroupShown"], "runs" | "failed">;
@@ -112,6 +119,8 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(order.behaviours === true ? { behaviours: true } : {}),
     ...order.led,
     ...(await sightOf(order.version)),
+    ...(order.watching === undefined ? {} : { watching: order.watching }),
+    ...(order.drill === true ? { drill: true } : {}),
     umrf: order.umrf,
     ...order.inside,
   };
@@ -135,9 +144,13 @@ export function findStart(
   return runnerAt(runner).get("/api/starts/{request_id}", { path, timeoutMs: patience, signal });
 }
 
-/** Pauses a run, or lets it go on. */
-export function pauseOrResume(runner: string, run: string, way: "pause" | "resume"): Promise<Run> {
-  return runnerAt(runner).post(`/api/runs/{run}/${way}`, { path: { run } });
+export function pauseRun(runner: string, run: string): Promise<Run> {
+  return runnerAt(runner).post("/api/runs/{run}/pause", { path: { run } });
+}
+
+/** Lets a paused run go on. */
+export function resumeRun(runner: string, run: string, watching: Watching): Promise<Run> {
+  return runnerAt(runner).post("/api/runs/{run}/resume", { path: { run }, body: { watching } });
 }
 
 /** Gives a run another version of its graph, by value. Its engine pauses it for that. */
@@ -145,9 +158,16 @@ export async function modifyRun(
   runner: string,
   run: string,
   version: { id: string; digest: string; umrf: string },
+  watching: Watching,
 ): Promise<Run> {
   const sight = await sightOf(version.id);
-  const body = { version: version.id, digest: version.digest, umrf: version.umrf, ...sight };
+  const body = {
+    version: version.id,
+    digest: version.digest,
+    umrf: version.umrf,
+    watching,
+    ...sight,
+  };
   return runnerAt(runner).post("/api/runs/{run}/modify", { path: { run }, body });
 }
 
@@ -201,9 +221,14 @@ async function sendPress<T>(what: string, send: (request: string) => Promise<T>)
 }
 
 /** Let a held run go on, if it is still held since this moment. Robots may begin to move. */
-export function letGoOn(runner: string, run: string, since: string): Promise<Run> {
+export function letGoOn(
+  runner: string,
+  run: string,
+  since: string,
+  watching: Watching = {},
+): Promise<Run> {
   return sendPress(`go on ${run} ${since}`, (request) => {
-    const body = { since, request_id: request };
+    const body = { since, request_id: request, watching };
     return runnerAt(runner).post("/api/runs/{run}/go_on", { path: { run }, body });
   });
 }

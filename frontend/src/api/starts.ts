@@ -2,7 +2,7 @@
 import { editor, runnerAt } from "./client";
 import type { LedOrder } from "./led-runs";
 import type { Preflight } from "./robots";
-import type { Inside } from "./runs";
+import type { Inside, Watching } from "./runs";
 import type { RunnerApi } from "./schema/runner";
 
 export type Approval = RunnerApi["Approval"];
@@ -39,9 +39,10 @@ export function runPreflight(
   engines: readonly string[],
   behaviours: boolean,
   led: LedOrder | null,
+  said: { watching: Watching; drill: boolean },
   signal: AbortSignal,
 ): Promise<Preflight[]> {
-  const body = { engines, ...(behaviours ? { behaviours } : {}), ...led, ...what };
+  const body = { engines, ...(behaviours ? { behaviours } : {}), ...led, ...said, ...what };
   return runnerAt(runner).post("/api/preflight", { body, signal });
 }
 

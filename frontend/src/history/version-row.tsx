@@ -1,10 +1,27 @@
 /** One version: its name, note, author and digest, its runs, and what can be done with it. */
 import { ActionIcon, Button } from "@mantine/core";
-import { IconCopy, IconCopyPlus, IconGitCompare, IconLink, IconRestore } from "@tabler/icons-react";
-import { useQuery } from "@tanstack/react-query";
+import { notifications } from "@mantine/notifications";
+import {
+  IconCopy,
+  IconCopyPlus,
+  IconGitCompare,
+  IconLink,
+  IconRestore,
+  IconRosetteDiscountCheck,
+} from "@tabler/icons-react";
+import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { Link } from "wouter";
-import { authorName, fetchVersion, type PinnedGraph, type Version } from "../api/graphs";
+import {
+  authorName,
+  fetchVersion,
+  type PinnedGraph,
+  queryKeys,
+  setReleased,
+  type Version,
+} from "../api/graphs";
+import { errorText } from "../api/http";
 import { useLive } from "../api/page-link";
+import { useMay } from "../api/people";
 import type { ListedRun } from "../api/review";
 import type { Tone } from "../status/progress";
 import { type Heard, runStatus, useRunStatus } from "../status/progress";
@@ -119,14 +136,45 @@ function Ways(props: Props) {
           Make it so again
         </Button>
       )}
+      <ReleaseButton version={listed.version} number={listed.number} />
     </div>
+  );
+}
+
+/** Lets an owner release a version: robots whose owners demand that start no other. */
+function ReleaseButton({ version, number }: { version: Version; number: string }) {
+  const { runner } = useLive();
+  const client = useQueryClient();
+  const isOwner = useMay("share");
+  const { graph, released } = version;
+  const change = useMutation({
+    mutationFn: () => setReleased(runner, version, released === undefined),
+    onError: (error) =>
+      notifications.show({
+        color: "red",
+        title: `${number} may not be ${released ? "withdrawn" : "released"} everywhere: try again`,
+        message: errorText(error),
+      }),
+    onSettled: () => client.invalidateQueries({ queryKey: queryKeys.versions(graph) }),
+  });
+  if (!isOwner) return null;
+  return (
+    <Button
+      size="compact-sm"
+      variant="default"
+      loading={change.isPending}
+      leftSection={<IconRosetteDiscountCheck size={14} aria-hidden />}
+      onClick={() => change.mutate()}
+    >
+      {released ? `Withdraw the release of ${number}` : `Release ${number}`}
+    </Button>
   );
 }
 
 export function VersionItem(props: Props) {
   const { listed, now, chosen, onChoose } = props;
   const { version, number, runs } = listed;
-  const { label, note, digest, author, at } = version;
+  const { label, note, digest, author, at, released } = version;
   return (
     <li className={style.version} data-chosen={chosen || undefined} data-version={number}>
       <button
@@ -158,6 +206,14 @@ export function VersionItem(props: Props) {
           </ActionIcon>
         </Tooltip>
       </p>
+      {released && (
+        <p className={style.facts}>
+          <IconRosetteDiscountCheck size={14} aria-hidden />
+          <span>
+            Released by <bdi>{authorName(released.by)}</bdi>, {timeWords(released.at, now)}
+          </span>
+        </p>
+      )}
       <Runs runs={runs} now={now} />
       {chosen && <InsideVersion version={version} />}
       {chosen && <Ways {...props} />}

@@ -47,6 +47,14 @@ export function RunFacts({ runner, run, version, by }: Props) {
     ...(run.batons
       ? [["Baton", `${by} held that of ${run.batons.map(isolated).join(", ")}`] as [string, string]]
       : []),
+    ...(run.watching
+      ? [
+          [
+            "Watched",
+            `${by} said to watch ${run.watching.map(isolated).join(", ")}, with the hardware stop within reach`,
+          ] as [string, string],
+        ]
+      : []),
     ...(run.lead
       ? [["Led on for", `${run.lead.name}${requesterPlace(run.lead)}`] as [string, string]]
       : []),

@@ -1,4 +1,4 @@
-/** An owner says who may start on a robot, and whether it has a baton. */
+/** An owner says who may start on a robot, whether it has a baton, and what each start there needs. */
 import {
   ActionIcon,
   Button,
@@ -25,6 +25,7 @@ import { isolated } from "../words/isolated";
 import style from "./rights-form.module.css";
 
 const NOBODY: readonly AllowedOperator[] = [];
+const MONTH = 30;
 
 /** Return the last day of a right as a date field has it; "" for one that does not end. */
 export function lastDay(until: string | null): string {
@@ -102,6 +103,9 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
   );
   const [baton, setBaton] = useState(robot.baton);
   const [askAgain, setAskAgain] = useState<number | string>(robot.ask_again || "");
+  const [watched, setWatched] = useState(robot.watched);
+  const [days, setDays] = useState<number | null>(robot.drill_days);
+  const [releasedOnly, setReleasedOnly] = useState(robot.released_only);
   usePendingText(
     chosen === robot.operators || chosen === NOBODY ? "" : JSON.stringify(chosen),
     null,
@@ -115,9 +119,9 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
       await setRights(runner ?? "", robot.name, {
         operators,
         baton,
-        watched: robot.watched,
-        drill_days: robot.drill_days,
-        released_only: robot.released_only,
+        watched,
+        drill_days: days,
+        released_only: releasedOnly,
         ask_again: Number(askAgain) || 0,
       });
       await client.invalidateQueries({ queryKey: ["robots"] });
@@ -163,6 +167,35 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
             checked={baton}
             onChange={(event) => setBaton(event.currentTarget.checked)}
           />
+          <Switch
+            label="Each start says who watches it"
+            description="The person ticks that they watch the robot, with its hardware stop within reach."
+            checked={watched}
+            onChange={(event) => setWatched(event.currentTarget.checked)}
+          />
+          <Switch
+            label="Only released versions"
+            description="Owners release a version in the history of its graph."
+            checked={releasedOnly}
+            onChange={(event) => setReleasedOnly(event.currentTarget.checked)}
+          />
+          <Switch
+            label="Stop drills"
+            description="Nothing starts there, except for a drill, unless the last one passed and is not too old."
+            checked={days !== null}
+            onChange={(event) => setDays(event.currentTarget.checked ? MONTH : null)}
+          />
+          {days !== null && (
+            <NumberInput
+              label="A drill counts for so many days"
+              value={days}
+              min={1}
+              max={3650}
+              allowDecimal={false}
+              clampBehavior="strict"
+              onChange={(value) => setDays(typeof value === "number" && value >= 1 ? value : 1)}
+            />
+          )}
           <NumberInput
             label="Ask again who starts, after so many minutes"
             description="Whoever starts there confirms on another device of theirs, or with a passkey, that it is they. Programs cannot start there then. Empty: nobody is asked."

@@ -6,6 +6,7 @@ import {
   IconBarrierBlock,
   IconCheck,
   IconDots,
+  IconHandStop,
   IconPencil,
   IconSquareFilled,
   IconTrash,
@@ -30,11 +31,13 @@ import { lazyPart, OverlayBoundary } from "../ui/lazy-part";
 import { colorOfName } from "../ui/name-colors";
 import { ago, clock, instant, useNow } from "../ui/times";
 import { isolated } from "../words/isolated";
+import { Drills } from "./drills";
 import style from "./robot-card.module.css";
 import { RobotLog } from "./robot-log";
 import { notifyRobotFailure, RobotRuns } from "./robot-runs";
 
 const RightsForm = lazyPart(() => import("./rights-form").then((part) => part.RightsForm));
+const DrillForm = lazyPart(() => import("./drill-form").then((part) => part.DrillForm));
 const LockForm = lazyPart(() => import("./rights-form").then((part) => part.LockForm));
 
 interface Props {
@@ -94,7 +97,7 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
   const client = useQueryClient();
   const may = useMay("register");
   const isOwner = useMay("share");
-  const [asks, setAsks] = useState<"rights" | "lock" | null>(null);
+  const [asks, setAsks] = useState<"rights" | "lock" | "drill" | null>(null);
   const close = () => setAsks(null);
   const forget = async () => {
     try {
@@ -110,6 +113,7 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
       <OverlayBoundary>
         {asks === "rights" && <RightsForm robot={robot} onClose={close} />}
         {asks === "lock" && <LockForm robot={robot} onClose={close} />}
+        {asks === "drill" && <DrillForm robot={robot} onClose={close} />}
       </OverlayBoundary>
       <Menu>
         <Menu.Target>
@@ -141,6 +145,13 @@ function More({ robot, onEdit }: Pick<Props, "robot" | "onEdit">) {
             onClick={() => setAsks("rights")}
           >
             Who may start here …{!isOwner && " (owners)"}
+          </Menu.Item>
+          <Menu.Item
+            leftSection={<IconHandStop size={15} />}
+            disabled={!may}
+            onClick={() => setAsks("drill")}
+          >
+            Record a Stop drill …
           </Menu.Item>
           <Menu.Item
             leftSection={<IconBarrierBlock size={15} />}
@@ -208,6 +219,7 @@ export function RobotCard({ robot, onEdit, onImport }: Props) {
       <OutOfService robot={robot} stop={<StopHere robot={robot} />} />
       <Facts robot={robot} />
       <Baton robot={robot} />
+      <Drills robot={robot} />
       <WhyNot robot={robot} />
       {robot.why !== "" && <p className={style.why}>{robot.why}</p>}
       <ul className={style.signs}>

@@ -9,11 +9,12 @@ import { errorText, isOutcomeUnknown } from "../api/http";
 import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import type { Robot } from "../api/robots";
-import { abilitiesOf, modifyRun, type Run } from "../api/runs";
+import { abilitiesOf, modifyRun, type Run, type Watching } from "../api/runs";
 import { mapsFrom } from "../graph/document-keys";
 import { differences, type MeaningDifference } from "../graph/meaning";
 import type { Graph } from "../graph/model";
 import { readGraph } from "../graph/read";
+import { useWatching, WatchTicks } from "../status/watching";
 import { HoldButton } from "../ui/hold-button";
 import style from "./modify-run.module.css";
 import { nextLabel, notifyFailure, publishedVersion } from "./start/use-start";
@@ -91,11 +92,22 @@ async function looked({ run, label, running, settle }: Props): Promise<LookedAt>
 class Unanswered extends Error {}
 
 /** Publishes that moment and sends it, once. */
-async function sent(runner: string, run: Run, seq: number, onVersion: () => void): Promise<Run> {
+async function sent(
+  runner: string,
+  run: Run,
+  seq: number,
+  watching: Watching,
+  onVersion: () => void,
+): Promise<Run> {
   const { version, umrf } = await publishedVersion(run.graph ?? "", seq);
   onVersion();
   try {
-    return await modifyRun(runner, run.id, { id: version.id, digest: version.digest, umrf });
+    return await modifyRun(
+      runner,
+      run.id,
+      { id: version.id, digest: version.digest, umrf },
+      watching,
+    );
   } catch (error) {
     throw isOutcomeUnknown(error) ? new Unanswered(errorText(error)) : error;
   }
@@ -109,6 +121,8 @@ interface DialogProps {
   onClose: () => void;
 }
 
+const NOBODY: readonly string[] = [];
+
 function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
   const { runner } = useLive();
   const client = useQueryClient();
@@ -116,8 +130,9 @@ function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
   const next = nextLabel(useVersions(graph).data ?? [], asking.seq);
   const where = run.simulated ? "the simulator" : run.engine;
   const told = () => void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
+  const watch = useWatching(run.simulated ? NOBODY : [run.engine]);
   const send = useMutation({
-    mutationFn: () => sent(runner ?? "", run, asking.seq, told),
+    mutationFn: () => sent(runner ?? "", run, asking.seq, watch.watching, told),
     onSuccess: onClose,
     onError: (error) => {
       if (!(error instanceof Unanswered)) return notifyFailure("Not sent", errorText(error));
@@ -129,7 +144,9 @@ function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
     },
   });
   const other = run.version !== asking.version;
-  const why = other ? "Another version was sent meanwhile: check again" : obstacle;
+  const why = other
+    ? "Another version was sent meanwhile: check again"
+    : (watch.obstacle ?? obstacle);
   return (
     <Modal
       opened
@@ -146,6 +163,7 @@ function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
         The engine pauses the running graph, replaces it by this one and goes on. Actions that run
         now are paused meanwhile. Stop works all the while.
       </Text>
+      <WatchTicks watch={watch} />
       <footer className={style.foot}>
         <Button onClick={onClose}>Cancel</Button>
         <HoldButton

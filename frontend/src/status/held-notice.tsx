@@ -16,6 +16,7 @@ import style from "./held-notice.module.css";
 import { actionWords } from "./level-places";
 import { OutcomeQuestions } from "./outcome-question";
 import { ServiceNotices } from "./robot-rights";
+import { useWatching, WatchTicks } from "./watching";
 
 /** Return what goes on while a run is held, and what nobody knows since its robot does not answer. */
 function movingWords(run: Run, silent: ReadonlySet<string>): string {
@@ -64,8 +65,9 @@ function failure(error: unknown, run: Run) {
 
 function GoOnButton({ run, since }: { run: Run; since: string }) {
   const { live, runner, now } = useLive();
+  const watch = useWatching(enginesOf(run));
   const goOn = useMutation({
-    mutationFn: () => letGoOn(runner ?? "", run.id, since),
+    mutationFn: () => letGoOn(runner ?? "", run.id, since, watch.watching),
     onSuccess: (fresh) => live?.learn(fresh),
     onError: (error) => notifications.show(failure(error, run)),
   });
@@ -74,15 +76,18 @@ function GoOnButton({ run, since }: { run: Run; since: string }) {
   const moves =
     players === "" ? "Nothing but the simulator moves." : `${players} may begin to move.`;
   return (
-    <HoldButton
-      size="compact-sm"
-      icon={<IconPlayerPlayFilled size={13} aria-hidden />}
-      label={goOn.isPending ? "Asking …" : "Hold to go on"}
-      name={`Let run ${run.number} go on`}
-      question={`Let run ${run.number} go on? ${moves}`}
-      disabled={goOn.isPending || now.link !== "live"}
-      onHeld={() => goOn.mutate()}
-    />
+    <>
+      <WatchTicks watch={watch} />
+      <HoldButton
+        size="compact-sm"
+        icon={<IconPlayerPlayFilled size={13} aria-hidden />}
+        label={goOn.isPending ? "Asking …" : (watch.obstacle ?? "Hold to go on")}
+        name={`Let run ${run.number} go on`}
+        question={`Let run ${run.number} go on? ${moves}`}
+        disabled={goOn.isPending || watch.obstacle !== null || now.link !== "live"}
+        onHeld={() => goOn.mutate()}
+      />
+    </>
   );
 }
 

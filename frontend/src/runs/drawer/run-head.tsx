@@ -18,11 +18,12 @@ import { enginesOf } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { useCurrentName, useMay } from "../../api/people";
 import { needsRestConfirmation } from "../../api/run-stop";
-import { abilitiesOf, pauseOrResume, type Run } from "../../api/runs";
+import { abilitiesOf, pauseRun, type Run, resumeRun } from "../../api/runs";
 import { serverTimeOf } from "../../clock/server-clock";
 import { boundsText } from "../../status/durations";
 import { useRunStatus } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
+import { useWatching, WatchTicks } from "../../status/watching";
 import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { colorOfName } from "../../ui/name-colors";
 import { clock, day, instant, stopwatch, useNow } from "../../ui/times";
@@ -199,28 +200,36 @@ function failure(error: unknown, paused: boolean) {
   };
 }
 
+const NOBODY: readonly string[] = [];
+
 function PauseButton({ run }: { run: Run }) {
   const { runner, now } = useLive();
   const may = useMay(run.simulated ? "simulate" : "operate");
   const engine = now.engines.find((each) => each.name === abilitiesOf(run));
   const paused = run.desired === "paused";
+  const watch = useWatching(paused && !run.simulated ? [run.engine] : NOBODY);
   const steer = useMutation({
-    mutationFn: () => pauseOrResume(runner ?? "", run.id, paused ? "resume" : "pause"),
+    mutationFn: () =>
+      paused ? resumeRun(runner ?? "", run.id, watch.watching) : pauseRun(runner ?? "", run.id),
     onError: (error) => notifications.show(failure(error, paused)),
   });
   const goes = run.state === "running" || run.state === "paused";
   if (!may || engine?.pauses !== true || !goes || run.desired === "stopped") return null;
   const Sign = paused ? IconPlayerPlay : IconPlayerPause;
+  const why = now.link === "down" ? "The runner does not answer" : watch.obstacle;
   return (
-    <Button
-      size="compact-xs"
-      leftSection={<Sign size={13} aria-hidden />}
-      loading={steer.isPending}
-      disabled={now.link === "down"}
-      title={now.link === "down" ? "The runner does not answer" : undefined}
-      onClick={() => steer.mutate()}
-    >
-      {paused ? "Go on" : "Pause"}
-    </Button>
+    <>
+      <WatchTicks watch={watch} />
+      <Button
+        size="compact-xs"
+        leftSection={<Sign size={13} aria-hidden />}
+        loading={steer.isPending}
+        disabled={why !== null}
+        title={why ?? undefined}
+        onClick={() => steer.mutate()}
+      >
+        {paused ? "Go on" : "Pause"}
+      </Button>
+    </>
   );
 }

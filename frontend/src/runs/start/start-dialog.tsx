@@ -1,5 +1,5 @@
 /** Before a start: where it goes, what was looked at there, and exactly what will be sent. */
-import { Button, Modal, Text, Textarea } from "@mantine/core";
+import { Button, Checkbox, Modal, Text, Textarea } from "@mantine/core";
 import { IconPlayerPlayFilled, IconRefresh, IconSend, IconUserCheck } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
@@ -12,7 +12,7 @@ import { useLive } from "../../api/page-link";
 import { useMay, usePerson } from "../../api/people";
 import { useRight } from "../../api/rights";
 import { type Preflight, type Robot, SIMULATOR, useRosReach } from "../../api/robots";
-import type { Run } from "../../api/runs";
+import type { Run, Watching } from "../../api/runs";
 import {
   type Approval,
   approve,
@@ -23,6 +23,7 @@ import {
 import { HelpLink } from "../../status/help-link";
 import { batonWords } from "../../status/robot-rights";
 import { EngineLabel } from "../../status/state-label";
+import { useWatching, WatchTicks } from "../../status/watching";
 import { HoldButton } from "../../ui/hold-button";
 import { textScope, useKeptText } from "../../ui/kept-texts";
 import { colorOfName } from "../../ui/name-colors";
@@ -71,14 +72,15 @@ function useLook(
   engines: readonly string[],
   behaviours: boolean,
   led: LedOrder | null,
+  said: { watching: Watching; drill: boolean },
 ) {
   const { runner } = useLive();
   const look = useQuery({
-    queryKey: ["preflight", graph, seq, behaviours, led, ...engines],
+    queryKey: ["preflight", graph, seq, behaviours, led, said, ...engines],
     queryFn: async ({ signal }) => {
       const inside = await fetchInside(graph, seq, signal);
       const what = { graph, umrf: umrf ?? "", ...inside };
-      return runPreflight(runner ?? "", what, engines, behaviours, led, signal);
+      return runPreflight(runner ?? "", what, engines, behaviours, led, said, signal);
     },
     enabled: umrf !== undefined && runner !== undefined && engines.length > 0,
     refetchInterval: LOOK_AGAIN,
@@ -141,9 +143,11 @@ function RightWords({ robot }: { robot: Robot }) {
       ? "OUT OF SERVICE"
       : robot.baton
         ? batonWords(robot, person.id)
-        : why !== ""
-          ? "you may not start here"
-          : "";
+        : why === ""
+          ? ""
+          : why === robot.drill_due
+            ? "a Stop drill is due"
+            : "you may not start here";
   return words === "" ? null : (
     <span className={why === "" ? "quiet-xs" : "quiet-xs ink-warn"} title={why}>
       {words}
@@ -215,6 +219,11 @@ function Exactly({
       )}
     </dl>
   );
+}
+
+/** Return whether a Stop drill has to be made before the next start there. */
+function isDrillDue({ items }: Preflight): boolean {
+  return items.some(({ code, verdict }) => code === "drill" && verdict === "blocked");
 }
 
 /** Return the robots that ask this person to confirm who they are. */
@@ -296,7 +305,11 @@ export function StartDialog(props: Props) {
   const { now } = useLive();
   const { behaviours, choice } = useBehaviours(!led && engines.includes(SIMULATOR));
   const moment = { graph, seq, umrf: way.text.data };
-  const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order);
+  const watch = useWatching(engines);
+  const mayDrill = !led && engines.length === 1 && !engines.includes(SIMULATOR);
+  const [drills, setDrills] = useState(false);
+  const said = { watching: watch.watching, drill: drills && mayDrill };
+  const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order, said);
   const error = way.text.error ?? lookError;
   const start = useStart(graph);
   const looks = look.data;
@@ -307,7 +320,7 @@ export function StartDialog(props: Props) {
       ? "The runner does not answer"
       : start.isPending
         ? "Starting …"
-        : (way.missing ?? obstacleOf(engines, looks, reason));
+        : (way.missing ?? watch.obstacle ?? obstacleOf(engines, looks, reason));
   const choose = (engine: string) => {
     setReason("");
     setEngines(toggled(whole, engine));
@@ -323,7 +336,14 @@ export function StartDialog(props: Props) {
       onStarted?.(runs);
     };
     const looked = { digest, ...(tree && { tree }) };
-    const what = { seq, engines: asked, ...(order && { led: order }), ...looked, behaviours };
+    const what = {
+      seq,
+      engines: asked,
+      ...(order && { led: order }),
+      ...looked,
+      behaviours,
+      ...said,
+    };
     start.mutate({ ...what, ...override }, { onSuccess: done });
   };
   const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
@@ -361,6 +381,7 @@ export function StartDialog(props: Props) {
         <Where engines={engines} behaviours={behaviours} onToggle={choose} />
       )}
       {choice}
+      <WatchTicks watch={watch} />
       {asked.length > 0 && (
         <section
           className={style.looks}
@@ -395,6 +416,13 @@ export function StartDialog(props: Props) {
             ),
           )}
         </section>
+      )}
+      {mayDrill && (drills || looks?.some(isDrillDue)) && (
+        <Checkbox
+          checked={drills}
+          onChange={(event) => setDrills(event.currentTarget.checked)}
+          label="This start is for a Stop drill: I press Stop while it moves"
+        />
       )}
       <SecondPerson graph={graph} label={label} looks={looks} />
       <ConfirmFirst looks={looks} />

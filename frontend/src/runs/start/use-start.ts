@@ -8,7 +8,7 @@ import { errorPlace, errorText, isOutcomeUnknown } from "../../api/http";
 import { insideOf } from "../../api/inside";
 import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
-import { type Started, type StartOrder, startRun } from "../../api/runs";
+import { type Started, type StartOrder, startRun, type Watching } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
 import { newAid } from "../../graph/document-keys";
 import { memberText } from "../../graph/json-members";
@@ -30,6 +30,10 @@ export interface StartInput {
   /** Set if actions follow their Python behaviours in the simulator. */
   behaviours?: boolean;
   override?: NonNullable<StartOrder["override"]>;
+  /** The robots that the person says to watch. */
+  watching?: Watching;
+  /** Set for a start by which a Stop drill is made. */
+  drill?: boolean;
 }
 
 /** A moment as a version, and its graph exactly as the editor wrote it. */
@@ -58,7 +62,8 @@ export function useStart(graph: string) {
   const client = useQueryClient();
   return useMutation({
     mutationFn: async (wanted: StartInput) => {
-      const { seq, engines, led, digest, tree, script, behaviours, override } = wanted;
+      const { seq, engines, led, digest, tree, script, behaviours, override, watching, drill } =
+        wanted;
       if (runner === undefined) throw new Error("The address of the runner is not known yet.");
       const { version, umrf } = await publishedVersion(graph, await seq);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
@@ -82,6 +87,8 @@ export function useStart(graph: string) {
         ...(script === undefined ? {} : { script }),
         ...(behaviours === undefined ? {} : { behaviours }),
         ...(override === undefined ? {} : { override }),
+        ...(watching === undefined ? {} : { watching }),
+        ...(drill === undefined ? {} : { drill }),
       });
       for (const run of started.runs) live?.learn(run);
       return started;

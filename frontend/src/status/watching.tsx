@@ -1,0 +1,52 @@
+/** Who watches the robots whose owners want to know it: one tick for each, before anything sets them going. */
+import { Checkbox } from "@mantine/core";
+import { useState } from "react";
+import { useLive } from "../api/page-link";
+import { isolated } from "../words/isolated";
+import style from "./watching.module.css";
+
+export interface Watch {
+  /** Robots of which somebody has to say that they watch them. */
+  readonly asked: readonly string[];
+  /** What the person has said, as the runner wants it. */
+  readonly watching: Readonly<Record<string, true>>;
+  /** Why nothing may be set going yet; null when all is said. */
+  readonly obstacle: string | null;
+  readonly toggle: (robot: string) => void;
+}
+
+/** Remember which of these robots a person says to watch, until the asking part is closed. */
+export function useWatching(robots: readonly string[]): Watch {
+  const { now } = useLive();
+  const [said, setSaid] = useState<readonly string[]>([]);
+  const asked = now.engines
+    .filter(({ name, watched }) => watched && robots.includes(name))
+    .map(({ name }) => name);
+  const missing = asked.find((robot) => !said.includes(robot));
+  return {
+    asked,
+    watching: Object.fromEntries(
+      asked.filter((robot) => said.includes(robot)).map((robot) => [robot, true as const]),
+    ),
+    obstacle: missing === undefined ? null : `Say that you watch ${isolated(missing)}`,
+    toggle: (robot) =>
+      setSaid(said.includes(robot) ? said.filter((each) => each !== robot) : [...said, robot]),
+  };
+}
+
+export function WatchTicks({ watch }: { watch: Watch }) {
+  if (watch.asked.length === 0) return null;
+  return (
+    <fieldset className={style.ticks}>
+      <legend>Who watches</legend>
+      {watch.asked.map((robot) => (
+        <Checkbox
+          key={robot}
+          checked={watch.watching[robot] === true}
+          onChange={() => watch.toggle(robot)}
+          label={`I watch ${isolated(robot)}, and its hardware stop is within my reach`}
+        />
+      ))}
+    </fieldset>
+  );
+}
