@@ -231,6 +231,8 @@ def values_in(pickled: bytes) -> int:
 #: it, `{v}`: a version, `{a}`: the key of one action. None: not asked here, and why.
 ASKED: Final[dict[str, tuple[str, str, Any] | None]] = {
     "getGraph": ("GET", "/api/graphs/{g}", None),
+    "getGraphRule": ("GET", "/api/graphs/{g}/rule", None),
+    "putGraphRule": ("PUT", "/api/graphs/{g}/rule", {"rule": None}),
     "fileGraph": ("PUT", "/api/graphs/{g}/folder", {"folder": None}),
     "describeGraph": ("PATCH", "/api/graphs/{g}", {"description": "new"}),
     "deleteGraph": None,  # the last thing that is done to a graph; below
@@ -251,6 +253,7 @@ ASKED: Final[dict[str, tuple[str, str, Any] | None]] = {
     "listVersions": ("GET", "/api/graphs/{g}/versions", None),
     "publishVersion": ("POST", "/api/graphs/{g}/versions", {"label": "one"}),
     "getVersion": ("GET", "/api/versions/{v}", None),
+    "getSight": ("GET", "/api/versions/{v}/sight", None),
     "releaseVersion": ("PUT", "/api/versions/{v}/release", None),
     "withdrawRelease": ("DELETE", "/api/versions/{v}/release", None),
     "getSubgraphs": ("GET", "/api/graphs/{g}/subgraphs", None),
