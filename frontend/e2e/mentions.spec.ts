@@ -104,6 +104,7 @@ test("who is mentioned finds it, is notified, and comes to the comment", async (
     ]);
   }).toPass({ timeout: 8_000, intervals: [500] });
   await expect(menu).toHaveAccessibleName(/1 unread mention/);
+  await ben.page.setViewportSize({ width: 390, height: 844 }); // a phone
   await menu.click();
   await ben.page.getByRole("link", { name: /Ada in chain_2/ }).click();
   await expect(ben.page.getByRole("article").getByText("Is this long enough, @Ben")).toBeVisible();

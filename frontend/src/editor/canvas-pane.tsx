@@ -305,14 +305,17 @@ function useGraphLink(context: EditorContext, begun: boolean): void {
     if (asked === null) return;
     const { doc, select, setPanel, view } = now.current;
     const thread = readThreads(rootOf(doc, "comments").entries()).find(({ id }) => id === asked);
-    setPanel("comments");
     if (thread === undefined) {
+      setPanel("comments");
       notifications.show({ message: "The comment is not there any more." });
       return;
     }
     const about = present(now.current.graph, [thread.about]);
     select(about);
-    const timer = setTimeout(() => about.length > 0 && view.show(about), SETTLED);
+    const timer = setTimeout(() => {
+      if (about.length > 0) view.show(about);
+      setPanel("comments"); // last: on a phone either the canvas or the panel is there
+    }, SETTLED);
     return () => clearTimeout(timer);
   }, [search, begun]);
   useEffect(() => {

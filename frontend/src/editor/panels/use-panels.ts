@@ -41,7 +41,9 @@ export function usePanels() {
     setLeft(listed);
     if (next === "library") return;
     const isList = next === "outline" || next === "history";
-    setPane((now) => (isList ? next : now === "outline" || now === "history" ? "details" : now));
+    // Comments are asked for to be read: on a phone the canvas makes way.
+    const leaves = (now: Pane) => now === "outline" || now === "history" || next === "comments";
+    setPane((now) => (isList ? next : leaves(now) ? "details" : now));
     if (next === "outline") whenThere(ROW, (row) => row.focus());
     if (next === "history") whenThere(ENTRY_BUTTON, (entry) => entry.focus());
   }, []);
