@@ -21,14 +21,18 @@ export function Notifier() {
   const news = useRef<{ who: string; notices: NewNotices } | null>(null);
   const isOn = IS_POSSIBLE && wanted.includes(person.id);
   useEffect(() => {
+    if (!isOn) {
+      news.current = null;
+      return;
+    }
     if (now.link !== "live" || !isFetched) return;
     const found = noticesOf(now, inbox);
-    // What was so before somebody came in is no news to them.
+    // What was so before somebody came in, or asked for this, is no news to them.
     if (news.current?.who !== person.id) {
       news.current = { who: person.id, notices: new NewNotices(found) };
     }
     const fresh = news.current.notices.take(found);
-    if (!isOn || !document.hidden || Notification.permission !== "granted") return;
+    if (!document.hidden || Notification.permission !== "granted") return;
     for (const { key, text, path } of fresh) {
       try {
         const shown = new Notification("TeMoto Action Assistant", { body: text, tag: key });

@@ -3,7 +3,6 @@ import { MantineProvider } from "@mantine/core";
 import { QueryClient, QueryClientProvider } from "@tanstack/react-query";
 import { useEffect, useState } from "react";
 import { Route, Router, Switch } from "wouter";
-import { Notifier } from "../account/notifier";
 import { SignInGate } from "../account/sign-in-gate";
 import { Refusal, unconfirmed } from "../api/http";
 import { useLive } from "../api/page-link";
@@ -74,6 +73,8 @@ const ConfirmDialog = lazyPart(() =>
 const ConfirmQuestion = lazyPart(() =>
   import("../account/confirm-question").then((part) => part.ConfirmQuestion),
 );
+
+const Notifier = lazyPart(() => import("../account/notifier").then((part) => part.Notifier));
 
 /** What this page has to confirm, and what another device asks it to. */
 function Confirmations() {
@@ -184,7 +185,9 @@ export function App() {
               <DragPreview />
               <NewVersionNotice />
               <LiveRegion />
-              <Notifier />
+              <OverlayBoundary>
+                <Notifier />
+              </OverlayBoundary>
             </DropFiles>
           </SignInGate>
         </Router>

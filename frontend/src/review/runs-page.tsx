@@ -113,7 +113,13 @@ function Row({ run, now, chosen, onChoose }: RunRowProps) {
           onClick={(event) => event.stopPropagation()}
         >
           <span className={style.number}>Run {run.number}</span>{" "}
-          {run.hidden ? <span className="ink3">of {run.graph_name}</span> : run.graph_name}
+          {run.hidden ? (
+            <span className="ink3">
+              of <bdi>{run.graph_name}</bdi>
+            </span>
+          ) : (
+            run.graph_name
+          )}
         </Link>
         {!run.hidden && <Marks run={run} />}
       </td>

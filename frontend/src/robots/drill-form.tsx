@@ -78,12 +78,12 @@ export function DrillForm({ robot, onClose }: { robot: Robot; onClose: () => voi
     },
     onSuccess: onClose,
   });
-  const name = isolated(robot.name);
+  const which = isolated(robot.name);
   return (
     <Modal
       opened
       onClose={onClose}
-      title={`Record a Stop drill of ${name}`}
+      title={`Record a Stop drill of ${which}`}
       closeButtonProps={{ "aria-label": "Close" }}
     >
       <form
@@ -94,13 +94,13 @@ export function DrillForm({ robot, onClose }: { robot: Robot; onClose: () => voi
       >
         <Stack gap="md">
           <Text size="sm">
-            Start a graph that keeps {name} moving for some seconds, press Stop while it moves, and
+            Start a graph that keeps {which} moving for some seconds, press Stop while it moves, and
             try its hardware stop, too. The runner takes the time from your press to the proof from
             that run.
           </Text>
           {runs.length === 0 ? (
             <Text size="sm" role="status">
-              No run on {name} was stopped within the last day. <Link to="/">Choose a graph</Link>{" "}
+              No run on {which} was stopped within the last day. <Link to="/">Choose a graph</Link>{" "}
               to start there.
             </Text>
           ) : (
@@ -112,7 +112,7 @@ export function DrillForm({ robot, onClose }: { robot: Robot; onClose: () => voi
               onChange={setChosen}
             />
           )}
-          <Question label={`Did you see ${name} stop?`} value={saw} onChange={setSaw} />
+          <Question label={`Did you see ${which} stop?`} value={saw} onChange={setSaw} />
           <Question
             label="Did you try its hardware stop?"
             value={hardware}
