@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-#: Raw bytes of a path or query, percent-encoded: NUL, half a character, bytes that are no UTF-8.
-RAW = ("a%00b", "%ED%A0%80", "%FF")
+#: Raw bytes of a path or query, percent-encoded: NUL, half a character, bytes that are no
+#: UTF-8; and a number that no database has.
+RAW = ("a%00b", "%ED%A0%80", "%FF", f"{10**30}")
 #: Texts of a body, as JSON has them.
 TEXTS = ("a\\u0000b", "\\ud800", "\\udfffx")
 _MARK = "hostile-text"

@@ -124,6 +124,18 @@ def test_line_breaks_stand_in_notes_and_older_names_are_shown_escaped(product: P
         assert editor.get(f"/api/graphs/{made.json()['id']}").json()["name"] == "\u202etask"
 
 
+def test_numbers_that_no_database_has_are_refused(product: Product) -> None:
+    with product.editor() as editor, product.runner() as runner:
+        graph = editor.post("/api/graphs", json={"name": "task"}).json()["id"]
+        for before in (10**30, -(10**30), 1 << 63):
+            path = f"/api/graphs/{graph}/history?before={before}"
+            assert editor.get(path).status_code == 400, before
+        for days in ("1e17", "1e300"):
+            for field in ("runs", "raw"):
+                body = f'{{"{field}": {days}}}'
+                assert runner.post("/api/archive", content=body).status_code == 400, body
+
+
 def test_a_stop_is_read_whatever_stands_beside_it(product: Product) -> None:
     with product.runner() as runner:
         for body in (

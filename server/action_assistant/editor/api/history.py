@@ -16,7 +16,7 @@ from action_assistant.editor.history.restoring import EditsOfOne, GoneBack
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
-from action_assistant.errors import Conflict
+from action_assistant.errors import BadInput, Conflict
 from action_assistant.umrf.difference import Difference
 from action_assistant.web.auth.access import Needs, identity_of, person_of
 from action_assistant.web.server.openapi import answer
@@ -24,6 +24,7 @@ from action_assistant.web.server.openapi import answer
 Asking = Request[Any, Any, Any]
 Seq = Annotated[int, Parameter(ge=1)]
 
+_MOST_SEQ: Final = 1 << 53  # larger numbers no JSON of a page has
 _STEPS: Final = 5_000  # changes of keys in one answer
 
 
@@ -77,6 +78,8 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         before: Seq | None = None,
     ) -> list[HistoryEntry]:
         services = app_state.services
+        if before is not None and abs(before) > _MOST_SEQ:  # Litestar checks no optional number
+            raise BadInput("There is no such change.", where={"path": "/before"})
         await services.catalogue.require(graph_id)
         found = await services.history.of(graph_id, limit=limit, before=before)
         sees = await services.rights.sight(identity_of(request))

@@ -37,6 +37,7 @@ from action_assistant.web.server.openapi import FileBytes, answer, reads
 
 T = TypeVar("T")
 
+_MOST_DAYS: Final = 36_500.0
 _Asking = Request[Any, Any, Any]
 _TYPES: Final[dict[str, str]] = {
     "jsonl": "application/x-ndjson",
@@ -67,8 +68,8 @@ class ArchiveRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A request to archive runs and raw messages that ended more than so many days ago; null
     archives none."""
 
-    runs: Annotated[float, msgspec.Meta(ge=0)] | None = None
-    raw: Annotated[float, msgspec.Meta(ge=0)] | None = None
+    runs: Annotated[float, msgspec.Meta(ge=0, le=_MOST_DAYS)] | None = None
+    raw: Annotated[float, msgspec.Meta(ge=0, le=_MOST_DAYS)] | None = None
 
 
 def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
