@@ -52,8 +52,8 @@ def test_its_code_moves_only_after_the_yes_and_not_after_the_stop(tmp_path: Path
     with (
         real_engine(tmp_path, DOMAIN) as events,
         running(tmp_path / "data") as product,
-        browser(product, "Ada") as ada,
-        browser(product, "Ben") as ben,
+        browser(product, "Ada", is_named=True) as ada,
+        browser(product, "Ben", is_named=True) as ben,
     ):
         robot = {"name": "David", "domain": DOMAIN, "profile": {"second_person": True}}
         assert ada.post("/api/robots", json=robot).is_success

@@ -13,7 +13,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from support.product import Product
+from support.product import TOKEN, Product
 
 PROGRAM = Path(os.environ.get("UMRF_SHARED", "/nonexistent")) / "engine-lab" / "engine"
 IS_HERE = bool(os.environ.get("ENGINE_LAB")) and PROGRAM.exists()
@@ -22,11 +22,14 @@ needs_engine = pytest.mark.skipif(
 )
 
 
-def browser(product: Product, name: str) -> httpx.Client:
-    """Return an HTTP client of the runner with the session of a person by a personal link."""
-    with product.editor() as owner:
-        made = owner.post("/api/members", json={"name": name, "role": "operator"}).json()
-    body = {"invitation": made["links"][0]["path"].removeprefix("/#i=")}
+def browser(product: Product, name: str, *, is_named: bool = False) -> httpx.Client:
+    """Return an HTTP client of the runner with the session of a person: by the link of the owner, or
+    with `is_named` of an operator by a personal link."""
+    body = {"token": TOKEN, "name": name}
+    if is_named:
+        with product.editor() as owner:
+            made = owner.post("/api/members", json={"name": name, "role": "operator"}).json()
+        body = {"invitation": made["links"][0]["path"].removeprefix("/#i=")}
     answer = httpx.post(
         f"{product.url}/api/session", json=body, headers={"origin": product.url}, trust_env=False
     )
