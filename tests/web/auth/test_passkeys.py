@@ -91,7 +91,7 @@ class Bench:
     """The passkeys of a server, and people who are signed in."""
 
     def __init__(self, data: Path) -> None:
-        self.wall, self.clock = Clock(1e9), Clock(0.0)
+        self.data, self.wall, self.clock = data, Clock(1e9), Clock(0.0)
         self.files = PasskeyFiles(data)
         self.passkeys = Passkeys(self.files, self.clock, self.wall)
 
@@ -276,3 +276,17 @@ def test_an_owner_is_asked_again_for_what_only_owners_change(bench: Bench) -> No
     with pytest.raises(Forbidden):  # nobody who finds the page open switches it off
         bench.passkeys.set_ask_again(bench.person(sure=False), 0)
     assert base64url_to_bytes(bench.files.of("mari").passkeys[0].credential) == key.id
+
+
+@pytest.mark.parametrize("content", [b"", b"[1]", b'{"passkeys": 3}'])
+def test_a_damaged_file_asks_an_owner_again_after_a_restart(bench: Bench, content: bytes) -> None:
+    mari = bench.person()
+    bench.register(mari, Authenticator())
+    bench.passkeys.set_ask_again(mari, 10)
+    assert bench.files.of("mari").ask_again == 10
+    (path,) = (bench.data / "passkeys").iterdir()
+    path.write_bytes(content)
+    assert bench.files.of("mari").ask_again == 10
+    restarted = PasskeyFiles(bench.data).of("mari")
+    assert restarted.passkeys == ()
+    assert restarted.ask_again > 0

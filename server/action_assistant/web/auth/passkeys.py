@@ -63,6 +63,10 @@ class PasskeyFile(msgspec.Struct, frozen=True, omit_defaults=True):
     ask_again: int = 0
 
 
+#: Counts for a file that this process has never been able to read.
+_UNREAD: Final = PasskeyFile(ask_again=15)
+
+
 class PasskeyFiles:
     """Reads and writes the passkeys of persons."""
 
@@ -72,7 +76,7 @@ class PasskeyFiles:
 
     def of(self, person: str) -> PasskeyFile:
         """Return the passkeys of a person. While the file cannot be read, they are those of the last
-        time."""
+        time; if this process never read it, there are none, and the person is asked again."""
         known = self._read.get(person)
         if _ID.fullmatch(person) is None:
             return PasskeyFile()
@@ -88,7 +92,8 @@ class PasskeyFiles:
             return PasskeyFile()
         except (OSError, msgspec.DecodeError) as error:
             log.error("%s cannot be read: %s", path, error)
-        return PasskeyFile() if known is None else known[1]
+            return _UNREAD if known is None else known[1]
+        return known[1]
 
     def write(self, person: str, file: PasskeyFile) -> None:
         """Store the passkeys of a person durably. Raise Unavailable if that fails."""
