@@ -17,8 +17,7 @@ unit e2e ros-test soak soak-ros pictures screens browsers bench: export ROS_AUTO
 PYTHON ?= python3
 BIN := .venv/bin
 # How many processes share the Python tests, of which many wait; each test file stays with one.
-PROCESSES ?= 6
-ROS_PROCESSES ?= 2
+PROCESSES ?= 5
 ROS := .venv-ros/bin
 # Tests see nothing of a sourced ROS 2 either; `make run` does.
 BARE := env -u AMENT_PREFIX_PATH -u COLCON_PREFIX_PATH -u LD_LIBRARY_PATH
@@ -112,7 +111,7 @@ unit: setup ## the tests of the server and of the page's pure parts
 .PHONY: ros-test
 ros-test: ros ## tests over real rclpy, on loopback
 	@echo "» pytest over rclpy"
-	@$(BARE) $(ROS)/python -m pytest -q --numprocesses $(ROS_PROCESSES) --dist loadfile tests/ros $(PYTEST)
+	@$(BARE) $(ROS)/python -m pytest -q tests/ros $(PYTEST)
 
 .PHONY: contract
 contract: ros ## what a link promises, with a real engine: NAME=David [DOMAIN=0] [RMW=…] [ACTION=…]; it moves

@@ -207,7 +207,7 @@ def test_every_route_says_how_it_treats_rights(owner: httpx.Client) -> None:
     others = re.compile(
         r"/healthz|/readyz|/metrics|/api/(server|session|sessions|status|doctor|invitations"
         r"|people|members|groups|devices|audit|tokens|logins|confirmations|view|view-links"
-        r"|notifications|mentions)\b"
+        r"|notifications|mentions|passkeys)\b"
     )
     for method, path, _ in operations(owner):
         known = named_in(path) or path in FILTERED | WITHOUT_GRAPHS

@@ -352,7 +352,7 @@ async def test_rights_that_cannot_be_read_let_nobody_start() -> None:
 
     class Row:
         name = "David"
-        rules, set_by, holder, locks = {"baton": "?"}, None, None, ()
+        rules, set_by, holder, locks, drills = {"baton": "?"}, None, None, (), ()
 
     async with harness.runner() as control:
         row: Any = Row()
