@@ -5,7 +5,8 @@ import { add, card, saved } from "./canvas";
 import { type Person, Product } from "./product";
 
 const product = new Product();
-const HOSTILE = "<img src=x onerror=alert(1)> \u202e";
+// A letter that is read from the right; texts that turn others around are refused in names.
+const HOSTILE = "<img src=x onerror=alert(1)> \u05d0";
 let graph = "";
 let ada: Person;
 let mari: Person;
