@@ -96,6 +96,7 @@ test("a run is seen in a frame of another site, and a graph on a phone, without 
   await picture(tab, "run-desktop");
   await owner.page.goto(`${product.url}/graphs/${graph}`);
   await expect(owner.page.getByRole("button", { name: /^You are Ada/ })).toBeVisible();
+  await expect(owner.page.getByText("Saved", { exact: true })).toBeVisible();
 
   const phone = await browser.newContext({ viewport: { width: 390, height: 844 }, hasTouch: true });
   const seen = await phone.newPage();
