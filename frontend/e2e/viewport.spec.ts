@@ -6,6 +6,8 @@ import { LONG, Product } from "./product";
 
 const product = new Product();
 
+test.skip(LONG !== "", LONG);
+
 test.beforeAll(() => product.start());
 test.afterAll(() => product.dispose());
 
@@ -32,7 +34,6 @@ for (const [what, viewport, least] of [
   ["a phone", { width: 390, height: 844 }, 0.6],
 ] as const) {
   test(`a large graph opens at its beginning and readable on ${what}`, async ({ browser }) => {
-    test.skip(LONG !== "", LONG);
     const { page, context } = await product.person(browser, "Ada", { viewport });
     await page.goto(`${product.url}/graphs/${await product.chain(60)}`);
     await saved(page);
@@ -62,7 +63,6 @@ for (const [what, viewport, least] of [
 test("Fit shows all of a graph also when it is pressed before the graph has places", async ({
   browser,
 }) => {
-  test.skip(LONG !== "", LONG);
   const { page, context } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/graphs/${await product.chain(80)}`);
   await page.getByRole("button", { name: "Fit", exact: true }).click();
@@ -110,7 +110,6 @@ test("the view follows what runs until the person moves it, and again when asked
 test("whoever takes hold of the canvas while it glides holds what they see", async ({
   browser,
 }) => {
-  test.skip(LONG !== "", LONG);
   const { page, context } = await product.person(browser, "Ada");
   await page.goto(`${product.url}/graphs/${await product.chain(30)}`);
   await saved(page);
