@@ -96,15 +96,21 @@ figures: .venv/.done ## sizes and language of the code, today and at an earlier 
 .PHONY: test
 test: setup ros ## every check and every test, also in a real browser
 	@# Most of these wait for processes and robots: together they take little longer than the longest.
-	@$(MAKE) --no-print-directory --jobs=3 --output-sync=target check unit ros-test
+	@$(MAKE) --no-print-directory --jobs=4 --output-sync=target check unit ros-test
 	@$(MAKE) --no-print-directory e2e
 
 .PHONY: unit
-unit: setup ## the tests of the server and of the page's pure parts
+unit: unit-server unit-page ## the tests of the server and of the page's pure parts
+
+.PHONY: unit-server
+unit-server: setup ## the tests of the server
 	@echo "» pytest"
 	@# One reads all tests and keeps what pytest makes of them, or each process would make it for itself.
 	@$(KEEPING) $(BIN)/pytest -q --collect-only $(STRUCTURE:%=--ignore=%) $(PYTEST) > /dev/null 2>&1 || true
 	@$(KEEPING) $(BIN)/pytest -q --numprocesses $(PROCESSES) --dist loadfile $(STRUCTURE:%=--ignore=%) $(PYTEST)
+
+.PHONY: unit-page
+unit-page: setup ## the tests of the pure parts of the page
 	@echo "» vitest"
 	@$(NPM) run --silent test
 
