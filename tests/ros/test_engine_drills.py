@@ -73,7 +73,7 @@ def test_a_drill_measures_the_code_of_the_action_and_an_unproven_stop_fails_it(
             assert engines.lines() == []
             for number in range(DRILLS):
                 run = await stopped(f"drill{number}", "OxWork", is_drill=number == 0)
-                await until(lambda run=run: run not in control.open, 20)  # type: ignore[misc]
+                await until(lambda run=run: run not in control.open, 20)
                 await control.record_drill("Ann", DrillRequest(run, **words), BEN)
                 told = control.rights.of("Ann").drills[-1]
                 assert told.failure == ""

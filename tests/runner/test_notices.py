@@ -119,7 +119,7 @@ async def test_an_unconfirmed_stop_is_told_to_all_who_want_it_and_not_each_secon
 
 async def test_a_robot_is_lost_only_while_a_run_is_open_on_it(journal: Journal) -> None:
     for name, state in (("Bob", "gone"), ("Eve", "gone"), ("Bob", "restarted"), ("Bob", "busy")):
-        await _store(journal, f"robot/{name}", EngineBecame(at=EPOCH, state=state, why="No."))  # type: ignore[arg-type]
+        await _store(journal, f"robot/{name}", EngineBecame(at=EPOCH, state=state, why="No."))
     assert await _told(journal) == [
         ("robot/Bob:1:chat", "Bob does not answer any more, and run 3 of Fetch is not over. No.")
     ]

@@ -145,7 +145,7 @@ class Browser:
         origin = self._headers["origin"]
         with connect(
             f"{url}/api/live", additional_headers=headers, origin=origin, proxy=None, max_size=None
-        ) as socket:  # type: ignore[arg-type]
+        ) as socket:
             assert json.loads(socket.recv())["type"] == "hello"
             yield socket
 

@@ -423,7 +423,7 @@ async def begin(case: Case) -> tuple[int, int, str]:
                     await control.rights.set_rules("David", rules, OLGA)
                 return await append(stream, *args, **fields)
 
-            harness.journal.append = appended  # type: ignore[method-assign]
+            harness.journal.append = appended
         try:
             if case.way == "group":
                 many = group(sequence(), "David", **more)

@@ -267,7 +267,7 @@ def _socket(url: str, headers: dict[str, str]) -> Any:
     return connect(
         url.replace("http", "ws", 1),
         additional_headers=own,
-        origin=headers.get("origin"),  # type: ignore[arg-type]
+        origin=headers.get("origin"),
         proxy=None,
         open_timeout=10,
     )

@@ -18,7 +18,7 @@ from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound, Ref
 from action_assistant.web.auth.confirmations import ADDED_S
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys
-from action_assistant.web.auth.passkeys import CHALLENGE_S, PasskeyFiles, Passkeys
+from action_assistant.web.auth.passkeys import CHALLENGE_S, PasskeyFile, PasskeyFiles, Passkeys
 from action_assistant.web.auth.rights import unconfirmed
 
 KEYS = Keys("k" * 43)
@@ -287,6 +287,9 @@ def test_a_damaged_file_asks_an_owner_again_after_a_restart(bench: Bench, conten
     (path,) = (bench.data / "passkeys").iterdir()
     path.write_bytes(content)
     assert bench.files.of("mari").ask_again == 10
-    restarted = PasskeyFiles(bench.data).of("mari")
-    assert restarted.passkeys == ()
-    assert restarted.ask_again > 0
+    restarted = PasskeyFiles(bench.data)
+    assert restarted.of("mari").passkeys == ()
+    assert restarted.of("mari").ask_again > 0
+    with pytest.raises(Unavailable, match="so it is not changed"):
+        restarted.write("mari", PasskeyFile())
+    assert path.read_bytes() == content

@@ -152,7 +152,7 @@ def comment(product: Product, graph: str) -> None:
     with connect(
         f"{product.url}/api/graphs/{graph}/room".replace("http", "ws", 1),
         additional_headers={"cookie": f"aa_{product.port}={KEYS.sealed(session)}"},
-        origin=product.url,  # type: ignore[arg-type]
+        origin=product.url,
         proxy=None,
     ) as socket:
         socket.send(messages.question(Doc().get_state()))
@@ -197,7 +197,7 @@ def test_a_link_reaches_its_own_thing_and_no_other_route(
             for method in (*item, "head"):
                 for ids in ((shown.graph, shown.run), (shown.other_graph, shown.other_run)):
                     names = iter([ids[0 if "graph" in path or "draft" in path else 1], "x", "y"])
-                    url = re.sub(r"\{[^}]*\}", lambda _, n=names: next(n), path)  # type: ignore[misc]
+                    url = re.sub(r"\{[^}]*\}", lambda _, n=names: next(n), path)
                     status, text = asked(client, method, url, key)
                     opens = path in reached and method == "get"
                     cells += 1
@@ -217,7 +217,7 @@ def test_no_socket_takes_a_link(shown: Shown, kind: str) -> None:
         for more in ({"additional_headers": bearer(key)}, {"subprotocols": [key]}):
             with (
                 pytest.raises(InvalidStatus) as refused,
-                connect(url.replace("http", "ws", 1), proxy=None, open_timeout=5, **more),  # type: ignore[arg-type]
+                connect(url.replace("http", "ws", 1), proxy=None, open_timeout=5, **more),
             ):
                 pass
             assert refused.value.response.status_code in {401, 403}

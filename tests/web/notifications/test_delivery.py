@@ -36,7 +36,7 @@ def _mailbox(port: int, **fields: object) -> Mailbox:
         "to": ("lab@example.org", "night@example.org"),
         "allow": LOOPBACK,
     }
-    return Mailbox(**(given | fields))  # type: ignore[arg-type]
+    return Mailbox(**(given | fields))
 
 
 def test_a_receiver_can_verify_a_webhook() -> None:

@@ -8,7 +8,7 @@ comes from the address that was asked: redirects are not followed.
 import ssl
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, Generic, NamedTuple, TypeVar
 
 import anyio
 import msgspec
@@ -18,6 +18,10 @@ from action_assistant.errors import Unauthenticated, Unavailable
 from action_assistant.safe_text import one_line
 from action_assistant.web.auth.provider_settings import ProviderSettings, is_safe
 
+if TYPE_CHECKING:  # slow to load, and only a sign-in needs it
+    from joserfc.jwk import KeySet
+
+_T = TypeVar("_T")
 _PATIENCE_S: Final = 5.0  # for one answer
 _EXCHANGE_S: Final = 12.0  # for all answers of one sign-in
 _MOST: Final = 512_000  # bytes of an answer
@@ -74,10 +78,10 @@ class ProviderIdentity(msgspec.Struct, frozen=True):
     asked_s: int | None
 
 
-class _Kept(NamedTuple):
+class _Kept(NamedTuple, Generic[_T]):
     """A value, and until when it is kept (monotonic seconds)."""
 
-    value: Any
+    value: _T
     until: float
 
 
@@ -91,8 +95,8 @@ class IdentityProvider:
         self._clock = clock
         self._turn = anyio.Lock()  # of whoever asks for the description or the keys
         self._tls: ssl.SSLContext | None = None
-        self._metadata: _Kept | None = None
-        self._keys: _Kept | None = None
+        self._metadata: _Kept[Metadata] | None = None
+        self._keys: _Kept[KeySet] | None = None
         self._asked_for_keys = -_REST_S
         self._failed: tuple[str, float] | None = None
 
@@ -101,10 +105,10 @@ class IdentityProvider:
         reason, if it cannot be had or used."""
         kept = self._metadata
         if kept is not None and self._clock() < kept.until:
-            return kept.value  # type: ignore[no-any-return]
+            return kept.value
         async with self._turn:
             if self._metadata is not kept and self._metadata is not None:
-                return self._metadata.value  # type: ignore[no-any-return]
+                return self._metadata.value
             if self._failed is not None and self._clock() < self._failed[1]:
                 raise Unavailable(self._failed[0])  # whoever waited is not kept waiting again
             try:
@@ -124,7 +128,7 @@ class IdentityProvider:
         more = {"prompt": "login", "max_age": "0"} if again else {}
 
         def written() -> str:
-            from authlib.oauth2.client import OAuth2Client  # type: ignore[import-untyped]
+            from authlib.oauth2.client import OAuth2Client
 
             client = OAuth2Client(
                 None,
@@ -208,8 +212,8 @@ class IdentityProvider:
         method = "client_secret_post" if "client_secret_post" in methods else "client_secret_basic"
 
         def prepared() -> tuple[str, dict[str, str], str]:
-            from authlib.oauth2.auth import ClientAuth  # type: ignore[import-untyped]
-            from authlib.oauth2.rfc6749.parameters import prepare_token_request  # type: ignore[import-untyped]
+            from authlib.oauth2.auth import ClientAuth
+            from authlib.oauth2.rfc6749.parameters import prepare_token_request
 
             body = prepare_token_request(
                 "authorization_code",
@@ -238,7 +242,7 @@ class IdentityProvider:
         client = self.settings.client_id
 
         def checked() -> dict[str, Any]:
-            from authlib.oidc.core import CodeIDToken  # type: ignore[import-untyped]
+            from authlib.oidc.core import CodeIDToken
             from joserfc import jwt
             from joserfc.errors import BadSignatureError, InvalidKeyIdError, JoseError
             from joserfc.jws import JWSRegistry

@@ -96,7 +96,10 @@ class PasskeyFiles:
         return known[1]
 
     def write(self, person: str, file: PasskeyFile) -> None:
-        """Store the passkeys of a person durably. Raise Unavailable if that fails."""
+        """Store the passkeys of a person durably. Raise Unavailable if that fails, or if there is a
+        file that this process cannot read: it is kept as it is."""
+        if self.of(person) is _UNREAD:
+            raise Unavailable(f"{self._folder / person}.json cannot be read, so it is not changed.")
         try:
             make_folder(self._folder)
             part = self._folder / f"{person}.{random_id()}.part"

@@ -22,7 +22,7 @@ _PREFIX: Final = "whsec_"
 _SHORTEST_KEY, _LONGEST_KEY = 24, 64  # bytes, by Standard Webhooks
 _SECRET_FILE: Final = 4096  # characters
 _MOST: Final = 20  # receivers
-_PORTS: Final = {"none": 25, "starttls": 587, "tls": 465}
+_PORTS: Final[Mapping["Security", int]] = {"none": 25, "starttls": 587, "tls": 465}
 
 Security: TypeAlias = Literal["starttls", "tls", "none"]
 
@@ -225,8 +225,9 @@ def _key(fields: _Fields) -> bytes:
 
 
 def _mailbox(name: str, fields: _Fields) -> Mailbox:
-    security = fields.text("security", "starttls")
-    if security not in _PORTS:
+    wanted = fields.text("security", "starttls")
+    security = next((each for each in _PORTS if each == wanted), None)
+    if security is None:
         raise fields.place.error(f"it is {', '.join(_PORTS)}", "security")
     allow = fields.networks()
     if security == "none" and not allow:
@@ -248,7 +249,7 @@ def _mailbox(name: str, fields: _Fields) -> Mailbox:
         kinds=fields.kinds(),
         host=host,
         port=fields.number("port", _PORTS[security]),
-        security=security,  # type: ignore[arg-type]  # checked above
+        security=security,
         sender=sender,
         to=to,
         user=user,
