@@ -3,11 +3,15 @@
 import json
 from collections.abc import AsyncIterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
+import anyio
 import pytest
-from pycrdt import Doc, Map
-from sqlalchemy import select
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from pycrdt import Array, Doc, Map, Text
+from sqlalchemy import Insert, insert, select
 
 from action_assistant.editor import inbox
 from action_assistant.editor.history.change_index import ChangeIndex
@@ -16,6 +20,7 @@ from action_assistant.editor.log import graph_events as h
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.schema.editor_tables import mention_due, outbox
+from support.doses import examples
 from web.notifications.receiving import webhook
 
 CHAT = webhook("https://chat.example/", "chat")
@@ -27,6 +32,7 @@ class Page:
     def __init__(self, journal: Journal, graph: str, author: str) -> None:
         self._journal, self._graph, self._author = journal, graph, author
         self.doc: Doc[Any] = Doc()
+        self.sent = 0
 
     async def say(self, key: str, text: str, *people: str, **fields: object) -> None:
         """Write a comment that mentions people, in a name that the page claims."""
@@ -47,21 +53,32 @@ class Page:
 
     async def send(self, update: bytes) -> None:
         """Have an update stored."""
-        await self._journal.append(
+        self.sent = await self._journal.append(
             h.graph_stream(self._graph), [Draft(h.UPDATED, self._author, update)]
         )
 
 
-@pytest.fixture
-async def journal(tmp_path: Path) -> AsyncIterator[Journal]:
-    """A journal with two graphs, and three people who have acted."""
-    url = f"sqlite:///{tmp_path / 'editor.db'}"
+def _marked(graph: str, seq: int) -> Insert:
+    """Return the statement that has a change looked at, as if it held the mark."""
+    values = {"graph": graph, "seq": seq, "at": 0}
+    return insert(mention_due).prefix_with("OR IGNORE").values(values)
+
+
+async def _opened(folder: Path) -> Journal:
+    url = f"sqlite:///{folder / 'editor.db'}"
     journal = await Journal.open(url, branch="editor", fold=h.fold)
     for graph in ("g1", "g2"):
         made = h.draft(h.CREATED, "ann", h.GraphCreated(f"Fetch {graph}", ""))
         await journal.append(h.about_stream(graph), [made])
     for person, name in (("ann", "Ann"), ("ben", "Ben"), ("mari", "Mari")):
         await journal.append(h.PEOPLE, [h.draft(h.NAMED, person, h.PersonNamed(name))])
+    return journal
+
+
+@pytest.fixture
+async def journal(tmp_path: Path) -> AsyncIterator[Journal]:
+    """A journal with two graphs, and three people who have acted."""
+    journal = await _opened(tmp_path)
     yield journal
     await journal.close()
 
@@ -169,6 +186,8 @@ async def test_a_copy_of_a_graph_mentions_nobody_anew(journal: Journal, inboxes:
         '{"mentions": ["b\\u0000n"], "text": "x"}',
         '{"mentions": [' + '"x",' * 30 + '"ben"], "text": "x"}',
         '"mentions"',
+        '{"mentions": ' + "[" * 100_000,
+        '{"mentions": ["ben"], "text": "' + "x" * 100_000 + '"}',
         7,
         {"mentions": ["ben"]},
     ],
@@ -183,6 +202,102 @@ async def test_what_is_no_mention_is_passed_over_and_the_next_one_is_found(
     assert (await _of(inboxes, "ben")).unread == expected
     await page.say("t/1", "@Ben", "ben")
     assert (await _of(inboxes, "ben")).unread == expected + 1
+
+
+#: Values of a comment, as an edit can bring them: also of kinds that no page writes.
+_VALUES = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**53), 2**53) | st.floats() | st.text()
+    | st.binary(max_size=20),
+    lambda each: st.lists(each, max_size=4) | st.dictionaries(st.text(), each, max_size=4),
+    max_leaves=20,
+)  # fmt: skip
+_PEOPLE = st.sampled_from(["ben", "ann", "", "\0", "nobody", "b" * 200])
+_BODIES = st.fixed_dictionaries(
+    {"mentions": st.lists(_PEOPLE | _VALUES, max_size=30) | _VALUES, "text": st.text() | _VALUES}
+)
+
+
+def _as_json(value: object) -> str:
+    return json.dumps(value, default=repr, ensure_ascii=False)
+
+
+_COMMENTS = (
+    _VALUES.filter(lambda each: each is not None)
+    | st.one_of(_BODIES, _VALUES).map(_as_json)
+    | st.sampled_from([1, 900, 100_000]).map(lambda n: '{"mentions": ' + "[" * n)
+    | st.text().map(lambda text: Text(text))
+    | _VALUES.map(lambda each: Array([each] * 3))
+    | _VALUES.map(lambda each: Map({"mentions": each}))
+)
+
+
+@settings(deadline=None, max_examples=examples(20))
+@given(values=st.lists(st.tuples(st.text(max_size=50), _COMMENTS), min_size=3, max_size=8))
+@example(values=[("deep", '{"mentions": ' + "[" * 100_000)])  # it once ended the editor
+async def test_whatever_stands_among_the_comments_the_next_mention_is_found(
+    values: list[tuple[str, Any]],
+) -> None:
+    with TemporaryDirectory() as folder:
+        journal = await _opened(Path(folder))
+        try:
+            inboxes = Inboxes(journal, ChangeIndex(journal), [CHAT])
+            page = Page(journal, "g1", "ann")
+            for key, value in values:
+                await page.put(f"t/{key}", value)
+                await journal.derive(lambda c, n=page.sent: c.execute(_marked("g1", n)))
+            await page.say("t", "@Mari", "mari")
+            assert [each.key for each in (await _of(inboxes, "mari")).mentions] == ["t"]
+            assert (await _of(inboxes, "ben")).mentions is not None
+            assert await journal.query(select(mention_due)) == []
+        finally:
+            await journal.close()
+
+
+async def test_a_graph_that_cannot_be_read_keeps_no_mention_of_another_back(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    class Failing(ChangeIndex):
+        """An index that fails at one graph, in a way that nobody has foreseen."""
+
+        async def upto(self, graph: str, seq: int | None = None) -> int:
+            if graph == "g1":
+                raise KeyError(graph)
+            return await super().upto(graph, seq)
+
+    monkeypatch.setattr(inbox, "_GRAPHS", 1)
+    monkeypatch.setattr(inbox, "_LOOK_S", 0.01)
+    inboxes = Inboxes(journal, Failing(journal))
+    await Page(journal, "g1", "ann").say("t/1", "@Ben", "ben")
+    await Page(journal, "g2", "ann").say("t/2", "@Ben", "ben")
+    async with inboxes.kept_up():
+        while not (await inboxes.of("ben", lambda _: True)).mentions:  # noqa: ASYNC110 - nobody tells
+            await anyio.sleep(0.01)
+    found = await inboxes.of("ben", lambda _: True)
+    assert [each.key for each in found.mentions] == ["t/2"]
+    assert caplog.text.count("g1: mentions from change 1 on cannot be looked for") == 1
+
+
+async def test_one_change_with_many_comments_is_read_in_parts(
+    journal: Journal, inboxes: Inboxes, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inbox, "_ROWS", 5)
+    page = Page(journal, "g1", "ann")
+    for n in range(12):
+        await page.say(f"t/{n:02}", "@Ben", "ben")
+    comments = page.doc.get("comments", type=Map)
+    before = page.doc.get_state()
+    with page.doc.transaction():
+        for n in range(12):
+            comments[f"u/{n:02}"] = '{"text": "x", "mentions": ["mari"]}'
+    await page.send(page.doc.get_update(before))
+    await page.say("v", "@Mari", "mari")
+    for _ in range(5):  # 4 and 4 and 4, the large change, and the last one
+        assert await journal.query(select(mention_due)) != []
+        await inboxes.find()
+    assert await journal.query(select(mention_due)) == []
+    assert (await _of(inboxes, "ben")).unread == 12
+    mine = [each.key for each in (await _of(inboxes, "mari")).mentions]
+    assert sorted(mine) == [*(f"u/{n:02}" for n in range(5)), "v"]
 
 
 async def test_a_comment_mentions_few_people(journal: Journal, inboxes: Inboxes) -> None:

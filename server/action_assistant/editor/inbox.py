@@ -4,7 +4,7 @@ Found in the committed events, not by what a page says: the author is the one th
 """
 
 import logging
-from collections import defaultdict
+from collections import Counter, defaultdict
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from collections.abc import Set as AbstractSet
 from contextlib import asynccontextmanager
@@ -53,6 +53,10 @@ _LOOK_S: Final = 2.0
 _GRAPHS: Final = 20  # in one look
 _EXCERPT: Final = 300  # characters
 _LONGEST_ID: Final = 100
+_LARGEST: Final = 100_000  # bytes of a comment; a larger one mentions nobody
+_ROWS: Final = 1_000  # changes of comments that are read at once
+_OF_ONE_CHANGE: Final = 50  # comments with mentions; a page brings one
+_AGAIN_S: Final = 60.0  # after which a graph that could not be read is tried again
 _SHOWN: Final = 100  # mentions in one answer
 _ROOT: Final = "comments"
 #: Messages about mentions to one receiver in an hour: nobody can flood it by comments.
@@ -91,6 +95,13 @@ class FoundMentions(msgspec.Struct, frozen=True):
     people: tuple[str, ...]
 
 
+class ReadMentions(msgspec.Struct, frozen=True):
+    """The mentions in the changes of a graph up to `upto`."""
+
+    upto: int
+    found: list[FoundMentions]
+
+
 class Inboxes:
     """Finds mentions, and reads and marks the inboxes of all persons. `receivers`: to which mentions
     are sent as messages; `may_see`: whether a person may see a graph, by their ids (None: all may)."""
@@ -108,6 +119,7 @@ class Inboxes:
         self._receivers = [each for each in receivers if "mention" in each.kinds]
         self._clock_us = clock_us
         self._may_see = may_see
+        self._put_off: dict[str, float] = {}  # until when, of graphs that could not be read
 
     @asynccontextmanager
     async def kept_up(self) -> AsyncIterator[None]:
@@ -123,23 +135,41 @@ class Inboxes:
                 await self.find()
             except Refused as error:
                 log.warning("mentions are not looked for: %s", error.detail)
+            except Exception:  # whatever the log holds, the editor is not ended by it
+                log.exception("mentions cannot be looked for")
             await anyio.sleep(_LOOK_S)
 
     async def find(self) -> None:
-        """Find the mentions in the edits that are marked. Raise Unavailable if the journal cannot be
-        read or written, TooMany if no worker is free."""
+        """Find the mentions in the edits that are marked. A graph that cannot be read is logged, and
+        tried again later. Raise Unavailable if the journal cannot be read."""
+        now = anyio.current_time()
+        self._put_off = {each: until for each, until in self._put_off.items() if until > now}
         due = mention_due.c
         marked = select(due.graph, func.min(due.seq).label("first")).group_by(due.graph)
-        for each in await self._journal.query(marked.order_by("first").limit(_GRAPHS)):
-            newest = await self._journal.newest(graph_stream(each.graph))
-            await self._changes.upto(
-                each.graph, newest
-            )  # less is there only where the log is damaged
-            found = await self._changes.value(mentions_in, each.graph, each.first, newest)
-            people = dict.fromkeys(one for mention_ in found for one in mention_.people)
-            sees = self._may_see
-            blind = {p for p in people if sees is not None and not await sees(each.graph, p)}
-            await self._journal.derive(partial(self._keep, each.graph, newest, found, blind))
+        marked = marked.where(due.graph.not_in(self._put_off)).order_by("first", due.graph)
+        for each in await self._journal.query(marked.limit(_GRAPHS)):
+            try:
+                await self._find_in(each.graph, each.first)
+            except Refused as error:
+                text = "%s: mentions from change %d on are not looked for: %s"
+                log.warning(text, each.graph, each.first, error.detail)
+            except Exception:  # the graphs after it have mentions too
+                text = "%s: mentions from change %d on cannot be looked for"
+                log.exception(text, each.graph, each.first)
+            else:
+                continue
+            self._put_off[each.graph] = now + _AGAIN_S
+
+    async def _find_in(self, graph_: str, first: int) -> None:
+        """Find the mentions in the changes of a graph from `first` on; the remainder of many stays
+        marked. Raise the errors of the index."""
+        newest = await self._journal.newest(graph_stream(graph_))
+        await self._changes.upto(graph_, newest)  # less is there only where the log is damaged
+        read = await self._changes.value(mentions_in, graph_, first, newest)
+        people = dict.fromkeys(one for mention_ in read.found for one in mention_.people)
+        sees = self._may_see
+        blind = {p for p in people if sees is not None and not await sees(graph_, p)}
+        await self._journal.derive(partial(self._keep, graph_, read.upto, read.found, blind))
 
     async def of(self, reader: str, sees: Callable[[str], bool]) -> Inbox:
         """Return the inbox of a person. `sees`: whether they may see the graph with an id. Raise
@@ -222,32 +252,42 @@ class Inboxes:
                 connection.execute(insert(outbox).values(values))
 
 
-def mentions_in(connection: Connection, graph_: str, first: int, upto: int) -> list[FoundMentions]:
-    """Return the persons whom the changes of a graph from `first` to `upto` mention, in the order of
-    the changes, by what the index of key changes says. For workers."""
+def mentions_in(connection: Connection, graph_: str, first: int, upto: int) -> ReadMentions:
+    """Return the persons whom the changes of a graph from `first` on mention, in the order of the
+    changes, by what the index of key changes says; up to `upto`, or less if there are many. A comment
+    that cannot be read is logged and mentions nobody. For workers."""
     c = key_change.c
     chosen = (
         select(c.seq, c.author, c.at, c.key, c.after)
         .where(c.graph == graph_, c.root == _ROOT, c.seq >= first, c.seq <= upto)
-        .order_by(c.seq)
+        .where(func.length(c.after) <= _LARGEST)
+        .order_by(c.seq, c.key)
+        .limit(_ROWS)
     )
-    found = []
-    for each in connection.execute(chosen).all():
-        text, people = _mentioned(each.after)
-        if others := tuple(one for one in people if one != each.author):
+    rows = connection.execute(chosen).all()
+    if len(rows) == _ROWS:  # the last change may have more; if it is the only one, these count
+        upto = rows[-1].seq if rows[0].seq == rows[-1].seq else rows[-1].seq - 1
+    found: list[FoundMentions] = []
+    counts: Counter[int] = Counter()
+    for each in rows:
+        if each.seq > upto:
+            break
+        try:
+            text, people = _mentioned(each.after)
+        except (ValueError, RecursionError) as error:  # pages write comments, and so may others
+            log.warning("%s: a comment of change %d cannot be read: %s", graph_, each.seq, error)
+            continue
+        others = tuple(one for one in people if one != each.author)
+        if others and counts[each.seq] < _OF_ONE_CHANGE:
             found.append(FoundMentions(each.seq, each.author, each.at, each.key, text, others))
-    return found
+            counts[each.seq] += 1
+    return ReadMentions(upto, found)
 
 
-def _mentioned(packed: bytes | None) -> tuple[str, tuple[str, ...]]:
-    """Return the beginning of a comment, and the persons that it mentions. Pages write comments: what
-    is none mentions nobody."""
-    if packed is None:
-        return "", ()
-    try:
-        body: Any = msgspec.json.decode(msgspec.msgpack.decode(packed, type=str))
-    except (msgspec.DecodeError, UnicodeError):
-        return "", ()
+def _mentioned(packed: bytes) -> tuple[str, tuple[str, ...]]:
+    """Return the beginning of a comment, and the persons that it mentions: none if it is no object
+    with both. Raise ValueError or RecursionError if it is no JSON."""
+    body: Any = msgspec.json.decode(msgspec.msgpack.decode(packed, type=str))
     if not isinstance(body, dict) or not isinstance(body.get("mentions"), list):
         return "", ()
     text = body.get("text")
@@ -313,4 +353,9 @@ def _stands(connection: Connection, graph_: str, key: str, reader: str) -> bool:
         .limit(1)
     )
     found = connection.execute(newest).first()
-    return found is None or reader in _mentioned(found.after)[1]
+    if found is None:
+        return True
+    try:
+        return found.after is not None and reader in _mentioned(found.after)[1]
+    except (ValueError, RecursionError):  # it was replaced by something else
+        return False

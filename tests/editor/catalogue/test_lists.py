@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -104,8 +105,11 @@ async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
         assert (await services.catalogue.get(made.id)).people == ()
 
 
+@pytest.mark.parametrize(
+    "fault", [GaveUp("This took longer than it may."), RecursionError("too deep"), KeyError("name")]
+)
 async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_the_others(
-    tmp_path: Path,
+    tmp_path: Path, fault: Exception
 ) -> None:
     settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
     async with open_services(settings) as services:
@@ -116,7 +120,7 @@ async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_
 
         async def ask(work: Any, *values: Any) -> Any:
             if getattr(values[0], "graph", "") == made.id:
-                raise GaveUp("This took longer than it may.")
+                raise fault
             return await asked(work, *values)
 
         services.graph_reader._run_in_worker = ask
@@ -125,3 +129,6 @@ async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_
         assert (views[made.id].name, views[made.id].problems) == (made.name, None)
         assert all(views[other].problems is not None for other in others)
         assert made.id.encode() not in await services.library.all()
+        await services.graph_checks.names.refresh()
+        assert not services.graph_checks.names.is_taken(made.name)
+        assert services.graph_checks.names.of_graphs(views[other].name for other in others)

@@ -7,7 +7,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from action_assistant.errors import Unavailable
+from action_assistant.errors import BadInput, Unavailable
 from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.web.audit.events import (
@@ -46,6 +46,8 @@ class Store:
         assert stream == STREAM
         if self.fails:
             raise Unavailable("The disk is full.")
+        if any(b'"s77"' in each.body for each in drafts):
+            raise BadInput("A name cannot hold the character NUL.")
         self.drafts += drafts
         return len(self.drafts)
 
@@ -67,12 +69,23 @@ async def test_a_journal_that_fails_gets_everything_later(monkeypatch: pytest.Mo
     store.fails = True
     async with audit.writing(store):
         for number in range(300):
-            audit.note(SessionEnded(f"s{number}"), "ada")
+            audit.note(SessionEnded(f"t{number}"), "ada")
         await asyncio.sleep(0.05)
         assert store.drafts == []
         store.fails = False
     sessions = [msgspec.json.decode(each.body)["session"] for each in store.drafts]
-    assert sessions == [f"s{number}" for number in range(300)]
+    assert sessions == [f"t{number}" for number in range(300)]
+
+
+async def test_an_event_that_cannot_be_stored_holds_up_no_other_one_and_is_counted() -> None:
+    audit, store = AuditLog(), Store()
+    async with audit.writing(store):
+        for number in range(300):
+            audit.note(SessionEnded(f"s{number}"), "ada")
+    stored = [msgspec.json.decode(each.body)["session"] for each in store.of(SessionEnded.kind)]
+    assert stored == [f"s{number}" for number in range(300) if number != 77]
+    (lost,) = store.of(Unlisted.kind)
+    assert msgspec.json.decode(lost.body, type=Unlisted) == Unlisted("lost", 1)
 
 
 async def test_what_a_full_disk_holds_up_too_long_is_counted(
@@ -84,7 +97,7 @@ async def test_what_a_full_disk_holds_up_too_long_is_counted(
     store.fails = True
     async with audit.writing(store):
         for number in range(150):
-            audit.note(SessionEnded(f"s{number}"), "ada")
+            audit.note(SessionEnded(f"t{number}"), "ada")
         await asyncio.sleep(0.05)
         store.fails = False
     assert len(store.of(SessionEnded.kind)) == 100

@@ -2,6 +2,7 @@
 
 import asyncio
 import random
+import threading
 from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
 from pathlib import Path
@@ -231,6 +232,38 @@ async def test_a_slow_receiver_delays_nothing_else(tmp_path: Path) -> None:
             await _until(lambda: _true(len(quick.got) == 2))
         # The end does not wait for the slow one either: this line is reached before its time is up.
         assert len(slow.got) == 1
+    await journal.close()
+
+
+async def test_no_message_that_cannot_be_read_or_sent_ends_the_process_or_keeps_the_next_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal, took = await _open(tmp_path), Counter[str]()
+    deep = "[" * 100_000
+    for n, facts in enumerate(('{"run": ' + deep, "[]", "no JSON")):
+        values = row(f"bad{n}:a", "a", "run.ended", "run/x", utc_us() - 10 + n, facts)
+        await journal.derive(lambda c, v=values: c.execute(insert(outbox).values(v)))
+    await journal.append("run/x", [EVENT])
+    sender = Notifications(
+        *(journal, RECEIVERS[:1], ["run.ended"], ""),
+        deliver=lambda _, message, __: took.update([message.id]),
+        gap_s=0,
+        look_s=0.01,
+    )
+    first, real = [RuntimeError("can't start new thread")], threading.Thread.start
+
+    def start(thread: threading.Thread) -> None:
+        if first and thread.name == "to a":
+            raise first.pop()
+        real(thread)
+
+    monkeypatch.setattr(threading.Thread, "start", start)
+    async with sender.sending():
+        await _until(lambda: _true(took))
+    assert took == {"run/x:1:a": 1}
+    assert not first
+    errors = {each.id: each.error for each in await _rows(journal) if each.id.startswith("bad")}
+    assert errors == dict.fromkeys(["bad0:a", "bad1:a", "bad2:a"], "It cannot be read.")
     await journal.close()
 
 

@@ -199,6 +199,11 @@ class GraphChecks:
         except HOPELESS as error:  # others are in the list too
             log.error("%s: nothing can be said of change %d: %s", graph, newest, error.detail)
             return GraphSummary(newest)
+        except Refused:
+            raise
+        except Exception:  # neither may a document whose contents no worker expected
+            log.exception("%s: nothing can be said of change %d", graph, newest)
+            return GraphSummary(newest)
         info = about.info
         return GraphSummary(
             about.seq,

@@ -4,6 +4,7 @@ See docs/decisions/070-one-truth-for-sub-graphs.md.
 """
 
 import asyncio
+import logging
 from bisect import insort
 from collections import Counter
 from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable
@@ -21,6 +22,8 @@ from action_assistant.schema import editor_tables
 from action_assistant.schema.editor_tables import editor_event, editor_head
 from action_assistant.web.auth.caller import Caller, set_caller
 from action_assistant.web.workers.lanes import GaveUp
+
+log: Final = logging.getLogger(__name__)
 
 _AT_ONCE: Final = 4  # documents that are read
 _ROWS: Final = 400  # that one question names
@@ -190,6 +193,9 @@ class GraphNames:
             except Refused:  # not now
                 self._again.add(graph)
                 return
+            except Exception:  # whatever one document holds, the names of the others are read
+                log.exception("%s: its name cannot be read", graph)
+                name = ""
             self._set_document(graph, msgspec.structs.replace(document, name=name))
 
     def _set_document(self, graph: str, document: _Document | None) -> None:

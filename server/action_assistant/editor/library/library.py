@@ -3,6 +3,7 @@
 Actions are made, imported, updated from graphs, and graphs updated from them.
 """
 
+import logging
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import AsyncExitStack
 from typing import Any, Final
@@ -30,13 +31,15 @@ from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.log.graph_events import DocumentKind
 from action_assistant.editor.rooms.open_rooms import Rooms
 from action_assistant.editor.rooms.room import Room
-from action_assistant.errors import BadInput, Conflict
+from action_assistant.errors import BadInput, Conflict, Refused
 from action_assistant.journal.journal import Journal
 from action_assistant.schema import editor_tables
 from action_assistant.umrf.action_updates import Renames
 from action_assistant.umrf.model import Action
 from action_assistant.web.http.plain_texts import require_plain
 from action_assistant.web.workers.lanes import HOPELESS, RunInWorker
+
+log: Final = logging.getLogger(__name__)
 
 _AT_ONCE: Final = 4  # documents that are read
 
@@ -106,9 +109,12 @@ class Library:
             .order_by(graph.c.made_at, graph.c.id)
         )
         limit = CapacityLimiter(_AT_ONCE)
+        refused: list[Refused] = []
         async with create_task_group() as reading:
             for row in rows:
-                reading.start_soon(self._refresh, row.id, row.seq, row.kind, limit)
+                reading.start_soon(self._refresh, row.id, row.seq, row.kind, limit, refused)
+        if refused:
+            raise refused[0]
         self._read = {row.id: self._read[row.id] for row in rows}
         return [
             (
@@ -119,8 +125,15 @@ class Library:
         ]
 
     async def _refresh(
-        self, graph: str, seq: int, kind: DocumentKind, limit: CapacityLimiter
+        self,
+        graph: str,
+        seq: int,
+        kind: DocumentKind,
+        limit: CapacityLimiter,
+        refused: list[Refused],
     ) -> None:
+        """Read the actions of a document, or add to `refused` why they cannot be read now. One whose
+        contents cannot be read counts as empty, so that the others are listed."""
         known = self._read.get(graph)
         if known is not None and known[0] >= seq:
             return
@@ -129,6 +142,12 @@ class Library:
                 sight = await self._graph_reader.now(graph)
                 seq, actions = sight.seq, await self._graph_reader.ask(found, sight, kind)
             except HOPELESS:
+                actions = NOTHING
+            except Refused as error:
+                refused.append(error)
+                return
+            except Exception:
+                log.exception("%s: the actions of change %d cannot be read", graph, seq)
                 actions = NOTHING
         self._read[graph] = seq, actions
 

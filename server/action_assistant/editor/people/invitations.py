@@ -185,6 +185,12 @@ class Invitations:
                 told = True
                 await asyncio.sleep(_AGAIN_S)
                 continue
+            except (
+                Exception
+            ):  # the mark in the folder ends it; the next ones are stored all the same
+                log.exception("the log cannot have that %s is revoked", invitation)
+                self._unrecorded.pop(0)
+                continue
             self._unrecorded.pop(0)
             self._made[invitation] = replace(
                 self._made[invitation], unrecorded=False, revoked_at=h.when(row[0].revoked_at)

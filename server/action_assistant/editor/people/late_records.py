@@ -15,7 +15,8 @@ _AGAIN_S: Final = 5.0
 
 
 class LateRecords:
-    """Runs functions that store something in the log, in order, and retries each until it succeeds."""
+    """Runs functions that store something in the log, in order, and retries each while the log is
+    Unavailable."""
 
     def __init__(self, what: str) -> None:
         self._what = what
@@ -26,7 +27,8 @@ class LateRecords:
     async def add(self, store: Callable[[], Awaitable[None]]) -> None:
         """Queue a function that stores something. Wait until everything queued is stored, but at
         most 2 s: then the storing goes on in the background. While the log is Unavailable, the
-        function is called again every 5 s until it succeeds."""
+        function is called again every 5 s until it succeeds. Another error is logged, and the
+        function is given up."""
         self._waiting.append((store, copy_context()))
         if self._task is None or self._task.done():
             self._task = asyncio.create_task(self._store(), name=self._what)
@@ -50,6 +52,8 @@ class LateRecords:
                 told = True
                 await asyncio.sleep(_AGAIN_S)
                 continue
+            except Exception:  # the others that wait are stored all the same
+                log.exception("the log cannot have one of %s", self._what)
             self._waiting.pop(0)
         if told:
             log.info("the log has %s now", self._what)

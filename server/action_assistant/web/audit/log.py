@@ -15,7 +15,7 @@ from typing import Final, Protocol, TypeAlias
 import msgspec
 from sqlalchemy import func, select
 
-from action_assistant.errors import Refused
+from action_assistant.errors import Unavailable
 from action_assistant.journal.events import Draft
 from action_assistant.journal.reader import JournalReader
 from action_assistant.kit.clock import ClockUs, utc_us
@@ -273,17 +273,25 @@ class AuditLog:
         self._news.set()
 
     async def _write(self, journal: "AuditStore") -> None:
+        most = _BATCH
         while True:
             await self._news.wait()
             self._news.clear()
             while self._waiting:
-                batch = [self._waiting[n] for n in range(min(len(self._waiting), _BATCH))]
+                batch = [self._waiting[n] for n in range(min(len(self._waiting), most))]
                 try:
                     await journal.append(STREAM, batch)
-                except Refused as refused:
+                except Unavailable as refused:
                     log.warning("the audit is not stored yet: %s", refused.detail)
                     await asyncio.sleep(_AGAIN_S)
                     continue
+                except Exception:  # of one event, which must not hold up those after it
+                    log.exception("%d events of the audit cannot be stored", len(batch))
+                    if most > 1:
+                        most = 1
+                        continue
+                    self._lost += 1
+                most = min(_BATCH, 2 * most)
                 for _ in batch:
                     self._waiting.popleft()
                 if self._lost:

@@ -4,6 +4,7 @@ A row is written in the transaction of the event that causes the message, so not
 not stored, and nothing that is stored is forgotten. Its id is `stream:seq:receiver`.
 """
 
+import logging
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from typing import Any, Final, Literal
@@ -18,6 +19,8 @@ from action_assistant.kit.moments import moment
 from action_assistant.schema import editor_tables
 from action_assistant.web.notifications.messages import Message
 from action_assistant.web.notifications.receivers import Receiver, Webhook, target_of
+
+log: Final = logging.getLogger(__name__)
 
 #: Seconds between the tries of a message; after the last one it is given up.
 RETRIES_S: Final = (5, 300, 1_800, 7_200, 18_000, 36_000, 36_000)
@@ -104,8 +107,8 @@ class Outbox:
         await self._journal.derive(begin)
 
     async def next(self, receiver: str, now: int) -> DueMessage | None:
-        """Return the message for a receiver that is due for the longest time; None if none is.
-        `now`: microseconds UTC."""
+        """Return the message for a receiver that is due for the longest time; None if none is. One
+        that cannot be read is given up. `now`: microseconds UTC."""
         chosen = (
             select(_c.id, _c.kind, _c.at, _c.facts, _c.tries)
             .where(_c.receiver == receiver, _c.due <= now)
@@ -116,7 +119,12 @@ class Outbox:
         if not rows:
             return None
         found = rows[0]
-        facts = msgspec.json.decode(found.facts)
+        try:
+            facts = msgspec.json.decode(found.facts, type=dict[str, Any])
+        except (ValueError, RecursionError) as error:
+            log.error("the message %s cannot be read: %s", found.id, error)
+            await self.give_up(found.id, "It cannot be read.")
+            return None
         message = Message(id=found.id, kind=found.kind, at=found.at, facts=facts)
         return DueMessage(message, found.tries)
 

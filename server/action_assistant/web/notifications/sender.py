@@ -103,11 +103,24 @@ class Notifications:
 
     async def _prune(self) -> None:
         while True:
-            with suppress(Unavailable):
+            try:
                 await self.outbox.prune(self._clock_us())
+            except Unavailable:
+                pass
+            except Exception:  # no message may end a process, which others need for Stop
+                log.exception("old messages cannot be deleted")
             await anyio.sleep(_PRUNE_S)
 
     async def _send_all(self, receiver: Receiver) -> None:
+        while True:
+            try:
+                await self._send_in_turn(receiver)
+            except Exception:  # no message may end a process, which others need for Stop
+                log.exception("nothing can be sent to %s now", receiver.name)
+            await anyio.sleep(self._look_s)
+
+    async def _send_in_turn(self, receiver: Receiver) -> None:
+        """Send the messages to a receiver, one after the other, until cancelled."""
         await self._until_stored(self.outbox.open, self.receivers)
         while True:
             try:
