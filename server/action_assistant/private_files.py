@@ -5,7 +5,9 @@ import re
 import stat
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Final, TypeVar
+
+import msgspec
 
 from action_assistant.errors import CannotStart
 
@@ -16,6 +18,7 @@ _OURS: Final = re.compile(
     r"|backups\.json.*|\.backups\.json\.part"
 )
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
+_T = TypeVar("_T")
 
 
 def opener(path: str, flags: int) -> int:
@@ -49,6 +52,16 @@ def replace_file(
         if is_durable:
             os.fsync(out.fileno())
     part.replace(path)
+
+
+def decoded(content: bytes, kind: type[_T]) -> _T:
+    """Return the value of this kind that a file of this program holds as JSON. Raise
+    msgspec.DecodeError for every other content: of itself msgspec raises other errors for text that is
+    not UTF-8 or is nested too deeply, and a damaged file would stop whoever reads it."""
+    try:
+        return msgspec.json.decode(content, type=kind)
+    except (UnicodeError, RecursionError) as error:
+        raise msgspec.DecodeError(f"{error}") from error
 
 
 def sync(path: Path) -> None:

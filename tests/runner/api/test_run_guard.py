@@ -402,3 +402,40 @@ def test_every_route_says_how_it_treats_hidden_runs(ruled: RunnerProcess) -> Non
     described = {re.sub(r"\{(\w+)\}", r"{\1}", path) for _, path in operations(ruled)}
     listed = {re.sub(r":\w+\}", "}", each) for each in ANSWERING_ALL | FILTERED | WITHOUT_RUNS}
     assert listed - described == {"/api/live"}
+
+
+#: Contents of files for which msgspec raises three different errors, and none that is of its own for two.
+DAMAGED = [b"{", b'{"id":"\xff","session":"\xff","at":"\xff"}', b'{"x":' + b"[" * 100_000]
+
+
+@pytest.mark.parametrize("content", DAMAGED, ids=["cut off", "not UTF-8", "nested"])
+def test_no_damaged_file_keeps_anybody_from_stopping(ruled: RunnerProcess, content: bytes) -> None:
+    """Each file that is read for a person, by POST in each form and by the socket."""
+    session = KEYS.new_session("Dan", role="owner", personal=True)
+    cookie = f"aa_8000={KEYS.sealed(session)}"
+    dan = Who(session.person.id, {"cookie": cookie, "origin": ORIGIN})
+    rules = ruled.data / "graph-rules.json"
+    rule(ruled, {"other": RULE})
+    kept = rules.read_bytes()
+    names = [f"people/{dan.id}", f"passkeys/{dan.id}"]
+    names += [f"{folder}/{session.id}" for folder in ("sessions", "confirmed")]
+    files = [ruled.data / f"{name}.json" for name in names]
+    runs = [begin(ruled, order(sequence("dan"), graph=None, script=ENDLESS)) for _ in range(3)]
+    try:
+        for file in (*files, rules):
+            file.parent.mkdir(exist_ok=True)
+            file.write_bytes(content)
+        with dan.client(ruled) as client, dan.live(ruled) as socket:
+            socket.send(json.dumps({"type": "stop", "run": runs[0], "stop_id": "d"}))
+            answers = [client.post(f"/api/runs/{runs[1]}/stop"), client.post("/api/stop")]
+            told = json.loads(socket.recv(timeout=10))
+            while told["type"] != "stopping":
+                told = json.loads(socket.recv(timeout=10))
+        assert [each.status_code for each in answers] == [202, 202]
+        assert (told["runs"], runs[2] in answers[1].json()["runs"]) == ([runs[0]], True)
+    finally:
+        rules.write_bytes(kept)
+        for file in files:
+            file.unlink(missing_ok=True)
+    with PEOPLE["owner"].client(ruled) as owner:
+        assert [over(owner, run)["state"] for run in runs] == ["stopped"] * 3

@@ -6,7 +6,7 @@ who started it, and Stop.
 """
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
@@ -14,7 +14,7 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, Unavailable
-from action_assistant.private_files import make_folder, replace_file
+from action_assistant.private_files import decoded, make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.runner.runs.events import Requested, RunSubgraph
 from action_assistant.runner.runs.run import Run
@@ -69,10 +69,22 @@ class Unseen(msgspec.Struct, frozen=True):
         return self.everything or run.unsighted or not self.graphs.isdisjoint(run.graphs)
 
 
-def names_seen(names: Mapping[str, list[str]], unseen: Unseen | None) -> dict[str, list[str]]:
-    """Return the names of graphs that others started, by robot; none is named to a person who may not
-    see some graph, since nobody knows what these are."""
-    if unseen is None or not unseen.is_some:
+def sees_all() -> None:
+    """Return what somebody who sees everything may not see."""
+
+
+def names_seen(
+    names: Mapping[str, list[str]], unseen: Callable[[], Unseen | None]
+) -> dict[str, list[str]]:
+    """Return the names of graphs that others started and that are being stopped, by robot; none is
+    named to a person who may not see some graph, since nobody knows what these are. If `unseen` fails,
+    none is named: the Stop has begun, and is answered."""
+    try:
+        now = unseen()
+    except Exception:  # the sender would be told that nothing was stopped
+        log.exception("it cannot be read who may see the graphs that are being stopped")
+        now = Unseen("", everything=True)
+    if now is None or not now.is_some:
         return dict(names)
     return {robot: [HIDDEN_NAME] * len(graphs) for robot, graphs in names.items()}
 
@@ -189,7 +201,7 @@ class RunSight:
             return True
         if self._rules is None or self._rules.newest() is not None:
             return False
-        return self._data is not None and (self._data / graph_seals.FILE).exists()
+        return self._data is not None and _may_exist(self._data / graph_seals.FILE)
 
     # --- starts ---------------------------------------------------------------------------------
 
@@ -242,12 +254,23 @@ class RunSight:
 
     def _read_learned(self, path: Path) -> None:
         try:
-            self._learned = msgspec.json.decode(path.read_bytes(), type=dict[str, _Learned])
+            self._learned = decoded(path.read_bytes(), dict[str, _Learned])
         except FileNotFoundError:
             pass
         except (OSError, msgspec.DecodeError) as error:
             log.error("%s cannot be read: %s", path, error)
             self._is_unread = True
+
+
+def _may_exist(path: Path) -> bool:
+    """Return whether a file is there, or may be, since the disk does not say."""
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return False
+    except OSError:
+        return True
+    return True
 
 
 def _is_whole(sight: Sight) -> bool:

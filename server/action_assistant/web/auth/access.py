@@ -403,11 +403,12 @@ class Access:
                 return
         genuine = self._sessions(headers)
         state["sessions"] = genuine
-        session = self._lasting(genuine)
+        stops = _is_stop(method, path)
+        session = self._lasting(genuine, stops=stops)
         ended = session is not None and self._revoked.ends(session)
         if session is not None and not ended:
-            standing = self._standing(session)
-        if session is not None and not ended and (not standing.expired or _is_stop(method, path)):
+            standing = self._standing(session, stops=stops)
+        if session is not None and not ended and (not standing.expired or stops):
             if origin is None and method not in _SAFE:
                 raise WrongOrigin("A browser says which page is asking; this request does not.")
             if headers.get("sec-fetch-site") == "cross-site" and path.startswith("/api/"):
@@ -443,8 +444,9 @@ class Access:
         token = self._tokens.opens(text)
         if token is None:
             return None
-        standing = self._standing(token)
-        if self._revoked.ends(token) or (standing.expired and not _is_stop(method, path)):
+        stops = _is_stop(method, path)
+        standing = self._standing(token, stops=stops)
+        if self._revoked.ends(token) or (standing.expired and not stops):
             raise self._over(token)
         return Identity(standing.person, standing.groups, token=token)
 
@@ -456,10 +458,18 @@ class Access:
             self._standings.browsers.use(credential.id)
         return standing
 
-    def _standing(self, credential: Credential) -> Standing:
-        if self._standings is not None:
+    def _standing(self, credential: Credential, *, stops: bool = False) -> Standing:
+        """Return the present standing. Before a Stop (`stops`) that of the credential itself counts
+        where the present one cannot be read: neither a role nor a confirmation decides about it."""
+        if self._standings is None:
+            return sealed_standing(credential)
+        try:
             return self._standings.of(credential)
-        return sealed_standing(credential)
+        except Exception:
+            if not stops:
+                raise
+            log.exception("a Stop goes on without the present rights of its person")
+            return sealed_standing(credential)
 
     def _over(self, credential: Credential) -> Refused:
         """Return the refusal for a session, token or link that has expired or was ended."""
@@ -486,13 +496,13 @@ class Access:
         given = cookie_values(headers.get("cookie", ""), self._device_cookie)
         return next(filter(None, map(self._keys.device, given)), "")
 
-    def _lasting(self, genuine: list[Session]) -> Session | None:
+    def _lasting(self, genuine: list[Session], *, stops: bool = False) -> Session | None:
         """Return the first session that is neither expired nor revoked. If there is none, return
         the first session, or None if `genuine` is empty."""
         lasting = (
             each
             for each in genuine
-            if not (self._standing(each).expired or self._revoked.ends(each))
+            if not (self._standing(each, stops=stops).expired or self._revoked.ends(each))
         )
         return next(lasting, genuine[0] if genuine else None)
 

@@ -18,7 +18,7 @@ from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
 import msgspec
 
 from action_assistant.errors import BadInput, Unauthenticated
-from action_assistant.private_files import make_folder, replace_file
+from action_assistant.private_files import decoded, make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.keys import Keys, Session
 
@@ -155,7 +155,7 @@ class Confirmations:
     def _read(self, path: Path, session_id: str) -> Confirmation | None:
         """Return the confirmation in a file; None if it is not genuine. Raise OSError."""
         try:
-            found = msgspec.json.decode(path.read_bytes(), type=Confirmation)
+            found = decoded(path.read_bytes(), Confirmation)
         except msgspec.DecodeError:
             return None
         genuine = hmac.compare_digest(self._seal(found).encode(), found.seal.encode())

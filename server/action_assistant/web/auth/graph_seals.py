@@ -19,7 +19,7 @@ from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Unavailable
 from action_assistant.kit.retrying_thread import RetryingThread
-from action_assistant.private_files import make_folder, replace_file
+from action_assistant.private_files import decoded, make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.graph_rules import OPEN, Rule
 from action_assistant.web.auth.keys import Keys
@@ -123,7 +123,7 @@ class RulesFile:
             if state != self._read:
                 content = self._path.read_bytes()
                 self._read = state
-                self._take(msgspec.json.decode(content, type=Statement))
+                self._take(decoded(content, Statement))
         except OSError:  # not there, or the disk is gone: what is known still counts
             pass
         except (msgspec.DecodeError, BadInput) as error:

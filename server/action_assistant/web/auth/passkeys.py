@@ -20,7 +20,7 @@ import msgspec
 from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound, Unavailable
-from action_assistant.private_files import make_folder, replace_file
+from action_assistant.private_files import decoded, make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.web.auth.confirmations import ADDED_S, is_sure
@@ -85,7 +85,7 @@ class PasskeyFiles:
             found = path.stat()
             state = (found.st_mtime_ns, found.st_ino, found.st_size)
             if known is None or known[0] != state:
-                known = (state, msgspec.json.decode(path.read_bytes(), type=PasskeyFile))
+                known = (state, decoded(path.read_bytes(), PasskeyFile))
                 self._read[person] = known
         except FileNotFoundError:
             self._read.pop(person, None)

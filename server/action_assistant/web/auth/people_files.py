@@ -17,7 +17,7 @@ import msgspec
 
 from action_assistant.errors import Unavailable
 from action_assistant.kit.retrying_thread import RetryingThread
-from action_assistant.private_files import make_folder, replace_file
+from action_assistant.private_files import decoded, make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.roles import Role
 
@@ -92,7 +92,7 @@ class PeopleFiles:
         """Return the names of all groups by id; an empty dict if the file of groups is missing or
         cannot be read."""
         try:
-            return msgspec.json.decode(self._path(_GROUPS).read_bytes(), type=dict[str, str])
+            return decoded(self._path(_GROUPS).read_bytes(), dict[str, str])
         except (OSError, msgspec.DecodeError):
             return {}
 
@@ -123,7 +123,7 @@ def _decoded(path: Path, person: str) -> PersonFile | None:
     """Return the person in a file; None for another one or none. Raise OSError."""
     content = path.read_bytes()
     try:
-        found = msgspec.json.decode(content, type=PersonFile)
+        found = decoded(content, PersonFile)
     except msgspec.DecodeError as error:
         log.error("%s cannot be read: %s", path, error)
         return None

@@ -17,7 +17,7 @@ from typing import Annotated, Final
 import msgspec
 
 from action_assistant.errors import BadInput, Unavailable
-from action_assistant.private_files import make_folder, replace_file, sync
+from action_assistant.private_files import decoded, make_folder, replace_file, sync
 from action_assistant.web.auth.keys import PersonRef
 
 log: Final = logging.getLogger(__name__)
@@ -118,7 +118,7 @@ def _version_of(path: Path) -> str:
 def _read(path: Path) -> Release | None:
     """Return the release in a file; None for a file that is gone, damaged, or about another version."""
     try:
-        found = msgspec.json.decode(path.read_bytes(), type=Release)
+        found = decoded(path.read_bytes(), Release)
     except FileNotFoundError:
         return None
     except msgspec.DecodeError as error:

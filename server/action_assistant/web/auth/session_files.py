@@ -18,7 +18,7 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import Conflict, NotFound
-from action_assistant.private_files import replace_file
+from action_assistant.private_files import decoded, replace_file
 from action_assistant.web.auth.keys import SESSION_SECONDS, Person, Session
 from action_assistant.web.auth.revocations import Revocations
 
@@ -175,7 +175,7 @@ class SessionFiles:
 
 def _read(path: Path) -> NotedSession | None:
     try:
-        return msgspec.json.decode(path.read_bytes(), type=NotedSession)
+        return decoded(path.read_bytes(), NotedSession)
     except (OSError, msgspec.DecodeError):
         return None
 

@@ -28,7 +28,7 @@ from action_assistant.errors import (
     Unavailable,
     Withdrawn,
 )
-from action_assistant.private_files import replace_file, sync
+from action_assistant.private_files import decoded, replace_file, sync
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.settings import TOKEN_DAYS
@@ -329,7 +329,7 @@ class TokenFiles:
 
     def _read(self, token: str) -> TokenRecord | None:
         try:
-            record = msgspec.json.decode(self._path(token).read_bytes(), type=TokenRecord)
+            record = decoded(self._path(token).read_bytes(), TokenRecord)
         except msgspec.DecodeError as error:
             log.error("%s cannot be read: %s", self._path(token), error)
             return None
@@ -357,7 +357,7 @@ class TokenFiles:
         """Return the newest use of which this process or the other one has told."""
         ours = self._uses.get(token)
         try:
-            stored = msgspec.json.decode(self._path(token, ".used").read_bytes(), type=TokenUse)
+            stored = decoded(self._path(token, ".used").read_bytes(), TokenUse)
         except (OSError, msgspec.DecodeError):
             return ours
         return stored if ours is None or ours.at < stored.at else ours

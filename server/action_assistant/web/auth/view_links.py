@@ -20,7 +20,7 @@ from typing import Final, NamedTuple
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Unauthenticated, Unavailable
-from action_assistant.private_files import make_folder, replace_file, sync
+from action_assistant.private_files import decoded, make_folder, replace_file, sync
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.web.auth.access import over_view
@@ -211,7 +211,7 @@ class ViewLinks:
 
     def _read(self, link: str) -> ViewRecord | None:
         try:
-            record = msgspec.json.decode(self._path(link).read_bytes(), type=ViewRecord)
+            record = decoded(self._path(link).read_bytes(), ViewRecord)
         except msgspec.DecodeError as error:
             log.error("%s cannot be read: %s", self._path(link), error)
             return None
@@ -221,7 +221,7 @@ class ViewLinks:
         if link not in self._uses:
             try:
                 stored = self._path(link, ".used").read_bytes()
-                self._uses[link] = msgspec.json.decode(stored, type=ViewUse)
+                self._uses[link] = decoded(stored, ViewUse)
             except (OSError, msgspec.DecodeError):
                 return ViewUse()
         return self._uses[link]
