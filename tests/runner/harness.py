@@ -21,6 +21,7 @@ from action_assistant.journal.events import BareEvent, Draft, Event, StreamSnaps
 from action_assistant.runner import projection
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
+from action_assistant.runner.execution.start_checks import NO_SOURCES, StartSources
 from action_assistant.runner.links.listeners import Listeners
 from action_assistant.runner.links.observations import Snapshot
 from action_assistant.runner.links.port import (
@@ -354,6 +355,7 @@ class Harness:
         self.journal = MemoryJournal()
         self.links = robots or {}
         self.simulator: Simulator = in_this_process
+        self.sources: StartSources = NO_SOURCES
         self.shown: list[tuple[float, Run]] = []
 
     @asynccontextmanager
@@ -365,6 +367,7 @@ class Harness:
             clock_us=clock_us,
             run_in_worker=at_once,
             simulator=self.simulator,
+            sources=self.sources,
             identity_now=now,
         ) as control:
             control.watch(self._saw)

@@ -5,16 +5,23 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from socket import SHUT_RDWR
 from typing import Any
 
 import anyio
+import pytest
+from litestar import WebSocket
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
-from action_assistant.runner.api.live import Hub, Outbox
+from action_assistant.runner.api.live import Hub, Outbox, attend
+from action_assistant.runner.execution.start_checks import StartSources
+from action_assistant.runner.runs.sight import HIDDEN_NAME, RunSight, names_seen
+from action_assistant.web.auth.graph_rules import Rule
+from action_assistant.web.auth.graph_seals import GraphSeals, RulesFile, Statement
 from action_assistant.web.auth.identity import Identity
-from action_assistant.web.auth.keys import Person
+from action_assistant.web.auth.keys import Keys, Person
 from runner.harness import ANN, Harness, carousel, clock_us, order, sequence, virtual
 from runner.process import RunnerProcess, over, started
 
@@ -223,3 +230,128 @@ async def test_an_expired_session_is_shown_nothing_more_but_its_stop_is_followed
         assert sent[0] == "stopping"
         assert set(sent) == {"stopping", "beat"}
         assert run.id not in control.open
+
+
+@virtual
+async def test_a_stop_of_everything_passes_by_what_fails_in_one_run() -> None:
+    async with Harness().runner() as control:
+        runs = [
+            (await control.start(order(sequence(f"s{i}"), script=ENDLESS), ANN)).run.id
+            for i in range(3)
+        ]
+
+        def fail(*_: object) -> None:
+            raise RuntimeError("a fault of the runner")
+
+        first = control.open[runs[0]]
+        first.stop = fail  # type: ignore[method-assign]  # the fault
+        with pytest.raises(ExceptionGroup):
+            control.stop_all(ANN, "s")
+        assert [control.open[each].run.desired for each in runs] == [
+            "running",
+            "stopped",
+            "stopped",
+        ]
+
+
+@virtual
+async def test_a_stop_is_taken_before_it_is_asked_what_its_sender_may_see() -> None:
+    """And if that fails, it is answered without the names of others' graphs."""
+    async with Harness().runner() as control:
+        run = (await control.start(order(sequence(), script=ENDLESS), ANN)).run.id
+        desired: list[str] = []
+
+        def unseen() -> None:
+            desired.append(control.open[run].run.desired)
+            raise OSError("the disk is gone")
+
+        message = '{"type":"stop","run":"all","stop_id":"s"}'
+        answer = json.loads(await Hub(control, clock_us).follow(message, ANN, unseen=unseen))
+        assert (answer["type"], answer["runs"], desired) == ("stopping", [run], ["stopped"])
+        assert names_seen({"r1": ["others"]}, unseen) == {"r1": [HIDDEN_NAME]}
+
+
+@virtual
+async def test_a_stop_does_not_wait_for_the_first_message() -> None:
+    class Stuck(Hub):
+        async def hello(self, unseen: object) -> str:
+            await anyio.sleep_forever()
+
+    async with Harness().runner() as control:
+        run = (await control.start(order(sequence(), script=ENDLESS), ANN)).run.id
+        waiting = [{"type": "websocket.connect"}]
+        waiting.append(
+            {"type": "websocket.receive", "text": json.dumps({"type": "stop", "run": run})}
+        )
+
+        async def receive() -> Any:
+            return waiting.pop(0) if waiting else await anyio.sleep_forever()
+
+        async def send(_: Any) -> None: ...
+
+        state = {"identity": Identity(Person(ANN.id, ANN.name))}
+        scope: Any = {"type": "websocket", "path": "/api/live", "headers": [], "state": state}
+        with anyio.move_on_after(1):
+            await attend(WebSocket(scope, receive, send), Stuck(control, clock_us))
+        assert run not in control.open or control.open[run].run.desired == "stopped"
+
+
+KEYS = Keys("t" * 40)
+MINE = Rule((ANN.id,), ())
+
+
+def rule(data: Path, at: int, **rules: Rule) -> None:
+    """Store which rules count, as the editor seals them."""
+    listed = tuple(dict.fromkeys(rules.values()))
+    graphs = {graph: listed.index(each) for graph, each in rules.items()}
+    RulesFile(data, KEYS).store(GraphSeals(KEYS).sealed(Statement(at, listed, graphs)))
+
+
+@virtual
+async def test_a_page_that_reads_slowly_is_shown_no_more_than_its_person_may_see(
+    tmp_path: Path,
+) -> None:
+    """There is always something that waits for it: a rule counts before the next message is chosen."""
+    harness = Harness()
+    harness.sources = StartSources(sight=RunSight(tmp_path, KEYS))
+    async with harness.runner() as control:
+        hub = Hub(control, clock_us)
+        box = Outbox(hub, lambda: True, Identity(Person("bob", "Bob", "viewer")))
+        hub.boxes.add(box)
+        for i in range(5):
+            await control.start(order(carousel(f"busy{i}"), graph=f"g{i}", script=BUSY), ANN)
+        sent: list[tuple[float, str]] = []
+
+        async def send(text: str) -> None:
+            sent.append((anyio.current_time(), text))
+            await anyio.sleep(0.2)
+
+        async with anyio.create_task_group() as tasks:
+            tasks.start_soon(box.deliver, send)
+            await anyio.sleep(3)
+            rule(tmp_path, 1, **{f"g{i}": MINE for i in range(5)})
+            ruled_at = anyio.current_time()
+            await anyio.sleep(5)
+            tasks.cancel_scope.cancel()
+        named = [at for at, text in sent if "busy" in text]
+        assert named
+        assert max(named) <= ruled_at + 0.7
+        hidden = {json.loads(text)["run"]["id"] for _, text in sent if HIDDEN_NAME in text}
+        assert hidden == set(control.shown)
+
+
+@virtual
+async def test_a_change_is_encoded_once_for_all_from_whom_a_run_is_hidden(tmp_path: Path) -> None:
+    harness = Harness()
+    harness.sources = StartSources(sight=RunSight(tmp_path, KEYS))
+    async with harness.runner() as control:
+        hub = Hub(control, clock_us)
+        run = (await control.start(order(sequence(), graph="g", script=ENDLESS), ANN)).run.id
+        rule(tmp_path, 1, g=MINE)
+        people = [Identity(Person(f"p{i}", f"P{i}", "viewer")) for i in range(20)]
+        opened = control.open[run]
+        assert len({id(hub.frame(opened, is_hidden=True)) for _ in people}) == 1
+        assert HIDDEN_NAME in hub.frame(opened, is_hidden=True).text
+        assert "patrol" in hub.frame(opened).text
+        lists = [hub.engines(hub.unseen(each)) for each in people]
+        assert {id(each) for each in lists} == {id(lists[0])}

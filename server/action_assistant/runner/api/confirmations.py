@@ -61,7 +61,7 @@ def _asking(services: RunnerServices) -> list[ControllerRouterHandler]:
             found.number,
             services.requests.left(found),
             found.state,
-            services.hub.devices_shown(found.id),
+            services.hub.devices_shown(found),
             found.record,
         )
 

@@ -11,6 +11,7 @@ import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 from datetime import datetime
+from functools import partial
 from typing import Any, Final, TypeAlias
 from weakref import WeakKeyDictionary
 
@@ -24,16 +25,17 @@ from action_assistant.errors import Forbidden, Refused
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.api.caller import author_of
 from action_assistant.runner.api.confirmation_requests import (
+    ConfirmationRequest,
     ConfirmationRequests,
     ConfirmationShown,
 )
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.execution.service import ExecutionService
-from action_assistant.runner.robots.registration import Robot
+from action_assistant.runner.robots.registration import Robot, seen_by
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run
-from action_assistant.runner.runs.sight import Unseen, names_seen, run_graphs
+from action_assistant.runner.runs.sight import Unseen, names_seen, run_graphs, sees_all
 from action_assistant.runner.start.rights_registry import IdentityNow, unchanged
 from action_assistant.runner.stop.foreign_stop import StoppedAll
 from action_assistant.safe_text import hold_names
@@ -50,6 +52,7 @@ _LOOK_S: Final = 0.5  # between two looks at what a person may see
 _SEND_S: Final = 15.0
 _AT_ONCE: Final = 250  # actions whose views are made in one turn of the event loop
 _ENGINES_GAP_S: Final = 0.25  # between two lists of engines
+_ENGINES_S: Final = 1.0  # for which an encoded list of engines is used
 _MOST_ANSWERS: Final = 64
 _TOO_SLOW: Final = 1013
 _LONGEST: Final = 10_000  # characters of a message from the page
@@ -75,10 +78,10 @@ class Stopping(msgspec.Struct, frozen=True, tag="stopping", tag_field="type"):
 
     @classmethod
     def everything(
-        cls, stop_id: str, stopped: StoppedAll, unseen: Unseen | None = None
+        cls, stop_id: str, stopped: StoppedAll, unseen: Callable[[], Unseen | None]
     ) -> "Stopping":
-        """Return the message that answers a Stop of everything. `unseen`: the graphs that its sender
-        may not see."""
+        """Return the message that answers a Stop of everything, which has begun. `unseen`: returns the
+        graphs that its sender may not see."""
         return cls(stop_id, stopped.runs, names_seen(stopped.graphs, unseen), stopped.unknown)
 
 
@@ -133,19 +136,46 @@ RunnerMessage: TypeAlias = (
 PageMessage: TypeAlias = StopMessage
 
 
+class _EncodedHello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
+    """The first message, made of robots and runs that are encoded already."""
+
+    engines: msgspec.Raw
+    runs: list[msgspec.Raw]
+
+
+class _EncodedMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
+    run: msgspec.Raw
+
+
 class EncodedRun(msgspec.Struct, frozen=True):
-    """An encoded run, the seconds that encoding took (`cost`), and when it may be encoded again
-    (`next`, in the loop's time)."""
+    """A message about a run (`text`) and the run in it, both encoded; the seconds that encoding took
+    (`cost`), and when it may be encoded again (`next`, in the loop's time)."""
 
     revision: int
     text: str
     cost: float
     next: float
+    run: bytes = b""
+
+
+class _Engines(msgspec.Struct, frozen=True):
+    """All robots as everybody with the same sight of their runs sees them: encoded, as a message, and
+    the seconds that encoding took."""
+
+    robots: bytes
+    text: str
+    cost: float
+
+
+#: The part of what somebody may not see that changes what they see of robots: whether there is anything, and
+#: the runs on robots that are hidden. None if they see everything.
+_Audience: TypeAlias = tuple[bool, frozenset[str]] | None
 
 
 class Hub:
-    """Has the outboxes of all pages, and encodes runs and engines once for all who see everything.
-    `identity_now`: says which role and groups a person has now."""
+    """Has the outboxes of all pages. A run is encoded once for all who see it and once for all who do
+    not; robots once for all from whom the same runs are hidden. `identity_now`: says which role and
+    groups a person has now."""
 
     def __init__(
         self,
@@ -159,9 +189,13 @@ class Hub:
         self.requests = requests or ConfirmationRequests()
         self.clock_us = clock_us
         self.boxes: set[Outbox] = set()
-        self._frames: WeakKeyDictionary[OpenRun, EncodedRun] = WeakKeyDictionary()
+        self._frames: Final[dict[bool, WeakKeyDictionary[OpenRun, EncodedRun]]] = {
+            is_hidden: WeakKeyDictionary() for is_hidden in (False, True)
+        }
         self._view_caches: WeakKeyDictionary[OpenRun, views.ActionViewCache] = WeakKeyDictionary()
-        self._engines: str | None = None
+        self._robots: list[Robot] = []  # as those see them who see everything
+        self._engines: dict[_Audience, _Engines] = {}
+        self._engines_until = 0.0  # for which these are true: some facts change with the time alone
         control.watch(self._changed)
         control.watch_robots(self._robots_changed)
         self.requests.watch(self._requests_changed)
@@ -171,29 +205,51 @@ class Hub:
             if box.identity.person.id == person:
                 box.mark_requests()
 
-    def devices_shown(self, request: str) -> int:
+    def devices_shown(self, request: ConfirmationRequest) -> int:
         """Return how many devices have a page open that can answer a request to confirm."""
+        person = request.identity.person.id
         shown = (
             box.identity.session
             for box in self.boxes
-            if any(each.id == request for each in self.requests.shown_to(box.identity))
+            if box.identity.person.id == person
+            and any(each.id == request.id for each in self.requests.shown_to(box.identity))
         )
         return len({session.id for session in shown if session is not None})
 
     def _robots_changed(self) -> None:
-        self._engines = None
+        self._engines.clear()
         for box in self.boxes:
             box.mark_engines()
 
-    def engines(self, unseen: Unseen | None) -> str:
-        """Return all engines as a message; it is encoded once per change for all who see
-        everything."""
-        if unseen is not None:
-            return msgspec.json.encode(EnginesMessage(self.control.robot_views(unseen))).decode()
-        if self._engines is None:
-            message = EnginesMessage(self.control.robot_views())
-            self._engines = msgspec.json.encode(message).decode()
-        return self._engines
+    def engines(self, unseen: Unseen | None) -> _Engines:
+        """Return all engines, encoded once per change for all from whom the same runs are hidden."""
+        if not self._engines or anyio.current_time() >= self._engines_until:
+            self._engines.clear()
+            self._robots = self.control.robot_views()
+            self._engines_until = anyio.current_time() + _ENGINES_S
+        audience = self._audience(unseen)
+        found = self._engines.get(audience)
+        if found is None:
+            began = anyio.current_time()
+            robots = [seen_by(each, unseen, self.control.graphs_now) for each in self._robots]
+            text = msgspec.json.encode(EnginesMessage(robots)).decode()
+            encoded = msgspec.json.encode(robots)
+            found = _Engines(encoded, text, anyio.current_time() - began)
+            self._engines[audience] = found
+        return found
+
+    def engines_gap(self, engines: _Engines) -> float:
+        """Return the seconds between two lists of engines to one page: all lists of all audiences
+        together take a bounded share of the time."""
+        return max(_ENGINES_GAP_S, _SHARE * engines.cost * len(self._engines))
+
+    def _audience(self, unseen: Unseen | None) -> _Audience:
+        if unseen is None:
+            return None
+        held = {each.run for robot in self._robots for each in robot.holds if each.run is not None}
+        graphs = {run: self.control.graphs_now(run) for run in held}
+        hidden = (run for run, of in graphs.items() if of is not None and unseen.hides(of))
+        return unseen.is_some, frozenset(hidden)
 
     def heartbeat(self) -> str:
         """Return the text of a heartbeat message, with the present times."""
@@ -209,44 +265,43 @@ class Hub:
         for box in self.boxes if not opened.is_led else ():
             box.mark(opened)
 
-    def frame(self, opened: OpenRun) -> EncodedRun:
-        """Return the message about an open run, as text with its costs; each revision is encoded
-        once."""
-        frame = self._frames.get(opened)
+    def frame(self, opened: OpenRun, *, is_hidden: bool = False) -> EncodedRun:
+        """Return the message about an open run, as text with its costs; each revision is encoded once
+        for those who see the run, and once for those from whom it `is_hidden`."""
+        frames = self._frames[is_hidden]
+        frame = frames.get(opened)
         if frame is None or frame.revision != opened.revision:
-            began = anyio.current_time()
-            text = msgspec.json.encode(RunMessage(self.run_view(opened))).decode()
+            began, view = anyio.current_time(), self.run_view(opened)
+            run = msgspec.json.encode(views.hidden(view) if is_hidden else view)
+            text = msgspec.json.encode(_EncodedMessage(msgspec.Raw(run))).decode()
             now = anyio.current_time()
-            frame = EncodedRun(opened.revision, text, now - began, now + _SHARE * (now - began))
-            self._frames[opened] = frame
+            next_ = now + _SHARE * (now - began)
+            frame = EncodedRun(opened.revision, text, now - began, next_, run)
+            frames[opened] = frame
         return frame
 
-    def due(self, opened: OpenRun) -> float:
+    def due(self, opened: OpenRun, *, is_hidden: bool = False) -> float:
         """Return the time, in seconds of the event loop, from which a run may be encoded again:
         encoding takes a bounded share of the time, however many pages follow it."""
-        frame = self._frames.get(opened)
+        frame = self._frames[is_hidden].get(opened)
         return 0.0 if frame is None or frame.revision == opened.revision else frame.next
 
     def unseen(self, identity: Identity) -> Unseen | None:
         """Return the graphs that a person may not see now; None if they see everything."""
         return self.control.sight.unseen(self.identity_now(identity))
 
-    async def hello(self, identity: Identity) -> str:
+    async def hello(self, unseen: Callable[[], Unseen | None]) -> str:
         """Return the first message for a page. The event loop stays free while large runs are
-        prepared. `identity`: of the person who reads it."""
+        prepared. `unseen`: returns what the reader may not see, and is called once they are."""
         for opened in tuple(self.control.shown.values()):
             await self.prepare_view(opened)
-        now = self.unseen(identity)
-        runs = [
-            views.hidden(view) if _is_hidden(opened, now) else view
-            for opened in self.control.shown.values()
-            for view in (self.run_view(opened),)
-        ]
-        return msgspec.json.encode(Hello(self.control.robot_views(now), runs)).decode()
-
-    def hidden_frame(self, opened: OpenRun) -> str:
-        """Return the message about an open run for a person who may not see its graph."""
-        return msgspec.json.encode(RunMessage(views.hidden(self.run_view(opened)))).decode()
+        now = unseen()
+        runs = []
+        for opened in tuple(self.control.shown.values()):
+            runs.append(msgspec.Raw(self.frame(opened, is_hidden=_is_hidden(opened, now)).run))
+            await anyio.lowlevel.checkpoint()
+        robots = msgspec.Raw(self.engines(now).robots)
+        return msgspec.json.encode(_EncodedHello(robots, runs)).decode()
 
     async def prepare_view(self, opened: OpenRun) -> None:
         """Fill the cache of an open run's view, with pauses for other tasks, so that encoding it
@@ -263,12 +318,17 @@ class Hub:
         return views.run_view(opened.run, recorded=recorded, cache=self.view_cache(opened))
 
     async def follow(
-        self, text: str, author: Author, *, denied: str = "", unseen: Unseen | None = None
+        self,
+        text: str,
+        author: Author,
+        *,
+        denied: str = "",
+        unseen: Callable[[], Unseen | None] = sees_all,
     ) -> str:
         """Carry out a message of a page in the name of `author`, and return the text of the answer.
         A message that cannot be understood or carried out is answered with the reason, not raised.
-        `denied`: why its sender may not stop anything; "" if they may. `unseen`: the graphs that they
-        may not see.
+        `denied`: why its sender may not stop anything; "" if they may. `unseen`: returns the graphs
+        that they may not see; it is asked for the answer only, once the Stop has begun.
         """
         stop_id = ""
         try:
@@ -282,7 +342,7 @@ class Hub:
                 stopped = self.control.stop_all(author, stop_id)
                 return _text(Stopping.everything(stop_id, stopped, unseen))
             runs = await self.control.stop(message.run, author, stop_id)
-        except msgspec.DecodeError as wrong:
+        except (msgspec.DecodeError, RecursionError, UnicodeError) as wrong:
             return _text(RefusedMessage(stop_id, f"Not understood: {wrong}"))
         except Refused as refused:
             return _text(RefusedMessage(stop_id, refused.detail))
@@ -306,7 +366,8 @@ class Outbox:
         self.identity = identity
         self._hub = hub
         self._is_allowed = is_allowed
-        self._unseen = hub.unseen(identity)
+        self._unseen: Unseen | None = None
+        self._look_at = 0.0  # when to look again what the person may see, in seconds of the loop
         self._answers: deque[str] = deque()
         self._changed: dict[str, OpenRun] = {}
         self._next: dict[str, float] = {}  # run -> when it may be sent again
@@ -342,39 +403,42 @@ class Outbox:
     async def deliver(self, send: Callable[[str], Awaitable[None]]) -> None:
         """Send messages until cancelled. Raises TimeoutError when the page does not read."""
         beat = anyio.current_time() + _HEARTBEAT_S
-        look = anyio.current_time() + _LOOK_S
         while True:
             self._news = anyio.Event()
-            if anyio.current_time() >= look:
-                look = anyio.current_time() + _LOOK_S
-                self._look_again()
             while (text := self._pick(beat)) is not None:
                 with anyio.fail_after(_SEND_S):
                     await send(text)
                 if text.startswith('{"type":"beat"'):
                     beat = anyio.current_time() + _HEARTBEAT_S
             runs = (self._due(run, opened) for run, opened in self._changed.items())
-            due = min([beat, look, self._engines_at, *runs])
+            due = min([beat, self._look_at, self._engines_at, *runs])
             with anyio.move_on_after(max(0.0, due - anyio.current_time())):
                 await self._news.wait()
+
+    def look(self) -> Unseen | None:
+        """Look now at what the person may see; return what they may not."""
+        self._look_at = anyio.current_time() + _LOOK_S
+        self._unseen = self._hub.unseen(self.identity)
+        return self._unseen
 
     def _look_again(self) -> None:
         """Send everything anew if a rule, or the role or groups of the person, have changed what they
         may see."""
-        unseen = self._hub.unseen(self.identity)
-        if unseen != self._unseen:
-            self._unseen = unseen
+        before = self._unseen
+        if self.look() is not before and self._unseen != before:
             for opened in self._hub.control.shown.values():
                 self.mark(opened)
             self.mark_engines()
 
     def _due(self, run: str, opened: OpenRun) -> float:
-        return max(self._next.get(run, 0.0), self._hub.due(opened))
+        is_hidden = _is_hidden(opened, self._unseen)
+        return max(self._next.get(run, 0.0), self._hub.due(opened, is_hidden=is_hidden))
 
     def _pick(self, beat: float) -> str | None:
         """Return the text of the next message: answers first, then a heartbeat if the time `beat`
         (seconds of the event loop) has come, engines, and runs that may be sent again. None if
-        nothing may be sent now."""
+        nothing may be sent now. A page that reads slowly is never idle, so what its person may see is
+        looked at here, before anything is chosen."""
         now = anyio.current_time()
         if self._answers:
             return self._answers.popleft()
@@ -382,22 +446,22 @@ class Outbox:
             return self._hub.heartbeat()
         if not self._is_allowed():
             self._changed.clear()
-            self._engines_at = math.inf
+            self._engines_at, self._look_at = math.inf, now + _LOOK_S
             return None
+        if now >= self._look_at:
+            self._look_again()
         if self._has_requests:
             self._has_requests = False
             return _text(ConfirmMessage(self._hub.requests.shown_to(self.identity)))
         if now >= self._engines_at:
+            engines = self._hub.engines(self._unseen)
             self._engines_at = math.inf
-            self._engines_next = now + _ENGINES_GAP_S
-            return self._hub.engines(self._unseen)
+            self._engines_next = now + self._hub.engines_gap(engines)
+            return engines.text
         for run, opened in self._changed.items():
             if self._due(run, opened) <= now:
                 del self._changed[run]
-                if _is_hidden(opened, self._unseen):
-                    self._next[run] = now + _GAP_S
-                    return self._hub.hidden_frame(opened)
-                frame = self._hub.frame(opened)
+                frame = self._hub.frame(opened, is_hidden=_is_hidden(opened, self._unseen))
                 self._next[run] = now + max(_GAP_S, _SHARE * frame.cost)
                 if opened.run.end is not None and opened.recorder.idle:
                     self._next.pop(run)
@@ -408,24 +472,20 @@ class Outbox:
 async def attend(socket: WebSocket[Any, Any, Any], hub: Hub) -> None:
     """Serve the socket of one page until it disconnects. A page with an expired session may still
     stop runs, but gets no more states."""
-    author = author_of(socket)
     box = Outbox(hub, lambda: not is_expired(socket), identity_of(socket))
     await socket.accept()
-    box.post(await hub.hello(box.identity))
-    hub.boxes.add(box)
-    if hub.requests.shown_to(box.identity):
-        box.mark_requests()
-    try:
-        with hub.control.rights.here(identity_of(socket)):
-            await _attend(socket, hub, box, author)
-    finally:
-        hub.boxes.discard(box)
-
-
-async def _attend(socket: WebSocket[Any, Any, Any], hub: Hub, box: Outbox, author: Author) -> None:
     async with anyio.create_task_group() as tasks:
-        tasks.start_soon(_read, socket, hub, box, author, tasks.cancel_scope)
-        await _write(socket, box)
+        # Before anything else: a Stop does not wait until the first message is made.
+        tasks.start_soon(_read, socket, hub, box, tasks.cancel_scope)
+        await anyio.lowlevel.checkpoint()
+        hub.boxes.add(box)
+        try:
+            if hub.requests.shown_to(box.identity):
+                box.mark_requests()
+            with hub.control.rights.here(box.identity):
+                await _write(socket, hub, box)
+        finally:
+            hub.boxes.discard(box)
         tasks.cancel_scope.cancel()
 
 
@@ -433,15 +493,15 @@ async def _read(
     socket: WebSocket[Any, Any, Any],
     hub: Hub,
     box: Outbox,
-    author: Author,
     scope: anyio.CancelScope,
 ) -> None:
+    author, identity = author_of(socket), identity_of(socket)
+    unseen = partial(hub.unseen, identity)
     try:
         while True:
             text = await socket.receive_text()
-            stop = may(identity_of(socket), "stop", now=time.time())
+            stop = may(identity, "stop", now=time.time())
             denied = stop.reason if isinstance(stop, Denied) else ""
-            unseen = hub.unseen(identity_of(socket))
             if not box.post(await hub.follow(text, author, denied=denied, unseen=unseen)):
                 await socket.close(code=_TOO_SLOW, reason="too slow")
                 break
@@ -450,8 +510,9 @@ async def _read(
     scope.cancel()
 
 
-async def _write(socket: WebSocket[Any, Any, Any], box: Outbox) -> None:
+async def _write(socket: WebSocket[Any, Any, Any], hub: Hub, box: Outbox) -> None:
     try:
+        box.post(await hub.hello(box.look))
         await box.deliver(socket.send_text)
     except TimeoutError:
         log.info("a page does not read its messages; its live socket is closed")

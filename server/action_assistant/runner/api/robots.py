@@ -2,6 +2,7 @@
 several robots."""
 
 from datetime import datetime
+from functools import partial
 from typing import Any, Final, Literal, assert_never
 
 import msgspec
@@ -370,7 +371,7 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
     )
     async def stop(name: str, request: _Asking) -> RobotStopped:
         runs, graphs = services.control.stop_robot(name, author_of(request))
-        names = names_seen({name: graphs}, unseen_by(services, request))
+        names = names_seen({name: graphs}, partial(unseen_by, services, request))
         return RobotStopped(runs, names[name])
 
     return [robot, known, known_action, events, commanded, held, recorded, recording, stop]

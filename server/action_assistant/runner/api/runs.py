@@ -2,6 +2,7 @@
 
 from collections.abc import AsyncIterator
 from datetime import UTC, datetime
+from functools import partial
 from typing import Annotated, Any, Final, get_args
 
 import anyio
@@ -178,7 +179,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
     async def stop_all(request: _Asking) -> Stopping:
         stop_id = await _stop_id(request)
         stopped = services.control.stop_all(author_of(request), stop_id)
-        return Stopping.everything(stop_id, stopped, unseen_by(services, request))
+        return Stopping.everything(stop_id, stopped, partial(unseen_by, services, request))
 
     @post(
         "/api/runs/{run:str}/stop",

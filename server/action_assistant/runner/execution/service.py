@@ -4,7 +4,7 @@ It lives on one event loop. Open runs are in memory; the journal has all runs.
 """
 
 import logging
-from collections.abc import AsyncIterator, Callable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable, Mapping
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Final
@@ -246,9 +246,12 @@ class ExecutionService:
         and graphs are being stopped, and the robots that cannot be reached. The call never waits.
         `stop_id`: the id of the press, by which a repeated press is recognised."""
         self._stops.note("", author, stop_id)
-        stopped = [run for run in tuple(self.open) if self._stop(run, author, stop_id)]
+        try:
+            stopped = self._stop_each(tuple(self.open), author, stop_id)
+        finally:
+            graphs = self.foreign_stops.stop(author, self._runs.on)
         runs = [run for run in stopped if not self.open[run].is_led]
-        if not self.foreign_stops.stop(author, self._runs.on) and not stopped:
+        if not graphs and not stopped:
             self.idle_stop(author, "", "")
         return StoppedAll(runs, self.foreign_stops.graphs(), self.robots.unheard())
 
@@ -256,9 +259,12 @@ class ExecutionService:
         """Begin to stop all runs on the robot `name` and all graphs that other programs have
         started there. Return the ids of the runs and the names of the graphs. The call never waits.
         Raise NotFound if the robot is not registered."""
-        graphs = self.foreign_stops.stop(author, self._runs.on, name)
+        self.robots.engines(name)
         self._stops.note(name, author)
-        stopped = [run for run in self._runs.on(name) if self._stop(run, author, "")]
+        try:
+            stopped = self._stop_each(tuple(self._runs.on(name)), author, "")
+        finally:
+            graphs = self.foreign_stops.stop(author, self._runs.on, name)
         if not graphs and not stopped:
             self.idle_stop(author, name, "")
         return [run for run in stopped if not self.open[run].is_led], graphs
@@ -275,11 +281,26 @@ class ExecutionService:
         parts = [each for each, opened in tuple(self.open.items()) if run in _wholes_of(opened.run)]
         if parts:
             self._stops.note(run, author, stop_id)
-            return [each for each in parts if self._stop(each, author, stop_id)]
+            return self._stop_each(parts, author, stop_id)
         if run not in self.open:
             await self._over(run)
         self.idle_stop(author, "", run)
         return []
+
+    def _stop_each(self, runs: Iterable[str], author: Author, stop_id: str) -> list[str]:
+        """Begin to stop these runs, and return those that had not ended. A fault of the runner in one
+        of them keeps it from no other one, and is raised at the end."""
+        stopped, faults = list[str](), list[Exception]()
+        for run in runs:
+            try:
+                if self._stop(run, author, stop_id):
+                    stopped.append(run)
+            except Exception as fault:  # whatever it is: the others are stopped
+                log.exception("a Stop has failed")
+                faults.append(fault)
+        if faults:
+            raise ExceptionGroup("a Stop has failed in part", faults)
+        return stopped
 
     def _stop(self, run: str, author: Author, stop_id: str) -> bool:
         opened = self.open[run]
@@ -650,7 +671,6 @@ def _ignore_stop(_author: Author, _robot: str, _run: str) -> None:
 
 
 def _operator(author: Author) -> Identity:
-    """Return an operator without groups, for commands that come from no route."""
     return Identity(Person(author.id, author.name, "operator"))
 
 

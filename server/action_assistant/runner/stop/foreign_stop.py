@@ -114,11 +114,18 @@ class ForeignStopLoop:
         returns the ids of this runner's open runs on a robot. The call never waits. Raise NotFound
         if the robot is not registered."""
         stopped: list[str] = []
+        faults: list[Exception] = []
         for engine in self._robots.engines(robot):
             name, answer = engine.registration.name, engine.answer
             for graph in [] if answer is None else foreign_graphs(answer, own_runs(name)):
-                self._stop_graph(engine, graph, author)
+                try:
+                    self._stop_graph(engine, graph, author)
+                except Exception as fault:  # whatever it is: the others are stopped
+                    log.exception("a Stop has failed")
+                    faults.append(fault)
                 stopped.append(f"{name}: {graph}")
+        if faults:
+            raise ExceptionGroup("a Stop has failed in part", faults)
         return stopped
 
     def _stop_graph(self, engine: KnownEngine, graph: str, author: Author) -> None:
