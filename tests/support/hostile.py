@@ -9,6 +9,8 @@ from typing import Any, NamedTuple
 #: Raw bytes of a path or query, percent-encoded: NUL, half a character, bytes that are no
 #: UTF-8; and a number that no database has.
 RAW = ("a%00b", "%ED%A0%80", "%FF", f"{10**30}")
+#: Numbers that no place of an address takes.
+NUMBERS = (10**30, 1 << 63, -1, -(10**30))
 #: Texts of a body, as JSON has them.
 TEXTS = ("a\\u0000b", "\\ud800", "\\udfffx")
 _MARK = "hostile-text"
@@ -86,6 +88,30 @@ def requests(document: dict[str, Any], *, every: bool) -> Iterator[HostileReques
             for body in bodies:
                 for text in of(TEXTS):
                     yield HostileRequest(method, plain, _filled(body, text))
+
+
+def number_requests(
+    document: dict[str, Any], values: dict[str, str]
+) -> Iterator[tuple[str, str, dict[str, str]]]:
+    """Yield method, path and query with each hostile number at each place of an address for a whole
+    number. `values`: those of other parameters, "1" where there is none."""
+    for path, item in document["paths"].items():
+        for method, operation in item.items():
+            given = operation.get("parameters", [])
+            queried = [each for each in given if each["in"] == "query"]
+            for each in given:
+                if '"integer"' not in json.dumps(each["schema"]):
+                    continue
+                for number in NUMBERS:
+                    filled = values | {each["name"]: str(number)}
+                    parts = re.split(r"\{(\w+)\}", path)
+                    parts[1::2] = [filled.get(name, "1") for name in parts[1::2]]
+                    needed = {
+                        one["name"]: filled.get(one["name"], "1")
+                        for one in queried
+                        if one.get("required") or one is each
+                    }
+                    yield method, "".join(parts), needed
 
 
 def _filled(body: Any, text: str) -> bytes | None:

@@ -125,11 +125,34 @@ def test_line_breaks_stand_in_notes_and_older_names_are_shown_escaped(product: P
 
 
 def test_numbers_that_no_database_has_are_refused(product: Product) -> None:
+    """Each number in an address that both documents name, about things that exist."""
+    file = {"graph_name": "task", "actions": [{"name": "Go", "instance_id": 0, "type": "sync"}]}
+    ends = {each: [{"name": "Go", "instance_id": 0}] for each in ("graph_entry", "graph_exit")}
     with product.editor() as editor, product.runner() as runner:
-        graph = editor.post("/api/graphs", json={"name": "task"}).json()["id"]
-        for before in (10**30, -(10**30), 1 << 63):
-            path = f"/api/graphs/{graph}/history?before={before}"
-            assert editor.get(path).status_code == 400, before
+        graph = editor.post("/api/graphs", json=file | ends).json()["id"]
+        made = editor.post(f"/api/graphs/{graph}/versions", json={}).json()["id"]
+        version = editor.get(f"/api/versions/{made}").json()
+        start = {key: version[key] for key in ("digest", "umrf")}
+        start |= {"version": made, "engine": "simulator", "request_id": "numbers"}
+        run = runner.post("/api/runs", json=start).json()["id"]
+        action = editor.post("/api/actions", json={"name": "Look", "type": "sync"}).json()["id"]
+        runner.post("/api/robots", json={"name": "Rover"}).raise_for_status()
+        actions = editor.get(f"/api/graphs/{graph}/document?at=1").json()["actions"]
+        values = {"graph_id": graph, "action_id": action, "run": run, "name": "Rover"}
+        values |= {"of": next(iter(actions)).partition("|")[0], "field": "name"}
+        wrong, asked = [], 0
+        for client in (editor, runner):
+            document = client.get("/schema/openapi.json").json()
+            for method, url, query in hostile.number_requests(document, values):
+                answer = client.request(method, url, params=query)
+                asked += 1
+                if answer.status_code != 400:
+                    wrong.append((method, url, query, answer.status_code))
+        assert wrong == []
+        assert asked > 100
+        last = {"last-event-id": f"{1 << 63}"}
+        assert editor.get("/api/events", headers=last).status_code == 400
+        assert runner.get(f"/api/runs/{run}/events", headers=last).status_code == 400
         for days in ("1e17", "1e300"):
             for field in ("runs", "raw"):
                 body = f'{{"{field}": {days}}}'

@@ -3,11 +3,12 @@
 import asyncio
 from collections.abc import AsyncIterator
 from datetime import datetime
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
 import anyio
 import msgspec
 from litestar import Request, get
+from litestar.params import Parameter
 from litestar.response import ServerSentEvent, ServerSentEventMessage
 from litestar.types import ControllerRouterHandler
 
@@ -22,7 +23,7 @@ from action_assistant.web.auth.access import Needs, identity_of, person_of
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.network.addresses import Addresses
-from action_assistant.web.server.openapi import answer
+from action_assistant.web.server.openapi import MOST_NUMBER, answer
 
 _SILENCE: Final = 10.0  # seconds of silence after which a sign of life is sent
 
@@ -121,11 +122,12 @@ def routes(app_state: EditorState, addresses: Addresses) -> list[ControllerRoute
         responses={200: answer(StoredEvent, media="text/event-stream", text="An event each time")},
     )
     async def follow_events(
-        request: Request[Any, Any, Any], after: int | None = None
+        request: Request[Any, Any, Any],
+        after: Annotated[int | None, Parameter(ge=0, le=MOST_NUMBER)] = None,
     ) -> ServerSentEvent:
         last = request.headers.get("last-event-id")
         if last is not None:
-            if not last.isdecimal():
+            if not (last.isdecimal() and len(last) < len(str(MOST_NUMBER))):
                 raise BadInput("Last-Event-ID is the number of an event.")
             after = int(last)
         return ServerSentEvent(_told(app_state, after, identity_of(request)))

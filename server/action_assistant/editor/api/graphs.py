@@ -23,10 +23,11 @@ from action_assistant.umrf.model import Problem
 from action_assistant.web.auth.access import Needs, identity_of, person_of
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.server.application import BODY_LIMIT
-from action_assistant.web.server.openapi import answer, reads
+from action_assistant.web.server.openapi import MOST_NUMBER, answer, reads
 
 Asking = Request[Any, Any, Any]
-Seq = Annotated[int, Parameter(ge=1)]
+Seq = Annotated[int, Parameter(ge=1, le=MOST_NUMBER)]
+SeqOrNone = Annotated[int | None, Parameter(ge=1, le=MOST_NUMBER)]
 
 _TOLD: Final = 50  # keys of a conflict that an answer lists
 
@@ -211,7 +212,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         responses={200: answer(UmrfGraph)},
     )
     async def get_umrf(
-        graph_id: str, at: Seq | None = None, *, identities: bool = False
+        graph_id: str, at: SeqOrNone = None, *, identities: bool = False
     ) -> Response[bytes]:
         services = app_state.services
         await services.catalogue.require(graph_id)
@@ -226,7 +227,7 @@ def _contents(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="getProblems",
         guards=[Needs("see")],
     )
-    async def get_problems(graph_id: str, seq: Seq | None = None) -> Problems:
+    async def get_problems(graph_id: str, seq: SeqOrNone = None) -> Problems:
         services = app_state.services
         await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, seq)

@@ -7,6 +7,7 @@ from litestar import Request, Response, get, post
 from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
+from action_assistant.editor.api.graphs import Seq, SeqOrNone
 from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.history import change_summaries
 from action_assistant.editor.history.blame import DocumentStep, FieldBlame, FieldValue
@@ -16,15 +17,13 @@ from action_assistant.editor.history.restoring import EditsOfOne, GoneBack
 from action_assistant.editor.log.graph_events import graph_stream
 from action_assistant.editor.services import EditorServices, EditorState
 from action_assistant.editor.workers import encoded
-from action_assistant.errors import BadInput, Conflict
+from action_assistant.errors import Conflict
 from action_assistant.umrf.difference import Difference
 from action_assistant.web.auth.access import Needs, identity_of, person_of
-from action_assistant.web.server.openapi import answer
+from action_assistant.web.server.openapi import MOST_NUMBER, answer
 
 Asking = Request[Any, Any, Any]
-Seq = Annotated[int, Parameter(ge=1)]
 
-_MOST_SEQ: Final = 1 << 53  # larger numbers no JSON of a page has
 _STEPS: Final = 5_000  # changes of keys in one answer
 
 
@@ -75,11 +74,9 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
         graph_id: str,
         request: Asking,
         limit: Annotated[int, Parameter(ge=1, le=1000)] = 100,
-        before: Seq | None = None,
+        before: SeqOrNone = None,
     ) -> list[HistoryEntry]:
         services = app_state.services
-        if before is not None and abs(before) > _MOST_SEQ:  # Litestar checks no optional number
-            raise BadInput("There is no such change.", where={"path": "/before"})
         await services.catalogue.require(graph_id)
         found = await services.history.of(graph_id, limit=limit, before=before)
         sees = await services.rights.sight(identity_of(request))
@@ -108,7 +105,7 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def get_changes(
         graph_id: str,
-        after: Annotated[int, Parameter(ge=0)],
+        after: Annotated[int, Parameter(ge=0, le=MOST_NUMBER)],
         upto: Seq,
         limit: Annotated[int, Parameter(ge=1, le=_STEPS)] = _STEPS,
     ) -> list[DocumentStep]:
@@ -126,8 +123,8 @@ def _looking(app_state: EditorState) -> list[ControllerRouterHandler]:
     )
     async def get_difference(
         graph_id: str,
-        before: Annotated[int, Parameter(query="from", ge=1)],
-        after: Annotated[int | None, Parameter(query="to", ge=1)] = None,
+        before: Annotated[int, Parameter(query="from", ge=1, le=MOST_NUMBER)],
+        after: Annotated[int | None, Parameter(query="to", ge=1, le=MOST_NUMBER)] = None,
     ) -> Difference:
         services = app_state.services
         await services.catalogue.require(graph_id)
@@ -148,7 +145,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="getBlame",
         guards=[Needs("see")],
     )
-    async def get_blame(graph_id: str, of: str, at: Seq | None = None) -> list[FieldBlame]:
+    async def get_blame(graph_id: str, of: str, at: SeqOrNone = None) -> list[FieldBlame]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         return encoded(list[FieldBlame], await services.blame.of(graph_id, of, at))
@@ -160,7 +157,7 @@ def _blaming(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
     )
     async def get_values(
-        graph_id: str, of: str, field: str, at: Seq | None = None
+        graph_id: str, of: str, field: str, at: SeqOrNone = None
     ) -> list[FieldValue]:
         services = app_state.services
         await services.catalogue.require(graph_id)

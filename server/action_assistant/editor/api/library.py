@@ -9,7 +9,7 @@ from litestar import Request, Response, get, post, put
 from litestar.params import QueryParameter
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.api.graphs import MadeGraph, Seq, made_graph
+from action_assistant.editor.api.graphs import MadeGraph, SeqOrNone, made_graph
 from action_assistant.editor.catalogue.catalogue import GraphView
 from action_assistant.editor.interchange.importing import Preview
 from action_assistant.editor.library import library_updates
@@ -135,7 +135,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         responses={200: answer(JsonObject)},
     )
-    async def get_action_umrf(action_id: str, at: Seq | None = None) -> Response[bytes]:
+    async def get_action_umrf(action_id: str, at: SeqOrNone = None) -> Response[bytes]:
         services = app_state.services
         await services.catalogue.require(action_id, "action")
         sight = await services.graph_reader.moment(action_id, at)
@@ -151,7 +151,7 @@ def _actions(app_state: EditorState) -> list[ControllerRouterHandler]:
         opt=reads(JsonObject),
         request_max_body_size=BODY_LIMIT,
     )
-    async def replace_action(action_id: str, request: Asking, seq: Seq | None = None) -> GraphView:
+    async def replace_action(action_id: str, request: Asking, seq: SeqOrNone = None) -> GraphView:
         services, person = app_state.services, person_of(request)
         body = await request.body()
         await services.people.seen(person)

@@ -6,7 +6,7 @@ from litestar import Response, get
 from litestar.params import QueryParameter
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.api.graphs import Seq
+from action_assistant.editor.api.graphs import SeqOrNone
 from action_assistant.editor.interchange import action_packages
 from action_assistant.editor.interchange.action_packages import PackageContents, PackageList
 from action_assistant.editor.services import EditorState
@@ -28,7 +28,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="listPackages",
         guards=[Needs("see")],
     )
-    async def list_packages(graph_id: str, at: Seq | None = None) -> PackageList:
+    async def list_packages(graph_id: str, at: SeqOrNone = None) -> PackageList:
         services = app_state.services
         kind = await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, at)
@@ -42,7 +42,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="getPackage",
         guards=[Needs("see")],
     )
-    async def get_package(graph_id: str, package: str, at: Seq | None = None) -> PackageContents:
+    async def get_package(graph_id: str, package: str, at: SeqOrNone = None) -> PackageContents:
         services = app_state.services
         kind = await services.catalogue.require(graph_id)
         sight = await services.graph_reader.moment(graph_id, at)
@@ -57,7 +57,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         responses={200: answer(FileBytes, media="application/zip")},
     )
     async def download_packages(
-        graph_id: str, at: Seq | None = None, packages: Packages = None
+        graph_id: str, at: SeqOrNone = None, packages: Packages = None
     ) -> Response[bytes]:
         services = app_state.services
         kind = await services.catalogue.require(graph_id)

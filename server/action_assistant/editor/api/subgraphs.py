@@ -7,7 +7,7 @@ import msgspec
 from litestar import Request, Response, get, post
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.api.graphs import Seq
+from action_assistant.editor.api.graphs import SeqOrNone
 from action_assistant.editor.catalogue.catalogue import GraphView, fit
 from action_assistant.editor.documents.contents import GraphAtSeq, Inside
 from action_assistant.editor.interchange.edited_text import KeyChange
@@ -202,7 +202,7 @@ def _flat(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="getFlatGraph",
         guards=[Needs("see")],
     )
-    async def get_flat(graph_id: str, at: Seq | None = None) -> FlatGraph:
+    async def get_flat(graph_id: str, at: SeqOrNone = None) -> FlatGraph:
         services = app_state.services
         whole = await _whole(services, graph_id, at)
         return encoded(FlatGraph, await services.graph_reader.ask(flat_graph, *whole))

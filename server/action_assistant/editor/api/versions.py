@@ -6,7 +6,7 @@ import msgspec
 from litestar import Request, Response, delete, get, post, put
 from litestar.types import ControllerRouterHandler
 
-from action_assistant.editor.api.graphs import Seq
+from action_assistant.editor.api.graphs import SeqOrNone
 from action_assistant.editor.catalogue.versions import InsideView, VersionView
 from action_assistant.editor.interchange.subgraphs import zipped
 from action_assistant.editor.services import EditorState
@@ -68,7 +68,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         operation_id="getSubgraphs",
         guards=[Needs("see")],
     )
-    async def get_subgraphs(graph_id: str, at: Seq | None = None) -> InsideView:
+    async def get_subgraphs(graph_id: str, at: SeqOrNone = None) -> InsideView:
         services = app_state.services
         await services.catalogue.require(graph_id)
         return await services.versions.inside(graph_id, at)
@@ -80,7 +80,7 @@ def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         responses={200: answer(FileBytes, media="application/zip")},
     )
-    async def download_subgraphs(graph_id: str, at: Seq | None = None) -> Response[bytes]:
+    async def download_subgraphs(graph_id: str, at: SeqOrNone = None) -> Response[bytes]:
         services = app_state.services
         await services.catalogue.require(graph_id)
         inside = await services.versions.inside(graph_id, at)

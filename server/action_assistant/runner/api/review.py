@@ -33,7 +33,7 @@ from action_assistant.runner.start.admission import decoded
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.access import Needs
-from action_assistant.web.server.openapi import FileBytes, answer, reads
+from action_assistant.web.server.openapi import MOST_NUMBER, FileBytes, answer, reads
 
 T = TypeVar("T")
 
@@ -98,7 +98,9 @@ def _one_run(services: RunnerServices) -> list[ControllerRouterHandler]:
         operation_id="getReplay",
         guards=[Needs("see")],
     )
-    async def film(run: str, after: Annotated[int, Parameter(ge=0)] = 0) -> Response[RunReplay]:
+    async def film(
+        run: str, after: Annotated[int, Parameter(ge=0, le=MOST_NUMBER)] = 0
+    ) -> Response[RunReplay]:
         return json_of(await services.worker_queries.text(StoredRuns.replay, run, after), RunReplay)
 
     @get(

@@ -3,10 +3,11 @@ several robots."""
 
 from datetime import datetime
 from functools import partial
-from typing import Any, Final, Literal, assert_never
+from typing import Annotated, Any, Final, Literal, assert_never
 
 import msgspec
 from litestar import Request, Response, delete, get, patch, post
+from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 from msgspec.structs import replace
 
@@ -55,7 +56,7 @@ from action_assistant.umrf.files.action_files import write_action
 from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Signature
 from action_assistant.web.auth.access import Needs, identity_of, require
-from action_assistant.web.server.openapi import FileBytes, answer, reads
+from action_assistant.web.server.openapi import MOST_NUMBER, FileBytes, answer, reads
 
 _EVENTS: Final = 200
 _Asking = Request[Any, Any, Any]
@@ -316,7 +317,9 @@ def _one_robot(services: RunnerServices) -> list[ControllerRouterHandler]:
         guards=[Needs("see")],
         responses={200: answer(UmrfGraph)},
     )
-    async def commanded(name: str, seq: int, request: _Asking) -> Response[bytes]:
+    async def commanded(
+        name: str, seq: Annotated[int, Parameter(ge=0, le=MOST_NUMBER)], request: _Asking
+    ) -> Response[bytes]:
         require_all_on_robot(services, request)
         services.control.robots.registration(name)
         return await _umrf(services, await services.control.robots.robot_log.graph(name, seq))

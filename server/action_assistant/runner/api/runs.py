@@ -78,7 +78,7 @@ from action_assistant.web.auth.access import (
 )
 from action_assistant.web.auth.caller import client_network
 from action_assistant.web.auth.graph_seals import Statement
-from action_assistant.web.server.openapi import answer, exchanges, reads
+from action_assistant.web.server.openapi import MOST_NUMBER, answer, exchanges, reads
 
 _PAGE: Final = 500  # events read at once
 _STOP_BYTES: Final = 4_096  # of the body of a Stop; whatever comes after them is not read
@@ -468,7 +468,7 @@ def _us(moment: datetime | None) -> int | None:
 
 def _last_event_id(request: _Asking) -> int:
     asked = request.headers.get("last-event-id", "0")
-    if not asked.isascii() or not asked.isdigit():
+    if not (asked.isascii() and asked.isdigit() and len(asked) < len(str(MOST_NUMBER))):
         raise BadInput("Last-Event-ID is the seq of the last event that was read.")
     return int(asked)
 

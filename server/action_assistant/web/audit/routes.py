@@ -11,7 +11,7 @@ from litestar.types import ControllerRouterHandler
 from action_assistant.errors import BadInput
 from action_assistant.web.audit.rows import AuditFilter, AuditPage, kinds_of
 from action_assistant.web.auth.access import Needs
-from action_assistant.web.server.openapi import answer
+from action_assistant.web.server.openapi import MOST_NUMBER, answer
 
 
 def audit_routes(
@@ -27,7 +27,7 @@ def audit_routes(
         responses={200: answer(AuditPage)},
     )
     async def list_audit(
-        before: Annotated[int | None, Parameter(ge=1)] = None,
+        before: Annotated[int | None, Parameter(ge=1, le=MOST_NUMBER)] = None,
         limit: Annotated[int, Parameter(ge=1, le=1000)] = 100,
         person: str = "",
         robot: str = "",

@@ -30,6 +30,10 @@ from action_assistant.web.http.problems import PROBLEM_JSON, ProblemDetails
 #: The bytes of a file, as they are.
 FileBytes: TypeAlias = Annotated[str, msgspec.Meta(extra_json_schema={"format": "binary"})]
 
+#: The largest number in an address: no JSON of a page has a larger whole one, nor a database many more.
+#: Litestar checks the bounds of `Annotated[int | None, …]`, and not those of `Annotated[int, …] | None`.
+MOST_NUMBER: Final = 1 << 53
+
 _BODY: Final = "body_type"
 _PARTS: Final = "part_types"
 _MESSAGES: Final = "message_types"
