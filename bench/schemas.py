@@ -1,9 +1,11 @@
 """Send what schemathesis makes of both OpenAPI documents, as an owner, an operator and a stranger:
 `make soak ARGS=schemas`. It needs the program `schemathesis` (PyPI), which nothing else here does.
 
-Fails if an answer is a server error. With a URL of a Postgres database the editor uses that one.
+Fails if an answer is a server error. `postgres` starts a server of it for the editor, which alone is
+asked then (`make soak ARGS=schemas-postgres`).
 """
 
+import contextlib
 import os
 import shutil
 import subprocess
@@ -15,6 +17,7 @@ from typing import Final
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 from action_assistant.web.auth.keys import Keys
+from journal import servers
 from support.product import TOKEN, running
 
 EXAMPLES: Final = os.environ.get("SCHEMAS_EXAMPLES", "50")  # of each operation
@@ -22,19 +25,21 @@ EXAMPLES: Final = os.environ.get("SCHEMAS_EXAMPLES", "50")  # of each operation
 LEFT_OUT: Final = "(/events|/room|/api/live|/api/session|/api/devices/.*end)$"
 
 
-def main(database: str | None) -> int:
+def main(words: list[str]) -> int:
     """Run it for each process and each who; return 1 if one fails, 2 without the program."""
+    on_postgres = words == ["postgres"]
     program = shutil.which("schemathesis") or shutil.which("st")
     if program is None:
         sys.stderr.write("schemathesis is not installed: pip install schemathesis\n")
         return 2
     os.environ["ACTION_ASSISTANT_LIMITS"] = "off"
-    flags = ["--database", database] if database else []
     failed = False
-    with (
-        tempfile.TemporaryDirectory() as folder,
-        running(Path(folder) / "data", *flags) as product,
-    ):
+    with contextlib.ExitStack() as stack:
+        folder = stack.enter_context(tempfile.TemporaryDirectory())
+        flags: list[str] = []
+        if on_postgres:
+            flags = ["--database", stack.enter_context(servers.server()).new_database()]
+        product = stack.enter_context(running(Path(folder) / "data", *flags))
         session = Keys(TOKEN).new_session("Olga", role="operator")
         cookie = f"aa_{product.port}={Keys(TOKEN).sealed(session)}"
         people = {
@@ -42,7 +47,7 @@ def main(database: str | None) -> int:
             "operator": [f"cookie: {cookie}", f"origin: {product.url}"],
             "stranger": [],
         }
-        for url in (product.url, product.runner_url):
+        for url in (product.url,) if on_postgres else (product.url, product.runner_url):
             document = Path(folder) / "openapi.json"
             document.write_bytes(_document(url))
             for who, headers in people.items():
@@ -70,4 +75,4 @@ def _document(url: str) -> bytes:
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1] if len(sys.argv) > 1 else None))
+    sys.exit(main(sys.argv[1:]))

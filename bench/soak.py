@@ -137,6 +137,12 @@ PARTS: Final[dict[str, Part]] = {
         ("bench/schemas.py",),
         (sys.executable,),
     ),
+    "schemas-postgres": Part(
+        "the same of the editor with its graphs in Postgres",
+        {},
+        ("bench/schemas.py", "postgres"),
+        (sys.executable,),
+    ),
     "robots": Part(
         "10,000 histories of runs with false confirmations, 1,000 stops and races, 300 clicks on Stop, "
         "12,000 races for a baton",
