@@ -1,15 +1,21 @@
 """Private files: folders that only this user may enter, files that only they may read."""
 
+import contextlib
+import logging
 import os
 import re
 import stat
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
-from typing import Final, TypeVar
+from typing import Final, NamedTuple, TypeVar
 
 import msgspec
 
 from action_assistant.errors import CannotStart
+
+log: Final = logging.getLogger(__name__)
+_T = TypeVar("_T")
 
 #: The names of files and folders that this program creates in a data folder.
 _OURS: Final = re.compile(
@@ -18,7 +24,21 @@ _OURS: Final = re.compile(
     r"|backups\.json.*|\.backups\.json\.part"
 )
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
-_T = TypeVar("_T")
+_MOST: Final = 64 * 1024 * 1024  # bytes of a small file; nothing of ours comes near it
+#: Ends the name of a file that held nothing readable, and was replaced.
+_DAMAGED: Final = ".damaged-"
+
+
+class DamagedFile(ValueError):
+    """A file exists, and holds no value of the form that is wanted. The text says why."""
+
+
+class FileState(NamedTuple):
+    """The state of a file as a listing has it, which changes with each write."""
+
+    changed_ns: int
+    number: int
+    size: int
 
 
 def opener(path: str, flags: int) -> int:
@@ -54,14 +74,54 @@ def replace_file(
     part.replace(path)
 
 
-def decoded(content: bytes, kind: type[_T]) -> _T:
-    """Return the value of this kind that a file of this program holds as JSON. Raise
-    msgspec.DecodeError for every other content: of itself msgspec raises other errors for text that is
-    not UTF-8 or is nested too deeply, and a damaged file would stop whoever reads it."""
+def state_of(path: Path) -> FileState:
+    """Return the state of a file. Raise OSError if it has none."""
+    found = path.stat()
+    return FileState(found.st_mtime_ns, found.st_ino, found.st_size)
+
+
+def read_json(path: Path, kind: type[_T]) -> _T:
+    """Return the value in a small JSON file. Raise OSError if the file cannot be read, DamagedFile if
+    it holds no value of this kind, whatever else it holds."""
+    flags = getattr(os, "O_NONBLOCK", 0)  # a pipe in its place keeps nobody waiting
+    with open(path, "rb", opener=lambda name, mode: os.open(name, mode | flags)) as file:
+        if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            raise DamagedFile("it is no file")
+        content = file.read(_MOST + 1)
+    if len(content) > _MOST:
+        raise DamagedFile(f"it has more than {_MOST} bytes")
     try:
+        content.decode()  # what is skipped is not looked at below
         return msgspec.json.decode(content, type=kind)
-    except (UnicodeError, RecursionError) as error:
-        raise msgspec.DecodeError(f"{error}") from error
+    except (ValueError, RecursionError) as error:  # no text, no JSON, too deep, or another form
+        raise DamagedFile(str(error)) from error
+
+
+def log_unreadable(path: Path, error: OSError | DamagedFile) -> None:
+    """Write into the log that a file cannot be read, once for each state of it."""
+    state = None
+    with contextlib.suppress(OSError):
+        state = state_of(path)
+    why = error.strerror if isinstance(error, OSError) else str(error)
+    _log_once(path, state, why or type(error).__name__)
+
+
+@lru_cache(1000)
+def _log_once(path: Path, _: FileState | None, why: str) -> None:
+    log.error("%s cannot be read, and is kept as it is: %s", path, why)
+
+
+def keep_damaged(path: Path, kind: type[object]) -> None:
+    """Rename a file that holds no value of this kind, so that it can be looked at after another one
+    has taken its place. Raise OSError if that fails."""
+    try:
+        read_json(path, kind)
+    except FileNotFoundError:
+        return
+    except DamagedFile as error:
+        kept = path.with_name(f"{path.name}{_DAMAGED}{path.stat().st_mtime_ns}")
+        log.error("%s is replaced, and kept as %s: %s", path, kept.name, error)
+        path.rename(kept)
 
 
 def sync(path: Path) -> None:

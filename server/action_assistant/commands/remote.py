@@ -191,7 +191,7 @@ def _run(options: argparse.Namespace) -> int:
     if options.script:
         try:
             script = msgspec.json.decode(options.script.read_bytes())
-        except (OSError, msgspec.DecodeError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise CannotStart(f"Cannot read the script {options.script}: {error}.") from error
     from action_assistant.runner.runs.views import RunShown
 

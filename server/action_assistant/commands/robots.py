@@ -435,5 +435,5 @@ def _profile(path: Path) -> dict[str, Any]:
         return msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
     except OSError as error:
         raise CannotStart(f"Cannot read the profile {path}: {error.strerror}.") from error
-    except msgspec.DecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise CannotStart(f"The profile {path} is no JSON object: {error}.") from error

@@ -11,7 +11,7 @@ import msgspec
 
 from action_assistant import paths
 from action_assistant.errors import CannotStart
-from action_assistant.private_files import make_folder, replace_file
+from action_assistant.private_files import DamagedFile, make_folder, read_json, replace_file
 
 _OTHERS: Final = stat.S_IRWXG | stat.S_IRWXO
 
@@ -70,7 +70,7 @@ def stored_token(url: str) -> StoredToken | None:
         raise CannotStart(f"Others may read {path}, which holds a token: chmod 600 it.")
     try:
         return msgspec.json.decode(content, type=StoredToken)
-    except msgspec.DecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise CannotStart(f"{path} is no token that `login` stored ({error}).") from error
 
 
@@ -78,8 +78,8 @@ def every_stored_token() -> Iterator[StoredToken]:
     """Yield the tokens that are kept, by server. Raise CannotStart as `stored_token` does."""
     for path in sorted((paths.config() / "tokens").glob("*.json")):
         try:
-            yield msgspec.json.decode(path.read_bytes(), type=StoredToken)
-        except (OSError, msgspec.DecodeError) as error:
+            yield read_json(path, StoredToken)
+        except (OSError, DamagedFile) as error:
             raise CannotStart(f"{path} cannot be read ({error}).") from error
 
 

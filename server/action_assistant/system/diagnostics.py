@@ -36,6 +36,7 @@ CODES: Final[Mapping[str, Severity]] = {
     "folder-unusable": "error",
     "folder-of-others": "error",
     "folder-readable": "error",
+    "file-unreadable": "error",
     "token-missing": "error",
     "token-readable": "error",
     "token-unusable": "error",

@@ -95,6 +95,16 @@ def test_a_missing_token_of_a_folder_that_was_served_is_named(data: Path) -> Non
     assert fault(data).code == "token-unusable"
 
 
+def test_small_files_that_hold_nothing_readable_are_named(data: Path) -> None:
+    for name in ("people/mari.json", "tokens/aaaaaaaaaaaa.json", "graph-rules.json"):
+        (data / name).parent.mkdir(mode=0o700, exist_ok=True)
+        (data / name).touch(mode=0o600)
+        (data / name).write_bytes(b'{"id":"\xff"}')
+    found = fault(data)
+    assert found.code == "file-unreadable"
+    assert all(name in found.message for name in ("mari.json", "aaaaaaaaaaaa", "graph-rules"))
+
+
 def test_a_restore_that_was_interrupted_is_named(data: Path) -> None:
     (data / "restore.unfinished").touch(mode=0o600)
     found = fault(data)

@@ -263,16 +263,35 @@ def test_a_browser_that_becomes_the_device_of_another_person_leaves_its_session(
         assert left.status_code == 401
 
 
-def test_a_recovery_link_of_the_command_line_works_with_the_server_down_and_up(
+def test_a_recovery_link_of_the_command_line_works_with_the_server_down_and_up_and_damaged_files(
     tmp_path: Path, arrive: Arrive
 ) -> None:
     data = tmp_path / "data"
     with sharing(data) as product:
+        eve = added(product, "Eve")
+        tablet = arrive(product)
+        assert come(tablet, eve).status_code == 200
         up = product.cli("people", "link", "Ann", "--role", "owner", "--data", str(data))
         assert up.returncode == 0, up.stderr
     down = product.cli("people", "link", "Bob", "--role", "owner", "--data", str(data))
     assert down.returncode == 0, down.stderr
+    small = [f"{name}.json" for name in ("people/x", "graph-rules", "graph-sights", "tokens/x")]
+    small += [f"{name}.json" for name in ("passkeys/x", "confirmed/x", "views/x", "released/x")]
+    small += [f"people/{eve['id']}.json", "people/groups.json", "sessions/x.json"]
+    for name in small:
+        (data / name).parent.mkdir(mode=0o700, exist_ok=True)
+        (data / name).write_bytes(b'{"id":"\xff"}')
     with sharing(data) as product:
+        person = data / "people" / f"{eve['id']}.json"
+        assert b"Eve" in person.read_bytes()  # the log has her
+        assert list(person.parent.glob(f"{person.name}.damaged-*"))
+        person.write_bytes(b"\0" * 60)
+        session = tablet.http.headers["cookie"].partition("=")[2]
+        tablet = arrive(product)
+        tablet.http.headers["cookie"] = f"aa_{product.port}={session}"
+        assert tablet.runner("POST", "/api/stop").is_success
+        refused = tablet.runner("POST", "/api/runs")
+        assert (refused.status_code, "cannot be read" in refused.text) == (401, True)
         for name, said in (("Ann", up), ("Bob", down)):
             path = "/#i=" + said.stdout.split("#i=")[1].split()[0]
             guest = arrive(product)

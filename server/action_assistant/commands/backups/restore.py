@@ -39,7 +39,7 @@ from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Branch
 from action_assistant.journal.databases import ask_once, database_of
 from action_assistant.journal.foreign_schema import remove_strangers
-from action_assistant.private_files import opener, replace_file, sync
+from action_assistant.private_files import DamagedFile, opener, read_json, replace_file, sync
 from action_assistant.schema.editor_tables import editor_event
 from action_assistant.web.auth.keys import TOKEN_FILE
 
@@ -189,10 +189,10 @@ def _begin(
 
 def _under(mark: Path) -> RestoreUnderWay | None:
     try:
-        return msgspec.json.decode(mark.read_bytes(), type=RestoreUnderWay)
+        return read_json(mark, RestoreUnderWay)
     except FileNotFoundError:
         return None
-    except msgspec.DecodeError:
+    except DamagedFile:
         return RestoreUnderWay("", 0, "")  # the interruption cut it short
 
 

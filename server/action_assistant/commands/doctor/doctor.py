@@ -55,6 +55,7 @@ CHECKS: Final[tuple[Check, ...]] = (
     machine_checks.page_is_built,
     machine_checks.folder_is_ours,
     machine_checks.token_is_there,
+    machine_checks.small_files_are_whole,
     machine_checks.nothing_was_interrupted,
     machine_checks.archive_is_usable,
     machine_checks.disk_has_room,

@@ -23,19 +23,53 @@ from action_assistant.commands.backups import options
 from action_assistant.commands.doctor.database_checks import has_events, oldest_at
 from action_assistant.commands.doctor.installation import Installation
 from action_assistant.editor.log import database_location
+from action_assistant.editor.people.members import OfflineLink
 from action_assistant.errors import CannotStart
 from action_assistant.journal.copies import backup_state as backups
 from action_assistant.journal.copies.backup_state import BackupState, backup_state
 from action_assistant.journal.databases import database_of
 from action_assistant.logs import log_settings
-from action_assistant.private_files import holds_nothing_else, of_others, open_to_others
+from action_assistant.private_files import (
+    DamagedFile,
+    holds_nothing_else,
+    of_others,
+    open_to_others,
+    read_json,
+)
+from action_assistant.runner.runs import sight
 from action_assistant.system import posix
 from action_assistant.system.diagnostics import Diagnostic, fine, found
 from action_assistant.version import described
+from action_assistant.web.auth import (
+    confirmations,
+    graph_seals,
+    passkeys,
+    people_files,
+    released_versions,
+    session_files,
+    tokens,
+    view_links,
+)
+from action_assistant.web.auth.graph_rules import Rule
 from action_assistant.web.auth.keys import TOKEN_FILE, Keys
 from action_assistant.web.notifications.receivers import receivers_of
 
+_NAMED: Final = 5  # files in one sentence
 _PREFIX: Final = "ACTION_ASSISTANT_"
+#: The small files of both processes, by their place in the data folder, and what each holds.
+_SMALL: Final[Mapping[str, type[object]]] = {
+    f"{people_files.FOLDER}/*.json": people_files.PersonFile,
+    f"{people_files.FOLDER}/groups.json": dict[str, str],
+    f"{people_files.FOLDER}/links/*.json": OfflineLink,
+    f"{session_files.FOLDER}/*.json": session_files.NotedSession,
+    f"{confirmations.FOLDER}/*.json": confirmations.Confirmation,
+    f"{passkeys.FOLDER}/*.json": passkeys.PasskeyFile,
+    f"{tokens.FOLDER}/*.json": tokens.TokenRecord,
+    f"{view_links.FOLDER}/*.json": view_links.ViewRecord,
+    f"{released_versions.FOLDER}/*.json": released_versions.Release,
+    graph_seals.FILE: graph_seals.Statement,
+    sight.FILE: dict[str, tuple[int, Rule]],
+}
 _HOST: Final = re.compile(r"[A-Za-z0-9_.:\[\]-]+")
 
 
@@ -431,6 +465,43 @@ def _listed(data: Path, paths: list[Path]) -> str:
     names = [str(path.relative_to(data)) if path != data else str(data) for path in paths]
     more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
     return ", ".join(names[:_SHOWN]) + more
+
+
+def small_files_are_whole(place: Installation) -> Iterator[Diagnostic]:
+    """Check that the files of persons, sessions, tokens, links and rules can be read. Yield the
+    findings."""
+    data = place.data
+    kinds = {path: kind for name, kind in _SMALL.items() for path in sorted(data.glob(name))}
+    broken = [
+        f"{path.relative_to(data)} ({why})"
+        for path, kind in kinds.items()
+        if (why := _fault(path, kind))
+    ]
+    if not broken:
+        yield fine(data, "The files of persons, sessions, tokens, links and rules can be read.")
+        return
+    more = f" and {len(broken) - _NAMED} more" if len(broken) > _NAMED else ""
+    yield found(
+        "file-unreadable",
+        data,
+        f"What these files say is not known: {', '.join(broken[:_NAMED])}{more}. Whoever they are about "
+        "may do nothing but Stop, or less than before.",
+        "Restore them from a backup, or move them away. The next start of the editor writes the files "
+        "of persons, releases and graph-rules.json anew from its log.",
+    )
+
+
+def _fault(path: Path, kind: type[object]) -> str:
+    """Return why a small file cannot be read; "" if it can, or is gone."""
+    try:
+        read_json(path, kind)
+    except FileNotFoundError:
+        return ""
+    except OSError as error:
+        return error.strerror or type(error).__name__
+    except DamagedFile as error:
+        return str(error)
+    return ""
 
 
 def token_is_there(place: Installation) -> Iterator[Diagnostic]:

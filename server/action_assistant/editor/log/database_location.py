@@ -16,7 +16,7 @@ from sqlalchemy.exc import ArgumentError
 from action_assistant.editor.log.epochs import MARK, EpochMark
 from action_assistant.errors import CannotStart
 from action_assistant.journal.databases import ask_once, database_of
-from action_assistant.private_files import replace_file
+from action_assistant.private_files import DamagedFile, read_json, replace_file
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
@@ -70,12 +70,12 @@ def remembered(data: Path) -> str | None:
     graphs are then in the folder itself, or do not exist yet. Raise CannotStart if the file with
     the URL cannot be read or is damaged."""
     try:
-        return msgspec.json.decode((data / FILE).read_bytes(), type=StoredLocation).database
+        return read_json(data / FILE, StoredLocation).database
     except FileNotFoundError:
         return None
     except OSError as error:
         raise CannotStart(f"Cannot read {data / FILE}: {error.strerror}.") from error
-    except msgspec.DecodeError as error:
+    except DamagedFile as error:
         raise CannotStart(
             f"{data / FILE} is damaged. Name the database by --database URL --switch-database."
         ) from error
@@ -175,8 +175,8 @@ def _holds(url: str, mark: Path) -> bool:
     if _is_nowhere(url):
         return False
     try:
-        last = msgspec.json.decode(mark.read_bytes(), type=EpochMark)
-    except (OSError, msgspec.DecodeError):
+        last = read_json(mark, EpochMark)
+    except (OSError, DamagedFile):
         return False
     found = select(_event.chain).where(_event.position == last.position)
 

@@ -20,7 +20,7 @@ from sqlalchemy import select
 from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import Unavailable
 from action_assistant.journal.journal import Journal
-from action_assistant.private_files import replace_file
+from action_assistant.private_files import DamagedFile, read_json, replace_file
 from action_assistant.schema import editor_tables
 
 log: Final = logging.getLogger(__name__)
@@ -104,8 +104,8 @@ def marked(mark: Path) -> EpochMark | None:
     """Return the last event that a data folder has seen, from the file `mark`; None if the file is
     missing or unreadable."""
     try:
-        return msgspec.json.decode(mark.read_bytes(), type=EpochMark)
-    except (OSError, msgspec.DecodeError):  # a new folder, or one of an older version
+        return read_json(mark, EpochMark)
+    except (OSError, DamagedFile):  # a new folder, or one of an older version
         return None
 
 

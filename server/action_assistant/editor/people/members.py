@@ -38,7 +38,13 @@ from action_assistant.errors import (
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.kit.moments import sent_us
-from action_assistant.private_files import make_folder, replace_file
+from action_assistant.private_files import (
+    DamagedFile,
+    log_unreadable,
+    make_folder,
+    read_json,
+    replace_file,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.schema import editor_tables
@@ -57,6 +63,7 @@ MOST_HOURS: Final = 30 * 24.0
 _LINKS: Final = "links"
 _MOST: Final = 1000  # persons that are not ended
 _MOST_GROUPS: Final = 100
+_LATEST: Final = 250_000_000_000.0  # seconds since 1970: before the year 10000
 
 
 class PersonalLink(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
@@ -412,10 +419,9 @@ class Members:
         """Store a link of the command line in the log, and its person if they are new there."""
         async with self.turn:
             try:
-                content = await asyncio.to_thread(path.read_bytes)
-                offline = msgspec.json.decode(content, type=OfflineLink)
-            except (OSError, msgspec.DecodeError) as error:
-                log.error("%s cannot be read: %s", path, error)
+                offline = await asyncio.to_thread(_offline_in, path)
+            except (OSError, DamagedFile) as error:
+                log_unreadable(path, error)
                 return
             person = offline.person
             if offline.id not in self._owner_of:
@@ -579,6 +585,14 @@ class Members:
         else:
             path = f"/#i={link.id}.{self._keys.secret_of(link.id)}"
         return replace(link, made_by=self._people.person(link.made_by.id), path=path)
+
+
+def _offline_in(path: Path) -> OfflineLink:
+    """Return the link that the command line has stored in a file. Raise OSError or DamagedFile."""
+    found = read_json(path, OfflineLink)
+    if not all(0 <= each < _LATEST for each in (found.expires, found.person.until or 0.0)):
+        raise DamagedFile("it has a time that no calendar has")
+    return found
 
 
 def known_offline(data: Path, text: str) -> list[PersonFile]:

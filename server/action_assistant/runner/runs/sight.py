@@ -14,7 +14,13 @@ import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, Unavailable
-from action_assistant.private_files import decoded, make_folder, replace_file
+from action_assistant.private_files import (
+    DamagedFile,
+    log_unreadable,
+    make_folder,
+    read_json,
+    replace_file,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.runner.runs.events import Requested, RunSubgraph
 from action_assistant.runner.runs.run import Run
@@ -243,7 +249,7 @@ class RunSight:
         kept = {graph: each for graph, each in self._learned.items() if each.at > since}
         self._learned = kept | news
         self._counted = None
-        if self._data is None:
+        if self._data is None or self._is_unread:  # what was there is kept, and hides everything
             return
         try:
             await to_thread.run_sync(_write, self._data / FILE, dict(self._learned))
@@ -254,11 +260,11 @@ class RunSight:
 
     def _read_learned(self, path: Path) -> None:
         try:
-            self._learned = decoded(path.read_bytes(), dict[str, _Learned])
+            self._learned = read_json(path, dict[str, _Learned])
         except FileNotFoundError:
             pass
-        except (OSError, msgspec.DecodeError) as error:
-            log.error("%s cannot be read: %s", path, error)
+        except (OSError, DamagedFile) as error:
+            log_unreadable(path, error)
             self._is_unread = True
 
 

@@ -18,7 +18,16 @@ from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
 import msgspec
 
 from action_assistant.errors import BadInput, Unauthenticated
-from action_assistant.private_files import decoded, make_folder, replace_file
+from action_assistant.private_files import (
+    DamagedFile,
+    FileState,
+    keep_damaged,
+    log_unreadable,
+    make_folder,
+    read_json,
+    replace_file,
+    state_of,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.keys import Keys, Session
 
@@ -66,7 +75,7 @@ def may_confirm(session: Session, now: float) -> bool:
 class _Known(NamedTuple):
     """A confirmation in memory, and the state of its file as it was read; None without a file."""
 
-    state: tuple[int, int, int] | None
+    state: FileState | None
     found: Confirmation | None
 
 
@@ -120,8 +129,7 @@ class Confirmations:
         known = self._known.get(session_id)
         path = self._path(session_id)
         try:
-            found = path.stat()
-            state = (found.st_mtime_ns, found.st_ino, found.st_size)
+            state = state_of(path)
             if known is None or known.state != state:
                 known = _Known(state, _newer(known, self._read(path, session_id)))
                 self._remember(session_id, known)
@@ -143,6 +151,7 @@ class Confirmations:
         part = self._folder / f"{made.session}.{random_id()}.part"  # both processes may write
         try:
             make_folder(self._folder)
+            keep_damaged(path, Confirmation)
             replace_file(path, msgspec.json.encode(made), part=part, is_durable=False)
         except OSError as error:
             log.warning("a confirmation could not be kept in %s: %s", self._folder, error.strerror)
@@ -155,8 +164,9 @@ class Confirmations:
     def _read(self, path: Path, session_id: str) -> Confirmation | None:
         """Return the confirmation in a file; None if it is not genuine. Raise OSError."""
         try:
-            found = decoded(path.read_bytes(), Confirmation)
-        except msgspec.DecodeError:
+            found = read_json(path, Confirmation)
+        except DamagedFile as error:
+            log_unreadable(path, error)
             return None
         genuine = hmac.compare_digest(self._seal(found).encode(), found.seal.encode())
         is_past = found.at <= self._clock() + _SKEW_S

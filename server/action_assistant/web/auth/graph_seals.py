@@ -19,7 +19,16 @@ from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Unavailable
 from action_assistant.kit.retrying_thread import RetryingThread
-from action_assistant.private_files import decoded, make_folder, replace_file
+from action_assistant.private_files import (
+    DamagedFile,
+    FileState,
+    keep_damaged,
+    log_unreadable,
+    make_folder,
+    read_json,
+    replace_file,
+    state_of,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.web.auth.graph_rules import OPEN, Rule
 from action_assistant.web.auth.keys import Keys
@@ -110,7 +119,7 @@ class RulesFile:
         self._path = data / FILE
         self._seals = GraphSeals(keys)
         self._newest: Statement | None = None
-        self._read: tuple[int, int, int] | None = None
+        self._read: FileState | None = None
         self._writing = threading.Lock()
         self._later: Final = RetryingThread(self._write_now, "graph-rules")
         self._unwritten = False
@@ -118,16 +127,16 @@ class RulesFile:
     def newest(self) -> Statement | None:
         """Return the newest statement; None if there was never one."""
         try:
-            found = self._path.stat()
-            state = (found.st_mtime_ns, found.st_ino, found.st_size)
+            state = state_of(self._path)
             if state != self._read:
-                content = self._path.read_bytes()
+                stored = _statement_in(self._path)
                 self._read = state
-                self._take(decoded(content, Statement))
+                if stored is not None:
+                    self._take(stored)
         except OSError:  # not there, or the disk is gone: what is known still counts
             pass
-        except (msgspec.DecodeError, BadInput) as error:
-            log.error("%s cannot be read: %s", self._path, error)
+        except BadInput as error:
+            log.error("%s cannot be read: %s", self._path, error.detail)
         return self._newest
 
     def store(self, statement: Statement) -> None:
@@ -173,5 +182,15 @@ class RulesFile:
         part = self._path.with_name(
             f"{FILE}.{random_id()}.part"
         )  # the other process may write, too
+        keep_damaged(self._path, Statement)
         replace_file(self._path, msgspec.json.encode(self._newest), part=part)
         self._unwritten = False
+
+
+def _statement_in(path: Path) -> Statement | None:
+    """Return the statement in a file; None for a damaged one. Raise OSError."""
+    try:
+        return read_json(path, Statement)
+    except DamagedFile as error:
+        log_unreadable(path, error)
+        return None

@@ -20,7 +20,16 @@ import msgspec
 from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, NotFound, Unavailable
-from action_assistant.private_files import decoded, make_folder, replace_file
+from action_assistant.private_files import (
+    DamagedFile,
+    FileState,
+    keep_damaged,
+    log_unreadable,
+    make_folder,
+    read_json,
+    replace_file,
+    state_of,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.web.auth.confirmations import ADDED_S, is_sure
@@ -72,7 +81,7 @@ class PasskeyFiles:
 
     def __init__(self, data: Path) -> None:
         self._folder = data / FOLDER
-        self._read: dict[str, tuple[tuple[int, int, int], PasskeyFile]] = {}
+        self._read: dict[str, tuple[FileState, PasskeyFile]] = {}
 
     def of(self, person: str) -> PasskeyFile:
         """Return the passkeys of a person. While the file cannot be read, they are those of the last
@@ -82,16 +91,16 @@ class PasskeyFiles:
             return PasskeyFile()
         path = self._folder / f"{person}.json"
         try:
-            found = path.stat()
-            state = (found.st_mtime_ns, found.st_ino, found.st_size)
+            state = state_of(path)
             if known is None or known[0] != state:
-                known = (state, decoded(path.read_bytes(), PasskeyFile))
+                last = _UNREAD if known is None else known[1]
+                known = (state, _passkeys_in(path, last))
                 self._read[person] = known
         except FileNotFoundError:
             self._read.pop(person, None)
             return PasskeyFile()
-        except (OSError, msgspec.DecodeError) as error:
-            log.error("%s cannot be read: %s", path, error)
+        except OSError as error:
+            log_unreadable(path, error)
             return _UNREAD if known is None else known[1]
         return known[1]
 
@@ -102,12 +111,23 @@ class PasskeyFiles:
             raise Unavailable(f"{self._folder / person}.json cannot be read, so it is not changed.")
         try:
             make_folder(self._folder)
+            keep_damaged(self._folder / f"{person}.json", PasskeyFile)
             part = self._folder / f"{person}.{random_id()}.part"
             replace_file(self._folder / f"{person}.json", msgspec.json.encode(file), part=part)
         except OSError as error:
             raise Unavailable(
                 f"It could not be written to {self._folder}: {error.strerror}."
             ) from error
+
+
+def _passkeys_in(path: Path, last: PasskeyFile) -> PasskeyFile:
+    """Return the passkeys in a file, or those of the last time (`last`) if it is damaged. Raise
+    OSError."""
+    try:
+        return read_json(path, PasskeyFile)
+    except DamagedFile as error:
+        log_unreadable(path, error)
+        return last
 
 
 class _Challenge(NamedTuple):

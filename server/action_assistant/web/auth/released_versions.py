@@ -17,12 +17,21 @@ from typing import Annotated, Final
 import msgspec
 
 from action_assistant.errors import BadInput, Unavailable
-from action_assistant.private_files import decoded, make_folder, replace_file, sync
+from action_assistant.private_files import (
+    DamagedFile,
+    keep_damaged,
+    log_unreadable,
+    make_folder,
+    read_json,
+    replace_file,
+    sync,
+)
 from action_assistant.web.auth.keys import PersonRef
 
 log: Final = logging.getLogger(__name__)
 
 FOLDER: Final = "released"
+_SUFFIX: Final = ".json"
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")
 _ID: Final = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
@@ -64,6 +73,7 @@ class ReleasedVersions:
             if path.exists() and _read(path) is not None:
                 return
             make_folder(self._folder)
+            keep_damaged(path, Release)
             replace_file(path, msgspec.json.encode(release))
             sync(self._folder)
         except OSError as error:
@@ -84,6 +94,7 @@ class ReleasedVersions:
     def _delete(self, paths: Iterable[Path]) -> None:
         try:
             for path in paths:
+                keep_damaged(path, Release)
                 path.unlink(missing_ok=True)
             if self._folder.is_dir():
                 sync(self._folder)
@@ -99,7 +110,8 @@ class ReleasedVersions:
     def _paths(self) -> Iterator[Path]:
         try:
             with os.scandir(self._folder) as entries:
-                yield from [self._folder / entry.name for entry in entries]
+                names = [entry.name for entry in entries]
+                yield from [self._folder / name for name in names if name.endswith(_SUFFIX)]
         except FileNotFoundError:
             return
 
@@ -112,16 +124,16 @@ class ReleasedVersions:
 
 
 def _version_of(path: Path) -> str:
-    return path.name.partition("-")[2].removesuffix(".json")
+    return path.name.partition("-")[2].removesuffix(_SUFFIX)
 
 
 def _read(path: Path) -> Release | None:
     """Return the release in a file; None for a file that is gone, damaged, or about another version."""
     try:
-        found = decoded(path.read_bytes(), Release)
+        found = read_json(path, Release)
     except FileNotFoundError:
         return None
-    except msgspec.DecodeError as error:
-        log.error("%s cannot be read: %s", path, error)
+    except DamagedFile as error:
+        log_unreadable(path, error)
         return None
     return found if path.name == f"{found.digest}-{found.version}.json" else None

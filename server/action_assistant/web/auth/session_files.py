@@ -18,7 +18,12 @@ from typing import Any, Final
 import msgspec
 
 from action_assistant.errors import Conflict, NotFound
-from action_assistant.private_files import decoded, replace_file
+from action_assistant.private_files import (
+    DamagedFile,
+    log_unreadable,
+    read_json,
+    replace_file,
+)
 from action_assistant.web.auth.keys import SESSION_SECONDS, Person, Session
 from action_assistant.web.auth.revocations import Revocations
 
@@ -29,6 +34,7 @@ _MOST: Final = 5000  # that one process notes: somebody may sign in again and ag
 #: Sessions of one person with which further devices are added.
 MOST_DEVICES: Final = 30
 _USE_S: Final = 60.0  # between two notes of the use of one session
+_LATEST: Final = 250_000_000_000.0  # seconds since 1970: before the year 10000
 
 
 class OpenSession(msgspec.Struct, frozen=True, omit_defaults=True):
@@ -113,12 +119,15 @@ class SessionFiles:
 
     def every(self) -> list[OpenSession]:
         """Return the sessions that are still valid, newest first, and delete the files of those
-        that never will be again. The file of an idle session stays, since it proves that."""
+        that never will be again. The file of an idle session stays, since it proves that; so does one
+        that cannot be read."""
         found = []
         with contextlib.suppress(FileNotFoundError):
             for path in list(self._folder.glob("*.json")):
                 session = _read(path)
-                if session is None or session.expired or self._revoked.ends(session):
+                if session is None:
+                    continue
+                if session.expired or self._revoked.ends(session):
                     self._forget(path)
                 elif not self._is_over(session):
                     found.append(self._shown(session))
@@ -174,10 +183,19 @@ class SessionFiles:
 
 
 def _read(path: Path) -> NotedSession | None:
+    """Return the session in a file; None for a file that is gone or cannot be read."""
     try:
-        return decoded(path.read_bytes(), NotedSession)
-    except (OSError, msgspec.DecodeError):
+        found = read_json(path, NotedSession)
+        if found.id != path.stem:
+            raise DamagedFile("it is about another session")
+        if not (0 <= found.begun < _LATEST and 0 <= found.expires < _LATEST):
+            raise DamagedFile("it has a time that no calendar has")
+    except FileNotFoundError:
         return None
+    except (OSError, DamagedFile) as error:
+        log_unreadable(path, error)
+        return None
+    return found
 
 
 def _time(seconds: float) -> datetime:

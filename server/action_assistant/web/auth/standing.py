@@ -52,7 +52,8 @@ class Standings:
         if file is not None:
             # A token has at most the role that it was made with.
             capped = isinstance(credential, Token) and rank(file.role) > rank(person.role)
-            person = Person(person.id, file.name, person.role if capped else file.role)
+            name = file.name or person.name  # nothing is known of one who cannot be read
+            person = Person(person.id, name, person.role if capped else file.role)
             over = over or (file.until is not None and now >= file.until)
         if not over and not isinstance(credential, Token):
             over = self._is_idle(credential, person.role, now)

@@ -28,7 +28,16 @@ from action_assistant.errors import (
     Unavailable,
     Withdrawn,
 )
-from action_assistant.private_files import decoded, replace_file, sync
+from action_assistant.private_files import (
+    DamagedFile,
+    FileState,
+    keep_damaged,
+    log_unreadable,
+    read_json,
+    replace_file,
+    state_of,
+    sync,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.settings import TOKEN_DAYS
@@ -115,7 +124,7 @@ class MadeToken(msgspec.Struct, frozen=True):
 class _Read(NamedTuple):
     """A record in memory, and the state of its file as it was read."""
 
-    state: tuple[int, int, int]
+    state: FileState
     record: TokenRecord | None
 
 
@@ -308,8 +317,7 @@ class TokenFiles:
         this server sealed. If the whole folder is gone, what was read before counts."""
         known = self._known.get(token)
         try:
-            found = self._path(token).stat()
-            state = (found.st_mtime_ns, found.st_ino, found.st_size)
+            state = state_of(self._path(token))
             if known is None or known.state != state:
                 known = _Read(state, self._read(token))
                 self._remember(token, known)
@@ -329,9 +337,9 @@ class TokenFiles:
 
     def _read(self, token: str) -> TokenRecord | None:
         try:
-            record = decoded(self._path(token).read_bytes(), TokenRecord)
-        except msgspec.DecodeError as error:
-            log.error("%s cannot be read: %s", self._path(token), error)
+            record = read_json(self._path(token), TokenRecord)
+        except DamagedFile as error:
+            log_unreadable(self._path(token), error)
             return None
         return record if record.id == token and self._is_sealed(record) else None
 
@@ -346,6 +354,7 @@ class TokenFiles:
         path = self._path(record.id)
         try:
             self._folder.mkdir(mode=0o700, exist_ok=True)
+            keep_damaged(path, TokenRecord)
             replace_file(path, msgspec.json.encode(record), part=path.with_suffix(".part"))
             sync(self._folder)
         except OSError as error:
@@ -357,8 +366,8 @@ class TokenFiles:
         """Return the newest use of which this process or the other one has told."""
         ours = self._uses.get(token)
         try:
-            stored = decoded(self._path(token, ".used").read_bytes(), TokenUse)
-        except (OSError, msgspec.DecodeError):
+            stored = read_json(self._path(token, ".used"), TokenUse)
+        except (OSError, DamagedFile):  # only the time of a use is lost
             return ours
         return stored if ours is None or ours.at < stored.at else ours
 

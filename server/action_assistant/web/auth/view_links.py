@@ -20,7 +20,16 @@ from typing import Final, NamedTuple
 import msgspec
 
 from action_assistant.errors import BadInput, Conflict, NotFound, Unauthenticated, Unavailable
-from action_assistant.private_files import decoded, make_folder, replace_file, sync
+from action_assistant.private_files import (
+    DamagedFile,
+    FileState,
+    log_unreadable,
+    make_folder,
+    read_json,
+    replace_file,
+    state_of,
+    sync,
+)
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.web.auth.access import over_view
@@ -70,7 +79,7 @@ class ViewLink(ViewRecord, frozen=True, kw_only=True):
 
 
 class _Read(NamedTuple):
-    state: tuple[int, int, int]
+    state: FileState
     record: ViewRecord | None
 
 
@@ -195,8 +204,7 @@ class ViewLinks:
         without one. If the whole folder cannot be read, what was read before counts."""
         known = self._known.get(link)
         try:
-            found = self._path(link).stat()
-            state = (found.st_mtime_ns, found.st_ino, found.st_size)
+            state = state_of(self._path(link))
             if known is None or known.state != state:
                 if len(self._known) > 2 * _MOST:
                     self._known.clear()
@@ -211,18 +219,19 @@ class ViewLinks:
 
     def _read(self, link: str) -> ViewRecord | None:
         try:
-            record = decoded(self._path(link).read_bytes(), ViewRecord)
-        except msgspec.DecodeError as error:
-            log.error("%s cannot be read: %s", self._path(link), error)
+            record = read_json(self._path(link), ViewRecord)
+            if record.made_at.tzinfo is None or record.expires.tzinfo is None:
+                raise DamagedFile("it has a time without a time zone")
+        except DamagedFile as error:
+            log_unreadable(self._path(link), error)
             return None
         return record if (record.id, record.kind) == (link, self.kind) else None
 
     def _use(self, link: str) -> ViewUse:
         if link not in self._uses:
             try:
-                stored = self._path(link, ".used").read_bytes()
-                self._uses[link] = decoded(stored, ViewUse)
-            except (OSError, msgspec.DecodeError):
+                self._uses[link] = read_json(self._path(link, ".used"), ViewUse)
+            except (OSError, DamagedFile):  # only a count is lost
                 return ViewUse()
         return self._uses[link]
 
