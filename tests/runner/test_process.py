@@ -1,16 +1,19 @@
 """The runner as a process: what it never loads, and what a kill leaves behind."""
 
 import os
+import signal
+import socket
 import sqlite3
 import subprocess
 import sys
 import time
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from runner.harness import order, sequence
-from runner.process import RunnerProcess, over, started
+from runner.process import BEARER, RunnerProcess, over, started
 
 FORBIDDEN = ("pycrdt", "action_assistant.editor")
 
@@ -58,6 +61,35 @@ def test_after_kill_9_a_run_is_told_truthfully(own_process: RunnerProcess) -> No
         assert client.get(f"/api/runs/{done['id']}").json() == before
         assert [each["state"] for each in client.get("/api/runs").json()] == ["lost", "finished"]
         assert started(client, order(sequence()))["number"] == 3
+
+
+def test_a_stop_that_came_while_the_runner_stood_still_is_carried_out(
+    process: RunnerProcess,
+) -> None:
+    """It stands still for longer than a connection may be silent, and two clients do not wait."""
+    bearer = "".join(f"\r\n{name}: {value}" for name, value in BEARER.items())
+    head = f"HTTP/1.1\r\nhost: 127.0.0.1:{process.port}{bearer}\r\ncontent-length: "
+    with process.client() as client, ExitStack() as opened:
+        stopped: list[tuple[socket.socket, bytes]] = []
+        for rest in (b"0\r\n\r\n", b"0\r\n\r\n", b"2\r\n\r\n{}", b"9\r\n\r\n{"):
+            run = started(client, order(sequence(), script={"*": [{"never": True}]}))["id"]
+            wire = opened.enter_context(socket.create_connection(("127.0.0.1", process.port), 20))
+            stopped.append((wire, f"POST /api/runs/{run}/stop {head}".encode() + rest))
+        kept_alive, _, *impatient = (wire for wire, _ in stopped)
+        kept_alive.sendall(f"GET /healthz {head}0\r\n\r\n".encode())
+        assert kept_alive.recv(12) == b"HTTP/1.1 200"
+        time.sleep(0.2)  # all are accepted
+        os.kill(process.pid, signal.SIGSTOP)
+        try:
+            for wire, stop in stopped:
+                wire.sendall(stop)
+            for wire in impatient:
+                wire.close()
+            time.sleep(10.5)
+        finally:
+            os.kill(process.pid, signal.SIGCONT)
+        for _, stop in stopped:
+            assert over(client, stop.split(b"/")[3].decode())["state"] == "stopped"
 
 
 def test_nobody_without_credentials_gets_in(process: RunnerProcess) -> None:

@@ -435,7 +435,7 @@ async def _stop_id(request: _Asking) -> str:
     try:
         body = await start_of(request, _STOP_BYTES, _STOP_S)
         return msgspec.json.decode(body, type=StopBody).stop_id[:100]
-    except (msgspec.DecodeError, UnicodeDecodeError, HTTPException, RecursionError):
+    except (msgspec.DecodeError, UnicodeDecodeError, HTTPException, BadInput, RecursionError):
         return ""
 
 

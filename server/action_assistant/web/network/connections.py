@@ -9,12 +9,16 @@ import asyncio
 import contextlib
 import logging
 import os
+import select
 import socket
 import ssl
 import time
 from collections.abc import Callable, Coroutine, Iterator
 from itertools import islice
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
+
+if TYPE_CHECKING:
+    from _typeshed import HasFileno
 
 log: Final = logging.getLogger(__name__)
 
@@ -47,6 +51,11 @@ class Connection:
     def is_over(self) -> bool:
         """Return whether the connection's descriptor is free again."""
         return self._wire.fileno() < 0
+
+    @property
+    def has_unread(self) -> bool:
+        """Return whether something has arrived that was not read yet."""
+        return has_unread(self._wire)
 
     def end(self) -> None:
         """Close the connection at once, and drop what waits to be sent."""
@@ -260,7 +269,7 @@ class Connections:
             self._forget_gone()
             late = time.monotonic() - _SILENT_S
             for _, each in tuple(self._all):
-                if not each.answering and each.since < late:
+                if not each.answering and each.since < late and not each.has_unread:
                     each.end()
 
     # --- what is known ------------------------------------------------------------------------
@@ -297,6 +306,21 @@ class Connections:
         or an unknown peer."""
         if peer is not None and (connection := self._all.get(peer)) is not None:
             connection.end()
+
+
+def has_unread(wire: "HasFileno | None") -> bool:
+    """Return whether bytes, or the end of the connection, have arrived at a socket and were not read
+    yet. Return False for None and a closed socket.
+
+    A loop that could not run for a while calls its timers before it reads. A timer that would close a
+    connection for its silence asks this first: the request may be there, and it may be a Stop.
+    """
+    descriptor = -1 if wire is None else wire.fileno()
+    if descriptor < 0:
+        return False
+    arrived = select.poll()
+    arrived.register(descriptor, select.POLLIN)
+    return bool(arrived.poll(0))
 
 
 def _in_use() -> int:

@@ -19,6 +19,8 @@ from uvicorn._types import ASGIReceiveEvent, ASGISendEvent
 from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 from websockets.http11 import Request
 
+from action_assistant.web.network.connections import has_unread
+
 try:
     from websockets.speedups import apply_mask
 except ImportError:  # where it was not compiled
@@ -78,7 +80,7 @@ class WebSocketProtocol(WebSocketsSansIOProtocol):
 
     def may_be_unread(self) -> bool:
         """Return whether the answer to the last ping may be received but not read yet."""
-        return self.read_paused
+        return self.read_paused or has_unread(self.transport.get_extra_info("socket"))
 
 
 def end_connection(transport: asyncio.Transport, shutdown: Callable[[], None]) -> None:

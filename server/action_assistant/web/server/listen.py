@@ -22,7 +22,7 @@ from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public_url import Network
 from action_assistant.system import posix
 from action_assistant.web.auth.access import KNOWN
-from action_assistant.web.network.connections import Connections
+from action_assistant.web.network.connections import Connections, has_unread
 from action_assistant.web.server.direct import DirectSocket, WebSocketProtocol, end_connection
 from action_assistant.web.server.proxy import ASKED, Forwarded
 from action_assistant.web.server.sockets import bound
@@ -263,6 +263,16 @@ class _Http(H11Protocol):
         computed."""
         _RECEIVED.set((time.process_time(), time.perf_counter()))
         super().data_received(data)
+
+    def timeout_keep_alive_handler(self) -> None:
+        """Close a connection on which no further request came in time. If one has arrived but was
+        not read yet, let it be read."""
+        if has_unread(self.transport.get_extra_info("socket")):
+            self.timeout_keep_alive_task = self.loop.call_later(
+                self.timeout_keep_alive, self.timeout_keep_alive_handler
+            )
+            return
+        super().timeout_keep_alive_handler()
 
     def send_400_response(self, msg: str) -> None:
         """Answer a malformed request with a refusal: 411 if its body has no length, else 400 with
