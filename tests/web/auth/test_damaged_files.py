@@ -148,7 +148,7 @@ def _wired(values: list[Any]) -> list[Any]:
 
 #: What a file of a kind that cannot be read opens for its person, where that is less than before.
 CLOSED_BY: Final[dict[str, dict[str, object]]] = {
-    "people": {"may": False, "token": False, "sessions": False},
+    "people": {"may": ("viewer", [])},
     "groups": {"groups": None},
     "sessions": {"sessions": False},
     "confirmed": {"confirmed": False},

@@ -485,7 +485,7 @@ def small_files_are_whole(place: Installation) -> Iterator[Diagnostic]:
         "file-unreadable",
         data,
         f"What these files say is not known: {', '.join(broken[:_NAMED])}{more}. Whoever they are about "
-        "may do nothing but Stop, or less than before.",
+        "may look and stop, or less than before.",
         "Restore them from a backup, or move them away. The next start of the editor writes the files "
         "of persons, releases and graph-rules.json anew from its log.",
     )

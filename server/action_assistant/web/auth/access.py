@@ -477,11 +477,6 @@ class Access:
             return over_view(is_revoked=self._revoked.view_ended(credential.id))
         if self._revoked.person_ended(credential.person.id):
             return Withdrawn("Your access was ended by an owner. Ask for a new link.")
-        if self._standings is not None and self._standings.people.is_unread(credential.person.id):
-            return Unauthenticated(
-                "What is stored about you cannot be read on the server, so you may do nothing but "
-                "Stop. Ask its owner to look at `doctor`."
-            )
         if isinstance(credential, Token):
             if self._revoked.token_ended(credential.id):
                 return Withdrawn(f"The token {credential.name!r} was revoked.")

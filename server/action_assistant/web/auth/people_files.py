@@ -3,7 +3,7 @@
 `people/ID.json` in the data folder holds the present name, role and groups of one person, and
 `people/groups.json` the names of groups. The editor writes both after its log. They are read
 without a database or the other process. A person without a file has what their cookie says, so that
-a full disk signs nobody out. A person whose file cannot be read may do nothing but Stop, unless this
+a full disk signs nobody out. A person whose file cannot be read is a viewer without groups, unless this
 process has read it before: the cookie may say more than the file did. What could not be written holds
 in this process, which tries again.
 """
@@ -66,8 +66,7 @@ class PeopleFiles:
 
     def get(self, person: str) -> PersonFile | None:
         """Return what is known of a person; None if there was never a file. While a file cannot be read,
-        the person is what it said last; one of whom this process never read may do nothing but
-        Stop."""
+        the person is what it said last; one of whom this process never read is a viewer."""
         if person in self._unwritten:
             return self._unwritten[person]
         if _ID.fullmatch(person) is None or person == _GROUPS:
@@ -92,10 +91,6 @@ class PeopleFiles:
                 known = _Read(state, last)
             self._read[person] = known
         return known.person
-
-    def is_unread(self, person: str) -> bool:
-        """Return whether the file of a person cannot be read, and this process never could."""
-        return self.get(person) == _unread(person)
 
     def write(self, person: PersonFile) -> None:
         """Store a person durably. Raise Unavailable if that fails; it then holds in this process
@@ -162,5 +157,5 @@ def _person_in(path: Path) -> PersonFile:
 
 
 def _unread(person: str) -> PersonFile:
-    """Return a person whose file cannot be read: one who may do nothing but Stop."""
-    return PersonFile(person, "", "viewer", until=0.0)
+    """Return a person whose file cannot be read: they may look at what everybody may, and stop it."""
+    return PersonFile(person, "", "viewer")
