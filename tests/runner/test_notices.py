@@ -8,6 +8,7 @@ import msgspec
 import pytest
 from sqlalchemy import select
 
+from action_assistant.journal.events import Event
 from action_assistant.journal.journal import Journal
 from action_assistant.runner import projection
 from action_assistant.runner.notices import KINDS, with_notices
@@ -174,3 +175,9 @@ def test_every_kind_of_the_runner_has_its_sentence() -> None:
 
 async def test_without_receivers_the_fold_is_as_it_was() -> None:
     assert with_notices(projection.fold, []) is projection.fold
+
+
+def test_an_event_is_folded_whatever_becomes_of_the_message_about_it() -> None:
+    tables = select(outbox)
+    event = Event("run/r1", 1, Ended.kind, "", EPOCH, b"[]", 1)
+    assert with_notices(lambda _: [tables], [CHAT])(event) == (tables,)

@@ -1,5 +1,6 @@
 """The messages that events of the runner cause: the rows of its outbox, written with the event."""
 
+import logging
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
@@ -22,6 +23,8 @@ from action_assistant.runner.start.approvals import ApprovalAsked
 from action_assistant.schema.runner_tables import outbox, run
 from action_assistant.web.notifications.outbox import id_of, row
 from action_assistant.web.notifications.receivers import Receiver
+
+log: Final = logging.getLogger(__name__)
 
 #: The kinds of messages that the runner sends.
 KINDS: Final = ("run.ended", "run.stop_unconfirmed", "robot.lost", "run.held", "approval.asked")
@@ -52,8 +55,14 @@ def with_notices(fold: Fold, receivers: Sequence[Receiver]) -> Fold:
         return fold
 
     def both(event: Event) -> Sequence[Executable]:
-        # The messages come after the tables, which they read.
-        return (*fold(event), *notices(event, receivers)) if event.kind in _EVENTS else fold(event)
+        if event.kind not in _EVENTS:
+            return fold(event)
+        try:
+            messages = notices(event, receivers)
+        except Exception:  # an event is stored, whatever becomes of the messages about it
+            log.exception("no message is sent about an event of %s", event.stream)
+            messages = []
+        return (*fold(event), *messages)  # after the tables, which they read
 
     return both
 

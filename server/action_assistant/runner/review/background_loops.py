@@ -73,6 +73,10 @@ class SumUpLoop:
                 log.warning("runs cannot be summed up now: %s", refused.detail)
                 await anyio.sleep(_RETRY_S)
                 continue
+            except Exception:  # sums are for people: without them the runner goes on
+                log.exception("runs cannot be summed up now")
+                await anyio.sleep(_RETRY_S)
+                continue
             if left:
                 continue
             if ended.is_set():  # its last events may not be stored yet
