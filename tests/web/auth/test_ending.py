@@ -237,6 +237,21 @@ async def test_all_sessions_of_a_browser_end_even_if_no_mark_can_be_written(tmp_
     assert all(revoked.ends(each) for each in held)
 
 
+def test_all_sessions_of_a_person_end_although_none_of_it_can_be_stored(tmp_path: Path) -> None:
+    revoked = Revocations(tmp_path)
+    browsers = SessionFiles(tmp_path, revoked)
+    mine = [KEYS.new_session("Eve", person_id="eve") for _ in range(3)]
+    for each in mine:
+        browsers.note(each)
+    (tmp_path / "revoked").rmdir()
+    (tmp_path / "revoked").write_text("no folder")
+    ended = browsers.end_all_of("eve", but=mine[0].id)
+    assert ended.left is not None
+    assert ended.left.detail.startswith("2 of 2 sessions: It holds here and now")
+    assert [revoked.ends(each) for each in mine] == [False, True, True]
+    assert set(ended.ids) == {each.id for each in mine[1:]}
+
+
 def test_nobody_is_put_out_when_the_disk_is_gone(tmp_path: Path) -> None:
     revoked = Revocations(tmp_path)
     one, other = KEYS.new_session("Ada"), KEYS.new_session("Mari")

@@ -95,8 +95,10 @@ def _own(
         ended = await to_thread.run_sync(
             lambda: browsers.end_all_of(session.person.id, but=session.id)
         )
-        for each in ended:
+        for each in ended.ids:
             audit.note(SessionEnded(each), session.person.id)
+        if ended.left is not None:
+            raise ended.left
 
     return [list_devices, end, end_others]
 

@@ -193,9 +193,11 @@ def _ends(app_state: EditorState, browsers: SessionFiles) -> list[ControllerRout
     )
     async def sign_out(person: str, request: _Asking) -> EndedSessions:
         ended = await to_thread.run_sync(browsers.end_all_of, person)
-        for session in ended:
+        for session in ended.ids:
             app_state.services.audit.note(SessionEnded(session), person_of(request).id)
-        return EndedSessions(len(ended))
+        if ended.left is not None:
+            raise ended.left
+        return EndedSessions(len(ended.ids))
 
     return [end, sign_out]
 

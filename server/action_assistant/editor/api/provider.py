@@ -7,6 +7,7 @@ of the browser that began; nothing is kept here for somebody who never comes bac
 """
 
 import hmac
+import logging
 import re
 import secrets
 import time
@@ -51,6 +52,8 @@ from action_assistant.web.auth.sessions import (
     signed_in,
 )
 from action_assistant.web.network.addresses import Addresses, host_name
+
+log: Final = logging.getLogger(__name__)
 
 #: Below the address of the page: the page to which a provider sends the browser back.
 RETURN_PATH: Final = "/signed-in"
@@ -261,7 +264,9 @@ class ProviderSignIn:
         members.refuse_ended(person)
         role = settings.role(found.groups)
         if role is None:
-            await to_thread.run_sync(self._browsers.end_all_of, person)
+            ended = await to_thread.run_sync(self._browsers.end_all_of, person)
+            if ended.left is not None:
+                log.error("sessions of %s: %s", person, ended.left.detail)
             raise Forbidden(
                 f"{settings.name} knows you, but none of your groups there may come in here. Ask "
                 "the person who runs this server."

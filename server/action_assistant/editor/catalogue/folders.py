@@ -6,6 +6,7 @@ A folder is no more than a place. Removing one moves its contents into the folde
 import asyncio
 from collections import Counter
 from collections.abc import Mapping
+from functools import partial
 from typing import Final, Literal
 
 import msgspec
@@ -142,8 +143,8 @@ class Folders:
             if rows[0].folder != folder:
                 await self._check_rule("graph", graph, folder, keeps=True)
                 filed = h.draft(h.FILED, author, h.GraphFiled(folder))
-                await self._journal.append(h.about_stream(graph), [filed])
-                await self._rights.refresh()
+                store = partial(self._journal.append, h.about_stream(graph), [filed])
+                await self._rights.carry_out(store)
 
     async def _check_rule(
         self, kind: Literal["graph", "folder"], thing: str, into: str | None, *, keeps: bool = False
@@ -185,8 +186,8 @@ class Folders:
         return {each.id: each for each in await self.all()}
 
     async def _append(self, kind: str, author: str, body: msgspec.Struct) -> None:
-        await self._journal.append(h.FOLDERS, [h.draft(kind, author, body)])
-        await self._rights.refresh()
+        drafts = [h.draft(kind, author, body)]
+        await self._rights.carry_out(partial(self._journal.append, h.FOLDERS, drafts))
 
 
 def fit_name(name: str) -> str:

@@ -1,9 +1,10 @@
 """The rights of identities on graphs and folders, by the rules that are stored."""
 
 import asyncio
+import contextlib
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Coroutine, Mapping, Sequence
 from functools import partial
 from typing import Any, Final, Literal, NamedTuple, TypeAlias
 
@@ -47,6 +48,8 @@ Kind: TypeAlias = Literal["graph", "draft", "version", "action", "folder"]
 #: Says of the id of a graph whether somebody may see it.
 Sees: TypeAlias = Callable[[str], bool]
 
+_AGAIN_S: Final = 1.0  # between attempts to read the rules
+
 _GRAPH: Final = editor_tables.graph
 _COLUMNS: Final = select(_GRAPH.c.id, _GRAPH.c.folder, _GRAPH.c.rule, _GRAPH.c.draft_of)
 _ONE: Final = _COLUMNS.where(_GRAPH.c.id == bindparam("id"))
@@ -79,12 +82,16 @@ class GraphRights:
         self._generation = 0  # of what is known here
         self._last_at = 0  # of statements and sights
         self._refreshing = asyncio.Lock()  # an older reading must not replace a newer one
+        self._changes = 0  # that were stored
+        self._counted = 0  # of these, by which is decided here
+        self._tasks: set[asyncio.Task[None]] = set()
 
     async def refresh(self) -> Unavailable | None:
         """Read the folders and their rules again, close the sockets of those who may no longer see
-        or edit what they have open, and store a statement for the runner. To be called after each
-        change of a rule or a place. Return the error if the statement could not be written."""
+        or edit what they have open, and store a statement for the runner. Return the error if the
+        statement could not be written. Raise Unavailable if the journal cannot be read."""
         async with self._refreshing:
+            changes = self._changes
             self._generation += 1  # before anybody is put out: see `admit`
             self._counts = {}
             folder = editor_tables.folder.c
@@ -96,11 +103,65 @@ class GraphRights:
             self._is_ruled = bool(graphs) or any(each.rule for each in self._folders.values())
             if was_ruled or self._is_ruled:
                 await self._put_out()
-            return await self._tell_runner()
+            error = await self._tell_runner()
+            self._counted = changes
+            return error
+
+    async def carry_out(self, store: Callable[[], Awaitable[object]]) -> None:
+        """Store a change of a rule or a place by `store`, and let it count, also if the caller is gone
+        meanwhile. Raise what `store` raises; raise Unavailable if the change is stored, and cannot be
+        read, so that nothing is decided until it can, or if the runner could not be told of it."""
+        await asyncio.shield(self._background(self._carried_out(store)))
+
+    async def _carried_out(self, store: Callable[[], Awaitable[object]]) -> None:
+        try:
+            await store()
+        finally:  # it may be stored, whatever was raised
+            self._changes += 1
+        await self._let_count()
 
     async def made(self) -> None:
-        """Tell the runner the rule of a new graph or draft."""
+        """Tell the runner the rule of a new graph or draft, which is there whatever becomes of that: a
+        start of it brings its rule to the runner, too."""
         if self._is_ruled:
+            self._changes += 1
+            with contextlib.suppress(Unavailable):  # logged, and tried again
+                await self._let_count()
+
+    async def _let_count(self) -> None:
+        """Let stored changes count. If that fails it is tried again, since rooms are open meanwhile."""
+        try:
+            error = await self.refresh()
+        except Exception:
+            log.exception("the rules of graphs cannot be read; nothing is decided by older ones")
+            self._background(self._try_again())
+            raise
+        if error is not None:
+            raise error
+
+    async def _try_again(self) -> None:
+        while self._counted != self._changes:
+            await asyncio.sleep(_AGAIN_S)
+            try:
+                await self._require_current()
+            except Exception:
+                log.exception("the rules of graphs still cannot be read")
+
+    def _background(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+        task = asyncio.create_task(work, name="graph rights")
+        self._tasks.add(task)
+        task.add_done_callback(self._forget)
+        return task
+
+    def _forget(self, task: "asyncio.Task[None]") -> None:
+        self._tasks.discard(task)
+        if not task.cancelled():
+            task.exception()  # raised to whoever waits; nobody may, and it was logged
+
+    async def _require_current(self) -> None:
+        """Read the rules again if a stored change does not count yet. Raise Unavailable if the journal
+        cannot be read: nobody may see what an older rule allows."""
+        if self._counted != self._changes:
             await self.refresh()
 
     async def _tell_runner(self) -> Unavailable | None:
@@ -151,6 +212,7 @@ class GraphRights:
 
     async def _counting(self, graph: str) -> Rule:
         """Return the rule that counts for a graph; CLOSED if there is none with this id."""
+        await self._require_current()
         if not self._is_ruled:
             return OPEN
         known = self._counts.get(graph)
@@ -171,7 +233,8 @@ class GraphRights:
 
     async def check(self, kind: Kind, thing: str, identity: Identity, *, edits: bool) -> None:
         """Raise NotFound if a thing does not exist or lies out of the sight of an identity, in the
-        same words; raise Forbidden if `edits` is True and it may only be seen."""
+        words; raise Forbidden if `edits` is True and it may only be seen."""
+        await self._require_current()
         if not self._is_ruled:
             return  # the route says by itself what does not exist
         rules = await self._rule_of(kind, thing)
@@ -212,6 +275,7 @@ class GraphRights:
 
     async def sight(self, identity: Identity) -> Sees:
         """Return a function that says whether an identity may see the graph with an id."""
+        await self._require_current()
         if not self._is_ruled or identity.person.role == OWNER:
             return _everything
         rows = {row.id: row for row in await self._journal.query(_COLUMNS)}
@@ -230,6 +294,7 @@ class GraphRights:
 
     async def restrictions(self) -> Callable[[str], bool]:
         """Return a function that says `is_restricted` of the graph with an id."""
+        await self._require_current()
         rows = await self._journal.query(_COLUMNS) if self._is_ruled else []
         by_id = {row.id: row for row in rows}
         return frozenset(
@@ -237,7 +302,10 @@ class GraphRights:
         ).__contains__
 
     def sees_folder(self, folder: str | None, identity: Identity) -> bool:
-        """Return whether an identity may see a folder; None: no folder."""
+        """Return whether an identity may see a folder; None: no folder. While a stored change does not
+        count yet, only owners see folders."""
+        if folder is not None and self._counted != self._changes:
+            return identity.person.role == OWNER
         return may_see(rule_at(None, folder, self._folders), identity)
 
     def sees_all_folders(self, identity: Identity) -> bool:
@@ -263,6 +331,7 @@ class GraphRights:
 
     async def rules_of(self, kind: Kind, thing: str) -> Rules:
         """Return the rules of a thing. Raise NotFound if it does not exist."""
+        await self._require_current()
         rules = await self._rule_of(kind, thing)
         if rules is None:
             raise NotFound(f"There is no {kind} {thing!r}.")
@@ -285,10 +354,7 @@ class GraphRights:
         await self._store(h.FOLDERS, h.draft(h.FOLDER_RULED, author, h.FolderRuled(folder, rule)))
 
     async def _store(self, stream: str, ruled: Draft) -> None:
-        await self._journal.append(stream, [ruled])
-        error = await self.refresh()
-        if error is not None:
-            raise error
+        await self.carry_out(partial(self._journal.append, stream, [ruled]))
 
     async def _rule_of(self, kind: Kind, thing: str) -> Rules | None:
         """Return the rules of a thing; None if it does not exist."""

@@ -13,11 +13,11 @@ import time
 from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import msgspec
 
-from action_assistant.errors import Conflict, NotFound
+from action_assistant.errors import Conflict, NotFound, Unavailable
 from action_assistant.private_files import (
     DamagedFile,
     log_unreadable,
@@ -59,6 +59,14 @@ class NotedSession(Session, frozen=True):
 
     browser: str = ""
     address: str = ""
+
+
+class EndedSessions(NamedTuple):
+    """The ids of sessions that were ended. `left`: why the end of some is not stored, so that it holds in
+    this process only; None if all are."""
+
+    ids: list[str]
+    left: Unavailable | None
 
 
 class SessionFiles:
@@ -141,14 +149,22 @@ class SessionFiles:
         self._revoked.end(session)
         self._forget(self._path(session))
 
-    def end_all_of(self, person: str, *, but: str | None = None) -> list[str]:
-        """End the open sessions of a person, except the one with the id `but`; return their ids.
-        Raise Unavailable if the folder cannot store that."""
+    def end_all_of(self, person: str, *, but: str | None = None) -> "EndedSessions":
+        """End the open sessions of a person, except the one with the id `but`: all of them, also where
+        the folder cannot store that of some."""
         theirs = [each.id for each in self.every() if each.person.id == person and each.id != but]
+        unwritten: list[Unavailable] = []
         for each in theirs:
-            self._revoked.end(each)
-            self._forget(self._path(each))
-        return theirs
+            try:
+                self._revoked.end(each)
+            except Unavailable as error:  # it holds here, and is tried again
+                unwritten.append(error)
+            else:
+                self._forget(self._path(each))
+        left = None
+        if unwritten:
+            left = Unavailable(f"{len(unwritten)} of {len(theirs)} sessions: {unwritten[0].detail}")
+        return EndedSessions(theirs, left)
 
     def require_room(self, person: str) -> None:
         """Raise Conflict if a person is signed in on as many devices as one may have."""
