@@ -1,10 +1,20 @@
-"""What is left of robots and led runs for a person who may not see a graph."""
+"""The sight of runs: robots and led runs for a person who may not see a graph, and rules by starts."""
+
+import contextlib
+import json
+from pathlib import Path
 
 import msgspec
+import pytest
 
+from action_assistant.errors import Forbidden, Unavailable
 from action_assistant.runner.robots.registration import HeldGraph, Robot, seen_by
 from action_assistant.runner.runs import views
-from action_assistant.runner.runs.sight import HIDDEN_NAME, RunGraphs, Unseen
+from action_assistant.runner.runs.sight import HIDDEN_NAME, RunGraphs, RunSight, Unseen
+from action_assistant.web.auth.graph_rules import OPEN, Rule
+from action_assistant.web.auth.graph_seals import GraphSeals, RulesFile, Sight, Statement
+from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.keys import Keys, Person
 from runner.execution.test_conductor import Lab, shared
 from runner.execution.test_led_rights import SLOW
 from runner.harness import ANN, order, sequence, until, virtual
@@ -53,6 +63,7 @@ def test_a_run_is_hidden_by_each_of_its_graphs_and_never_from_its_starter() -> N
     assert not ANY.hides(of)
     assert ANY.hides(msgspec.structs.replace(of, unsighted=True))
     assert Unseen("vic", everything=True).hides(RunGraphs("ann", ()))
+    assert Unseen("", everything=True).hides(RunGraphs("", ()))  # nobody has started nothing
     for unseen in (SOME, ANY, Unseen("ann", everything=True)):
         assert not msgspec.structs.replace(unseen, person="ann").hides(of)
 
@@ -82,3 +93,83 @@ async def test_a_hidden_led_run_shows_its_robots_their_rest_and_who_stopped_it()
             text = msgspec.json.encode(shown)
             assert b"Canary" not in text
             assert b"Work" not in text
+
+
+KEYS = Keys("t" * 40)
+VIC = Identity(Person("vic", "Vic", "viewer"))
+CLOSED = Rule(("ann",), ())
+NOW = 1_800_000_000_000_000  # microseconds since 1970
+HOUR = 3_600_000_000
+
+
+class Sights:
+    """What a runner learns from starts of one graph. `at`: seconds after or before now."""
+
+    def __init__(self, data: Path) -> None:
+        self.data, self.now = data, NOW
+        self.seals, self.runner = GraphSeals(KEYS), self.begun()
+
+    def begun(self) -> RunSight:
+        self.runner = RunSight(self.data, KEYS, lambda: self.now)
+        return self.runner
+
+    def say(self, at: int, rule: Rule) -> None:
+        """Store a statement."""
+        statement = Statement(NOW + at * 1_000_000, (rule,), {"g": 0})
+        RulesFile(self.data, KEYS).store(self.seals.sealed(statement))
+
+    async def start(self, at: int, rule: Rule, *graphs: str) -> None:
+        """Start a version with its sight."""
+        of = graphs or ("g",)
+        sight = Sight("v", "d", of, (rule,) * len(of), NOW + at * 1_000_000)
+        with contextlib.suppress(Forbidden):
+            await self.runner.accept(self.seals.sealed(sight), "v", ("d",), VIC)
+
+    @property
+    def is_hidden(self) -> bool:
+        return self.runner.hides(RunGraphs("ann", ("g",)), VIC)
+
+
+async def test_a_sight_that_is_sent_again_later_lets_nobody_see_more(tmp_path: Path) -> None:
+    sights = Sights(tmp_path)
+    sights.say(-10, CLOSED)
+    await sights.start(-5, CLOSED)  # the same as is known, and newer
+    await sights.start(-7, OPEN)
+    assert sights.is_hidden
+    sights.begun()
+    await sights.start(-6, OPEN)
+    assert sights.is_hidden
+    await sights.start(-4, OPEN)
+    assert not sights.is_hidden
+    await sights.start(-5, CLOSED)
+    assert not sights.is_hidden
+
+
+async def test_after_a_clock_was_set_back_the_narrower_rule_counts(tmp_path: Path) -> None:
+    sights = Sights(tmp_path)
+    sights.say(-10, CLOSED)
+    sights.now = NOW + 2 * HOUR
+    await sights.start(3600, OPEN)
+    await sights.start(3601, CLOSED, "other")
+    assert not sights.is_hidden
+    sights.now = NOW
+    sights.say(0, CLOSED)
+    sights.begun()
+    assert sights.is_hidden
+    await sights.start(1, OPEN, "other")
+    assert sights.runner.hides(RunGraphs("ann", ("other",)), VIC)
+
+
+async def test_what_starts_teach_is_bounded_and_nothing_hidden_is_forgotten(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("action_assistant.runner.runs.sight._MOST_LEARNED", 3)
+    sights = Sights(tmp_path)
+    await sights.start(-9, CLOSED)
+    await sights.start(-8, CLOSED, "a", "b")
+    await sights.start(-7, OPEN, "a")
+    await sights.start(-6, CLOSED, "c")
+    assert set(json.loads((tmp_path / "graph-sights.json").read_text())) == {"g", "b", "c"}
+    with pytest.raises(Unavailable, match="bring it all rules"):
+        await sights.start(-5, CLOSED, "d")
+    assert sights.is_hidden

@@ -10,10 +10,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final
 
+import anyio
 import msgspec
 from anyio import to_thread
 
 from action_assistant.errors import BadInput, Conflict, Forbidden, Unavailable
+from action_assistant.kit.clock import ClockUs, utc_us
 from action_assistant.private_files import (
     DamagedFile,
     log_unreadable,
@@ -25,7 +27,7 @@ from action_assistant.random_ids import random_id
 from action_assistant.runner.runs.events import Requested, RunSubgraph
 from action_assistant.runner.runs.run import Run
 from action_assistant.web.auth import graph_seals
-from action_assistant.web.auth.graph_rules import OPEN, Rule, may_see
+from action_assistant.web.auth.graph_rules import OPEN, Rule, combined, may_see
 from action_assistant.web.auth.graph_seals import GraphSeals, RulesFile, Sight, Statement
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys
@@ -41,6 +43,8 @@ HIDDEN_RUN: Final = (
 )
 HIDDEN_GRAPH: Final = "You may not see this graph, or a graph inside of it."
 HIDDEN_ON_ROBOT: Final = "This may hold graphs that you may not see."
+_SKEW_US: Final = 60_000_000  # by which the clock of the editor may be ahead
+_MOST_LEARNED: Final = 20_000  # graphs whose rules came with starts, since the newest statement
 _MOST_RUNS: Final = 10_000  # that are remembered
 _MOST_KEPT: Final = 1_000  # identities of which it is remembered what they may not see
 
@@ -70,7 +74,7 @@ class Unseen(msgspec.Struct, frozen=True):
 
     def hides(self, run: RunGraphs) -> bool:
         """Return whether the person may not see a run."""
-        if run.author == self.person:
+        if self.person and run.author == self.person:
             return False
         return self.everything or run.unsighted or not self.graphs.isdisjoint(run.graphs)
 
@@ -125,7 +129,11 @@ class _Learned(msgspec.Struct, frozen=True, array_like=True):
 class RunSight:
     """Knows who may see which runs. Without a data folder there are no rules."""
 
-    def __init__(self, data: Path | None = None, keys: Keys | None = None) -> None:
+    def __init__(
+        self, data: Path | None = None, keys: Keys | None = None, clock_us: ClockUs = utc_us
+    ) -> None:
+        self._clock_us = clock_us
+        self._storing = anyio.Lock()
         self._rules = None if data is None or keys is None else RulesFile(data, keys)
         self._seals = None if keys is None else GraphSeals(keys)
         self._data = data
@@ -195,7 +203,12 @@ class RunSight:
             rules = (
                 {} if newest is None else {graph: newest.rule_of(graph) for graph in newest.graphs}
             )
-            rules |= {graph: each.rule for graph, each in self._learned.items() if each.at > since}
+            for graph, each in self._learned.items():
+                if each.at > since:
+                    known = rules.get(graph, OPEN)
+                    rules[graph] = (
+                        combined((known, each.rule)) if self._is_doubted(each) else each.rule
+                    )
             counting = {graph: rule for graph, rule in rules.items() if rule != OPEN}
             self._counted = newest, counting
             self._unseen.clear()
@@ -234,25 +247,35 @@ class RunSight:
         if self._rules is not None:
             await to_thread.run_sync(self._rules.store, statement)
 
+    def _is_doubted(self, learned: _Learned) -> bool:
+        """Return whether a rule is of the future: a clock was set back, and nothing says whether it is
+        newer than others. Then only those see the graph whom all of them let."""
+        return learned.at > self._clock_us() + _SKEW_US
+
     async def _learn(self, sight: Sight) -> None:
+        """Remember the rules of a sight that are newer than what is known, also where they are the same:
+        an older sight that is sent again later must not replace them."""
         counting = self._counting()
         newest = None if self._rules is None else self._rules.newest()
         since = 0 if newest is None else newest.at
+        kept = {graph: each for graph, each in self._learned.items() if each.at > since}
         news: dict[str, _Learned] = {}
         for graph, rule in zip(sight.graphs, sight.rules, strict=True):
-            known = self._learned.get(graph)
-            is_newer = sight.at > max(since, 0 if known is None else known.at)
-            if is_newer and counting.get(graph, OPEN) != rule:
-                news[graph] = _Learned(sight.at, rule)
+            known = kept.get(graph)
+            if sight.at > max(since, 0 if known is None else known.at):
+                if known is not None or rule != OPEN or graph in counting:
+                    news[graph] = _Learned(sight.at, rule)
+            elif sight.at > since and known is not None and self._is_doubted(known):
+                news[graph] = _Learned(known.at, combined((known.rule, rule)))
         if not news:
             return
-        kept = {graph: each for graph, each in self._learned.items() if each.at > since}
-        self._learned = kept | news
+        self._learned = _within_bounds(kept | news)
         self._counted = None
         if self._data is None or self._is_unread:  # what was there is kept, and hides everything
             return
         try:
-            await to_thread.run_sync(_write, self._data / FILE, dict(self._learned))
+            async with self._storing:  # of two that store at once the older one must not be last
+                await to_thread.run_sync(_write, self._data / FILE, dict(self._learned))
         except OSError as error:
             raise Unavailable(
                 f"The rules of the graph could not be stored, so nothing was started: {error.strerror}."
@@ -277,6 +300,22 @@ def _may_exist(path: Path) -> bool:
     except OSError:
         return True
     return True
+
+
+def _within_bounds(learned: dict[str, _Learned]) -> dict[str, _Learned]:
+    """Return the rules without the oldest ones that let everybody see a graph, if they are too many. Raise
+    Unavailable if they are too many without these: none that hides a graph is forgotten."""
+    too_many = len(learned) - _MOST_LEARNED
+    if too_many <= 0:
+        return learned
+    wide = sorted((each.at, graph) for graph, each in learned.items() if each.rule == OPEN)
+    if len(wide) < too_many:
+        raise Unavailable(
+            "This runner has learned the rules of too many graphs by starts, so nothing was started. An "
+            "owner's page or command can bring it all rules."
+        )
+    forgotten = {graph for _, graph in wide[:too_many]}
+    return {graph: each for graph, each in learned.items() if graph not in forgotten}
 
 
 def _is_whole(sight: Sight) -> bool:

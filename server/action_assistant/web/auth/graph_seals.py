@@ -121,6 +121,7 @@ class RulesFile:
         self._newest: Statement | None = None
         self._read: FileState | None = None
         self._writing = threading.Lock()
+        self._taking = threading.Lock()
         self._later: Final = RetryingThread(self._write_now, "graph-rules")
         self._unwritten = False
 
@@ -162,9 +163,10 @@ class RulesFile:
         BadInput for a wrong seal."""
         if not self._seals.holds(statement):
             raise BadInput("The rules of graphs do not have the seal of this server.")
-        if self._newest is not None and statement.at <= self._newest.at:
-            return False
-        self._newest = statement
+        with self._taking:  # one may be stored while the file is read
+            if self._newest is not None and statement.at <= self._newest.at:
+                return False
+            self._newest = statement
         return True
 
     def _write_now(self) -> bool:
