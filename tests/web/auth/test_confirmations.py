@@ -75,6 +75,26 @@ def test_a_clock_that_is_ahead_confirms_nothing_for_the_future(tmp_path: Path) -
     assert Confirmations(tmp_path / "editor", KEYS, clock).confirmed_at("s1") is None
 
 
+def test_a_clock_that_is_set_back_makes_no_confirmation_younger(tmp_path: Path) -> None:
+    """Neither where it was made, nor where it was read or adopted; and a new one counts at once."""
+    clock, steady = Clock(), Clock()
+    made_here, reader, told = (
+        Confirmations(tmp_path / name, KEYS, clock, steady) for name in ("a", "a", "b")
+    )
+    record = made_here.confirm("s1", "device")
+    told.adopt(record)
+    every = (made_here, reader, told)
+    clock.now, steady.now = clock.now + 7200, steady.now + 7200
+    assert {each.confirmed_at("s1") for each in every} == {record.at}
+    clock.now -= 3600
+    assert {round(clock.now - (each.confirmed_at("s1") or 0)) for each in every} == {7200}
+    clock.now -= 3600 + 61
+    assert {each.confirmed_at("s1") for each in every} == {None}
+    again = made_here.confirm("s1", "device")
+    told.adopt(again)
+    assert {each.confirmed_at("s1") for each in every} == {again.at}
+
+
 def test_a_full_disk_confirms_in_the_processes_that_are_told(tmp_path: Path) -> None:
     clock = Clock()
     (tmp_path / "confirmed").write_text("no folder")

@@ -38,6 +38,7 @@ FOLDER: Final = "confirmed"
 LONGEST_S: Final = 24 * 3600.0
 _ID: Final = re.compile(r"[A-Za-z0-9_-]{1,40}")
 _SKEW_S: Final = 60.0  # by which the clock of another process may be ahead
+_UNEVEN_S: Final = 1.0  # by which two clocks of one computer may run unevenly
 _MOST: Final = 5000  # sessions that one process keeps in memory
 
 #: The means by which a person was confirmed: on another device of theirs, by a passkey, by signing
@@ -73,19 +74,28 @@ def may_confirm(session: Session, now: float) -> bool:
 
 
 class _Known(NamedTuple):
-    """A confirmation in memory, and the state of its file as it was read; None without a file."""
+    """A confirmation in memory, and the state of its file as it was read; None without a file. `since`:
+    the monotonic time at which it would have been made by its age when it became known."""
 
     state: FileState | None
     found: Confirmation | None
+    since: float = 0.0
 
 
 class Confirmations:
     """Keeps, verifies and reads the last confirmation of each session."""
 
-    def __init__(self, data: Path, keys: Keys, clock: Callable[[], float] = time.time) -> None:
+    def __init__(
+        self,
+        data: Path,
+        keys: Keys,
+        clock: Callable[[], float] = time.time,
+        monotonic: Callable[[], float] = time.monotonic,
+    ) -> None:
         self._folder = data / FOLDER
         self._keys = keys
         self._clock = clock
+        self._monotonic = monotonic
         self._known: dict[str, _Known] = {}
 
     def confirm(self, session_id: str, how: ConfirmedBy) -> Confirmation:
@@ -118,12 +128,20 @@ class Confirmations:
 
     def confirmed_at(self, session_id: str) -> float | None:
         """Return when the person of a session was last confirmed, in seconds since 1970; None if
-        that is not known."""
-        found = self.last(session_id)
-        return None if found is None else found.at
+        that is not known. No clock that was set back makes it younger while this process knows it."""
+        known = self._last(session_id)
+        if known is None or known.found is None:
+            return None
+        lost = self._monotonic() - known.since - (self._clock() - known.found.at)
+        return known.found.at - lost if lost > _UNEVEN_S else known.found.at
 
     def last(self, session_id: str) -> Confirmation | None:
-        """Return the last confirmation of a session; None if none is known."""
+        """Return the last confirmation of a session; None if none is known. One that is dated later
+        than now does not count: the clock has jumped."""
+        known = self._last(session_id)
+        return None if known is None else known.found
+
+    def _last(self, session_id: str) -> _Known | None:
         if _ID.fullmatch(session_id) is None:
             return None
         known = self._known.get(session_id)
@@ -131,11 +149,22 @@ class Confirmations:
         try:
             state = state_of(path)
             if known is None or known.state != state:
-                known = _Known(state, _newer(known, self._read(path, session_id)))
+                read = self._read(path, session_id)
+                kept = None if known is None or self._is_future(known.found) else known.found
+                if known is None or known.found != _newer(kept, read):
+                    known = self._known_now(read)
+                known = known._replace(state=state)
                 self._remember(session_id, known)
         except OSError:  # not there, or the disk is gone: what is in memory holds
             pass
-        return None if known is None else known.found
+        return None if known is None or self._is_future(known.found) else known
+
+    def _is_future(self, found: Confirmation | None) -> bool:
+        return found is not None and found.at > self._clock() + _SKEW_S
+
+    def _known_now(self, found: Confirmation | None) -> _Known:
+        age = 0.0 if found is None else max(0.0, self._clock() - found.at)
+        return _Known(None, found, self._monotonic() - age)
 
     def prune(self) -> None:
         """Delete the files of confirmations that are too old for every rule."""
@@ -146,7 +175,7 @@ class Confirmations:
 
     def _keep(self, made: Confirmation) -> None:
         """Keep a confirmation in memory and as a file. A full disk is no error."""
-        self._remember(made.session, _Known(None, made))
+        self._remember(made.session, self._known_now(made))
         path = self._path(made.session)
         part = self._folder / f"{made.session}.{random_id()}.part"  # both processes may write
         try:
@@ -180,9 +209,8 @@ class Confirmations:
         return self._folder / f"{session_id}.json"
 
 
-def _newer(known: _Known | None, read: Confirmation | None) -> Confirmation | None:
+def _newer(kept: Confirmation | None, read: Confirmation | None) -> Confirmation | None:
     """Return the newer one of a confirmation in memory and one read from a file."""
-    kept = None if known is None else known.found
     if kept is None or read is None:
         return kept or read
     return kept if kept.at > read.at else read
