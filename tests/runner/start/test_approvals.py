@@ -1,7 +1,7 @@
 """A robot that demands a second person takes only what somebody else has said yes to."""
 
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -11,13 +11,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.errors import BadInput, Conflict
+from action_assistant.errors import BadInput, Conflict, TooMany
 from action_assistant.runner.execution.service import ExecutionService
 from action_assistant.runner.links.port import SIMULATOR, Order, Registration
 from action_assistant.runner.runs.events import Author, Override
 from action_assistant.runner.start.approvals import (
     STREAM,
     ApprovalGiven,
+    ApprovalQuestion,
     ApprovalRequest,
     Approvals,
 )
@@ -230,3 +231,37 @@ def test_a_browser_is_known_again_by_both_processes_after_somebody_has_signed_ou
         browser.cookies.clear()
         signed_in("Carl")
         assert approved()[1]["verdict"] == "passed"
+
+
+@virtual
+async def test_nobody_approves_or_asks_without_end() -> None:
+    """And nobody is kept from it by others, nor by asking about another robot."""
+    harness = Harness()
+    approvals = Approvals(harness.journal, clock_us)
+
+    def question(number: int, robot: str) -> ApprovalQuestion:
+        return ApprovalQuestion(digest=f"{number:064x}", robots=(robot,), graph_name="Fetch")
+
+    async def stored() -> int:
+        return len(await harness.journal.read(STREAM, limit=1000))
+
+    async def refused(again: Callable[[int], Awaitable[object]]) -> str:
+        for number in range(1000):
+            try:
+                await again(number)
+            except TooMany as why:
+                return why.detail
+        return ""
+
+    why = await refused(lambda number: approvals.give(yes(f"{number:064x}"), ANN))
+    assert "very many graphs" in why
+    given = await stored()
+    why = await refused(lambda number: approvals.ask(question(number, "David"), ANN))
+    assert "very often about David" in why
+    asked = await stored() - given
+    assert (0 < given < 100, 0 < asked < 50) == (True, True)
+    assert (await approvals.give(yes("0" * 64), ANN)).author == ANN  # that stands already
+    await approvals.give(yes("f" * 64), BEN)
+    await approvals.ask(question(999, "Carol"), ANN)
+    await approvals.ask(question(1, "David"), BEN)
+    assert await stored() == given + asked + 3

@@ -11,8 +11,9 @@ from typing import Annotated, ClassVar, Final
 import anyio
 import msgspec
 
-from action_assistant.errors import BadInput, Conflict
+from action_assistant.errors import BadInput, Conflict, TooMany
 from action_assistant.kit.clock import ClockUs
+from action_assistant.kit.token_bucket import TokenBuckets
 from action_assistant.runner.links.port import Registration
 from action_assistant.runner.runs.events import Author, draft_of
 from action_assistant.runner.runs.history import RunnerJournal
@@ -25,6 +26,9 @@ STREAM: Final = "approvals"
 
 _DIGEST: Final = frozenset("0123456789abcdef")
 _ASKED_US: Final = 600_000_000  # in which one person asks for one graph once
+_GIVEN_AT_ONCE: Final = 60  # approvals of one person
+_ASKED_AT_ONCE: Final = 20  # questions of one person for one robot, about different graphs
+_PER_MINUTE: Final = 1  # of either, after that
 
 
 class ApprovalGiven(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -92,18 +96,23 @@ class Approvals:
         self._by_digest: defaultdict[str, list[ApprovalGiven]] = defaultdict(list)
         self._reading = anyio.Lock()
         self._asked: dict[tuple[str, str], ApprovalAsked] = {}
+        self._given_pace = TokenBuckets(_GIVEN_AT_ONCE, _PER_MINUTE / 60)
+        self._asked_pace = TokenBuckets(_ASKED_AT_ONCE, _PER_MINUTE / 60)
 
     async def give(
         self, request: ApprovalRequest, author: Author, *, is_named: bool = True
     ) -> ApprovalGiven:
         """Store an approval. If the same person has approved the graph before, return that earlier
-        approval. `is_named`: the person did not come by a link that several may use. Raise BadInput if the digest has the wrong form, Unavailable if the journal
-        cannot store it."""
+        approval. `is_named`: the person did not come by a link that several may use. Raise BadInput if
+        the digest has the wrong form, TooMany if the person approves very many graphs, Unavailable if
+        the journal cannot store it."""
         if not _DIGEST.issuperset(request.digest):
             raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
         for known in await self.given_for(request.digest):
             if known.author.id == author.id:
                 return known
+        if not self._given_pace.of(author.id).take():
+            raise TooMany("You have said yes to very many graphs; wait some minutes.")
         given = ApprovalGiven(
             at=self._clock_us(),
             digest=request.digest,
@@ -119,8 +128,8 @@ class Approvals:
 
     async def ask(self, question: ApprovalQuestion, author: Author) -> ApprovalAsked:
         """Store that a person asks for an approval; while one from the last ten minutes stands, return
-        that instead. Raise BadInput if the digest has the wrong form, Unavailable if the journal
-        cannot store it."""
+        that instead. Raise BadInput if the digest has the wrong form, TooMany if the person asks for
+        very many graphs, Unavailable if the journal cannot store it."""
         if not _DIGEST.issuperset(question.digest):
             raise BadInput("This is no digest of a graph.", where={"path": "/digest"})
         now = self._clock_us()
@@ -128,6 +137,9 @@ class Approvals:
         before = self._asked.get(key)
         if before is not None and now - before.at < _ASKED_US:
             return before
+        for robot in dict.fromkeys(question.robots):
+            if not self._asked_pace.of(f"{author.id} {robot}").take():
+                raise TooMany(f"You have asked others very often about {robot}; wait some minutes.")
         asked = ApprovalAsked(at=now, author=author, **msgspec.structs.asdict(question))
         self._asked = {k: v for k, v in self._asked.items() if now - v.at < _ASKED_US}
         self._asked[key] = asked
