@@ -1,7 +1,6 @@
 """Stop drills, released versions, and the rules of owners that nothing starts against."""
 
 import os
-from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -137,6 +136,28 @@ async def test_a_drill_takes_its_time_to_proof_from_the_run_and_outlives_the_run
 
 
 @virtual
+async def test_the_run_of_a_drill_is_changed_like_another_one() -> None:
+    """It needs no earlier drill; a run that was started with one needs that it still counts."""
+    robot = david()
+    robot.pauses = True
+    async with lab(Harness({"David": robot}), WEEKLY) as control:
+        changed = order(sequence(actions=4))
+        body = {"version": "v2", "digest": changed.digest, "umrf": changed.umrf}
+        run = await moving(control, drill=True)
+        await control.modify(run, msgspec.json.encode(body), author(ANN), ANN)
+        assert control.open[run].run.version == "v2"
+        await control.stop(run, author(BEN))
+        await until(lambda: run not in control.open)
+        assert (await record(control, run)).failure == ""
+        later = await moving(control)
+        await control.rights.set_rules("David", Rules(drill_days=0), author(BEN))
+        with pytest.raises(Conflict, match="asks for one within 0 days"):
+            await control.modify(later, msgspec.json.encode(body), author(ANN), ANN)
+        await control.stop(later, author(BEN))
+        await until(lambda: later not in control.open)
+
+
+@virtual
 async def test_a_stop_that_is_not_proven_makes_a_failed_drill() -> None:
     robot = david()
     harness = Harness({"David": robot})
@@ -269,11 +290,7 @@ class Published:
 def releasing(monkeypatch: pytest.MonkeyPatch) -> Published:
     """Let all runners of a test take these releases."""
     published = Published()
-    sources = StartSources(release_of=published)
-    opened: Callable[..., Any] = ExecutionService.opened
-    monkeypatch.setattr(
-        ExecutionService, "opened", lambda *args, **more: opened(*args, sources=sources, **more)
-    )
+    monkeypatch.setattr("runner.harness.NO_SOURCES", StartSources(release_of=published))
     return published
 
 

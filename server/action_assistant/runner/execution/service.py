@@ -36,7 +36,7 @@ from action_assistant.runner.robots.registration import (
     with_rights,
 )
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.robots.rights import Claim
+from action_assistant.runner.robots.rights import OF_PEOPLE, Claim
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended
@@ -198,9 +198,9 @@ class ExecutionService:
     async def start(
         self, request: StartRequest, author: Author, identity: Identity | None = None
     ) -> Started:
-        """Carry out a start, at most once per request id. Return after the one start message has
-        been sent. `identity`: that of the author; None for an operator without groups. Raise a subclass of
-        Refused if the start is refused; nothing was sent then."""
+        """Carry out a start, at most once per request id. Return after the one start message was sent.
+        `identity`: that of the author; None for an operator without groups. Raise a subclass of Refused
+        if the start is refused; nothing was sent then."""
         starter = identity or _operator(author)
         self.rights.act(starter)
         return await self._starts.start(request, author, starter)
@@ -209,8 +209,8 @@ class ExecutionService:
         self, group: GroupRequest, author: Author, identity: Identity | None = None
     ) -> Grouped:
         """Start one version on several robots, and return the runs and the robots that nothing was
-        sent to. All starts are checked and accepted before the first message is sent. `identity`: as
-        for `start`. Raise a subclass of Refused if one start is refused; nothing was sent to any robot then."""
+        sent to. All starts are accepted before the first message is sent. `identity`: as for `start`.
+        Raise a subclass of Refused if one start is refused; nothing was sent to any robot then."""
         starter = identity or _operator(author)
         self.rights.act(starter)
         return await self._starts.start_group(group, author, starter)
@@ -271,10 +271,9 @@ class ExecutionService:
 
     async def stop(self, run: str, author: Author, stop_id: str = "") -> list[str]:
         """Begin to stop a run, or all runs of a group, and return the ids of the runs that are
-        being stopped; none if all is over already. A Stop of a piece stops its whole led run;
-        once that is over, a Stop of either reaches the pieces that move again. The call does not
-        wait for an effect, only to read a run that is not open. Raise NotFound if there is no such
-        run or group."""
+        being stopped; none if all is over. A Stop of a piece stops its whole led run; once that is
+        over, a Stop of either reaches the pieces that move again. The call only waits to read a run
+        that is not open. Raise NotFound if there is no such run or group."""
         for each in (whole_of(run), run):
             if each in self.open and self._stop(each, author, stop_id):
                 return [each]
@@ -310,8 +309,7 @@ class ExecutionService:
         return True
 
     async def pause(self, run: str, author: Author) -> Run:
-        """Pause a run. Raise NotFound if there is no such run, Conflict if it cannot be paused now,
-        Unavailable if the message could not be sent."""
+        """Pause a run. Raise NotFound, Conflict if it cannot be paused, Unavailable if not sent."""
         return await interventions.pause(_no_piece(await self._movable(run)), author)
 
     async def resume(
@@ -342,10 +340,12 @@ class ExecutionService:
         self, run: str, body: bytes, author: Author, identity: Identity | None = None
     ) -> Run:
         """Give a run another version of its graph; `body` is an encoded ModifyRequest. Raise
-        NotFound if there is no such run, what `interventions.modify` raises, and Forbidden or Conflict
-        if the author may not start on its robot."""
+        NotFound if there is no such run, Forbidden or Conflict if the author may not start on its
+        robot, and what `interventions.modify` raises."""
         opened = _no_piece(await self._movable(run))
-        self._require_rights(opened.run, author, identity)
+        by = identity or _operator(author)
+        self.rights.act(by)
+        self.rights.require(opened.run.robots, by, only=OF_PEOPLE)
         engine = self.robots.link(opened.run.engine)
         return await interventions.modify(
             opened,
@@ -356,7 +356,7 @@ class ExecutionService:
             run_in_worker=self._runtime.run_in_worker,
             require=partial(self._require_rights, opened.run, author, identity),
             sight=self.sight,
-            identity=identity or _operator(author),
+            identity=by,
         )
 
     async def go_on(
@@ -414,8 +414,8 @@ class ExecutionService:
     ) -> Run:
         """Hand a led run over to a person who has a page open, with all batons of its robots. It
         goes on, unless it is held. Raise NotFound if there is no such run, Conflict or Forbidden if the
-        author does not hold these batons or the other person may not start on one of its robots,
-        Unavailable if it could not be stored: then it is held."""
+        author lacks a baton or the other person may not start on a robot of it, Unavailable if it
+        could not be stored: then it is held."""
         opened = await self._movable(run)
         if opened.run.led is None:
             raise Conflict("Only a run that is led has further starts to hand over.")

@@ -22,6 +22,8 @@ from action_assistant.web.auth.roles import Permission
 RightCode: TypeAlias = Literal[
     "service", "right", "baton", "confirm", "watched", "drill", "released"
 ]
+#: Those that concern the person alone, whatever is started.
+OF_PEOPLE: Final[frozenset[RightCode]] = frozenset({"service", "right", "baton", "confirm"})
 #: How a baton came to another person, or to nobody.
 BatonChange: TypeAlias = Literal["taken", "handed", "forced", "dropped", "fell", "off"]
 _NAMED: Final = 4
