@@ -404,13 +404,13 @@ def test_every_route_says_how_it_treats_hidden_runs(ruled: RunnerProcess) -> Non
     assert listed - described == {"/api/live"}
 
 
-#: Contents of files for which msgspec raises three different errors, and none that is of its own for two.
+#: Contents of files for each of which msgspec raises another error.
 DAMAGED = [b"{", b'{"id":"\xff","session":"\xff","at":"\xff"}', b'{"x":' + b"[" * 100_000]
 
 
 @pytest.mark.parametrize("content", DAMAGED, ids=["cut off", "not UTF-8", "nested"])
 def test_no_damaged_file_keeps_anybody_from_stopping(ruled: RunnerProcess, content: bytes) -> None:
-    """Each file that is read for a person, by POST in each form and by the socket."""
+    """By POST the person whose files are damaged, by the socket another one: rules are for all."""
     session = KEYS.new_session("Dan", role="owner", personal=True)
     cookie = f"aa_8000={KEYS.sealed(session)}"
     dan = Who(session.person.id, {"cookie": cookie, "origin": ORIGIN})
@@ -425,7 +425,7 @@ def test_no_damaged_file_keeps_anybody_from_stopping(ruled: RunnerProcess, conte
         for file in (*files, rules):
             file.parent.mkdir(exist_ok=True)
             file.write_bytes(content)
-        with dan.client(ruled) as client, dan.live(ruled) as socket:
+        with dan.client(ruled) as client, PEOPLE["viewer"].live(ruled) as socket:
             socket.send(json.dumps({"type": "stop", "run": runs[0], "stop_id": "d"}))
             answers = [client.post(f"/api/runs/{runs[1]}/stop"), client.post("/api/stop")]
             told = json.loads(socket.recv(timeout=10))
