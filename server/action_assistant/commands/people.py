@@ -1,7 +1,8 @@
 """`people`: persons, their links, and links of groups; `link`: the owner's own."""
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Final, get_args
 
 import msgspec
@@ -211,7 +212,12 @@ def _end_person(options: argparse.Namespace) -> int:
                 raise RequestRefused(f"No person is called {options.person!r}.")
             person = meant[0].id
             server.editor("POST", f"/api/members/{person}/end")
-            server.runner("POST", "/api/revocations", json={"person": person})
+            try:
+                server.runner("POST", "/api/revocations", json={"person": person})
+            except (RequestRefused, CannotStart) as error:
+                raise RequestRefused(
+                    f"Ended, but a runner with a data folder of its own has not been told: {error}"
+                ) from error
     except CannotStart as silent:
         data = options.data.resolve()
         if options.url or not data.is_dir():
@@ -223,13 +229,28 @@ def _end_person(options: argparse.Namespace) -> int:
             raise CannotStart(
                 f"{silent} No person in {data} is called {options.person!r}."
             ) from silent
-        try:
-            for each in persons:
-                Revocations(own_folder(data)).end_person(each.id)
-        except Refused as error:
-            raise CannotStart(f"{silent} {error}") from error
+        marks = Revocations(own_folder(data))
+        failed = [why for each in persons if (why := _refusal(marks.end_person, each.id))]
+        if failed:
+            raise CannotStart(f"{silent} {failed[0]}") from silent
+        print(
+            one_line(
+                f"No server answers; {options.person} is ended in the data folder, for good. A runner "
+                "with a data folder of its own has not been told."
+            )
+        )
+        return 0
     print(one_line(f"{options.person} is out on all devices, for good."))
     return 0
+
+
+def _refusal(act: Callable[[str], object], id_: str) -> str:
+    """Return why an act about this id was refused; "" if it was done."""
+    try:
+        act(id_)
+    except Refused as error:
+        return error.detail
+    return ""
 
 
 def _confirm_person(options: argparse.Namespace) -> int:
@@ -249,9 +270,18 @@ def _confirm_person(options: argparse.Namespace) -> int:
     if len({each.person.id for each in found}) > 1:
         ids = ", ".join(sorted({each.person.id for each in found}))
         raise CannotStart(f"Several people are called {options.person!r}: say which one: {ids}.")
-    for each in found:
-        confirmations.confirm(each.id, "command")
-        print(one_line(f"{each.id}  {each.browser or 'a browser'}, since {each.since:%Y-%m-%d}"))
+    confirm = partial(confirmations.confirm, how="command", is_stored=True)
+    outcomes = [(each, _refusal(confirm, each.id)) for each in found]
+    for each, why in outcomes:
+        said = f"  NOT CONFIRMED: {why}" if why else ""
+        since = f"{each.since:%Y-%m-%d}"
+        print(one_line(f"{each.id}  {each.browser or 'a browser'}, since {since}{said}"))
+    number = sum(bool(why) for _, why in outcomes)
+    if number:
+        raise RequestRefused(
+            f"{options.person} is not confirmed on {number} of {len(found)} devices: "
+            f"{next(why for _, why in outcomes if why)}"
+        )
     print(one_line(f"{options.person} is confirmed on these devices now."))
     return 0
 

@@ -17,7 +17,7 @@ from typing import Annotated, Final, Literal, NamedTuple, TypeAlias
 
 import msgspec
 
-from action_assistant.errors import BadInput, Unauthenticated
+from action_assistant.errors import BadInput, Unauthenticated, Unavailable
 from action_assistant.private_files import (
     DamagedFile,
     FileState,
@@ -98,14 +98,17 @@ class Confirmations:
         self._monotonic = monotonic
         self._known: dict[str, _Known] = {}
 
-    def confirm(self, session_id: str, how: ConfirmedBy) -> Confirmation:
+    def confirm(
+        self, session_id: str, how: ConfirmedBy, *, is_stored: bool = False
+    ) -> Confirmation:
         """Keep that the person of a session is confirmed now, and return the sealed record of that,
-        for other runners. Raise ValueError for a malformed id."""
+        for other runners. Raise ValueError for a malformed id. With `is_stored` raise Unavailable if
+        the file could not be written: then only this process knows of it."""
         if _ID.fullmatch(session_id) is None:
             raise ValueError(f"{session_id!r} is no id of a session")
         plain = Confirmation(session_id, self._clock(), how, "")
         made = msgspec.structs.replace(plain, seal=self._seal(plain))
-        self._keep(made)
+        self._keep(made, is_stored=is_stored)
         return made
 
     def adopt(self, given: Confirmation) -> None:
@@ -173,8 +176,8 @@ class Confirmations:
                 if self._clock() - path.stat().st_mtime > LONGEST_S:
                     path.unlink(missing_ok=True)
 
-    def _keep(self, made: Confirmation) -> None:
-        """Keep a confirmation in memory and as a file. A full disk is no error."""
+    def _keep(self, made: Confirmation, *, is_stored: bool = False) -> None:
+        """Keep a confirmation in memory and as a file. A full disk is an error with `is_stored` only."""
         self._remember(made.session, self._known_now(made))
         path = self._path(made.session)
         part = self._folder / f"{made.session}.{random_id()}.part"  # both processes may write
@@ -183,6 +186,10 @@ class Confirmations:
             keep_damaged(path, Confirmation)
             replace_file(path, msgspec.json.encode(made), part=part, is_durable=False)
         except OSError as error:
+            if is_stored:
+                raise Unavailable(
+                    f"The confirmation could not be written to {self._folder}: {error.strerror}."
+                ) from error
             log.warning("a confirmation could not be kept in %s: %s", self._folder, error.strerror)
 
     def _remember(self, session_id: str, known: _Known) -> None:
