@@ -1,6 +1,7 @@
 """Tokens and sealed sessions."""
 
 import base64
+import contextlib
 import stat
 import subprocess
 import sys
@@ -12,9 +13,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from action_assistant.errors import CannotStart
+from action_assistant.errors import CannotStart, Unauthenticated
+from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, Person, Session
+from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.roles import Role
+from action_assistant.web.auth.session_files import SessionFiles
+from action_assistant.web.auth.tokens import TokenFiles
+from action_assistant.web.auth.view_links import ViewLinks
 
 KEYS = Keys("k" * 43)
 
@@ -110,3 +116,38 @@ def test_the_environment_may_give_the_token(
 def test_a_token_that_can_be_guessed_is_refused() -> None:
     with pytest.raises(CannotStart, match="at least 32"):
         Keys("secret")
+
+
+def test_nothing_that_lets_in_lasts_longer_when_the_clock_is_set_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    keys, revoked, now = Keys("t" * 40), Revocations(tmp_path), time.time()
+    session = keys.new_session("Mari", role="operator", personal=True, seconds=3600)
+    browsers = SessionFiles(tmp_path, revoked)
+    browsers.note(session)
+    tokens = TokenFiles(tmp_path, keys, revoked)
+    text = tokens.make(Identity(session.person), "nightly", ["read"], days=1).token
+    views = ViewLinks(tmp_path, keys, revoked, "run")
+    link = views.make("r1", "", 1, session.person).path.partition("=")[2]
+
+    def let_in() -> tuple[bool, bool, bool]:
+        cookie, token = keys.session(keys.sealed(session)), tokens.opens(text)
+        assert cookie is not None
+        assert token is not None
+        with contextlib.suppress(Unauthenticated):
+            views.opens(link)
+            return not cookie.expired, not token.expired, True
+        return not cookie.expired, not token.expired, False
+
+    assert let_in() == (True, True, True)
+    monkeypatch.setattr(time, "time", lambda: now - 120)  # of another computer
+    assert let_in() == (True, True, True)
+    monkeypatch.setattr(time, "time", lambda: now - 7200)
+    assert let_in() == (False, False, False)
+    used = SessionFiles(tmp_path, revoked).used_at(session)
+    assert used is not None
+    assert used <= now - 7200  # so that it is idle after the same time as others
+    assert list((tmp_path / "sessions").iterdir())
+    browsers.every()
+    monkeypatch.setattr(time, "time", lambda: now)
+    assert [each.id for each in browsers.every()] == [session.id]

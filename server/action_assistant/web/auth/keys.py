@@ -25,6 +25,8 @@ from action_assistant.web.auth.roles import OWNER, Role
 METRICS: Final = "/metrics"
 TOKEN_FILE: Final = "token"
 SESSION_SECONDS: Final = 30 * 24 * 3600
+#: Seconds by which the clock of another computer may be ahead.
+SKEW_S: Final = 300.0
 _MIN_TOKEN: Final = 32  # characters; the tokens made here have 43 (256 bit)
 
 
@@ -58,8 +60,10 @@ class Session(msgspec.Struct, frozen=True):
 
     @property
     def expired(self) -> bool:
-        """Return whether the session has expired: it then allows nothing but Stop."""
-        return time.time() >= self.expires
+        """Return whether the session has expired: it then allows nothing but Stop. So has one that
+        begins later than now: the clock was set back, and nobody knows for how long it lasts."""
+        now = time.time()
+        return now >= self.expires or self.begun > now + SKEW_S
 
 
 class Sealed(msgspec.Struct, frozen=True, array_like=True):

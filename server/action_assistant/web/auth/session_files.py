@@ -24,7 +24,7 @@ from action_assistant.private_files import (
     read_json,
     replace_file,
 )
-from action_assistant.web.auth.keys import SESSION_SECONDS, Person, Session
+from action_assistant.web.auth.keys import SESSION_SECONDS, SKEW_S, Person, Session
 from action_assistant.web.auth.revocations import Revocations
 
 log: Final = logging.getLogger(__name__)
@@ -105,7 +105,7 @@ class SessionFiles:
         """Note that the session with this id is used now, at most once a minute. A full disk is no
         error."""
         now = time.time()
-        if now - self._used.get(session, 0.0) < _USE_S:
+        if 0 <= now - self._used.get(session, 0.0) < _USE_S:
             return
         if len(self._used) >= _MOST:
             self._used.clear()
@@ -115,15 +115,21 @@ class SessionFiles:
 
     def used_at(self, session: Session) -> float | None:
         """Return when a session was last used, in seconds since 1970, by either process; None if
-        that is unknown."""
-        mine = self._used.get(session.id)
-        if mine is not None and time.time() - mine < _USE_S:
+        that is unknown. A use that is dated later than now counts from now on: the clock was set
+        back."""
+        mine, now = self._used.get(session.id), time.time()
+        if mine is not None and 0 <= now - mine < _USE_S:
             return mine
         try:
             noted = self._path(session.id).stat().st_mtime
         except (OSError, ValueError):
             return mine
-        return noted if mine is None else max(noted, mine)
+        if noted > now + SKEW_S:
+            self._used.pop(session.id, None)
+            with contextlib.suppress(OSError):
+                os.utime(self._path(session.id))
+            return now
+        return noted if mine is None else max(noted, min(mine, now))
 
     def every(self) -> list[OpenSession]:
         """Return the sessions that are still valid, newest first, and delete the files of those
@@ -135,9 +141,9 @@ class SessionFiles:
                 session = _read(path)
                 if session is None:
                     continue
-                if session.expired or self._revoked.ends(session):
+                if time.time() >= session.expires or self._revoked.ends(session):
                     self._forget(path)
-                elif not self._is_over(session):
+                elif not (session.expired or self._is_over(session)):
                     found.append(self._shown(session))
         return sorted(found, key=lambda each: each.expires, reverse=True)
 

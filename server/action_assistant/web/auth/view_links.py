@@ -34,7 +34,7 @@ from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.web.auth.access import over_view
 from action_assistant.web.auth.identity import View, ViewKind
-from action_assistant.web.auth.keys import Keys, PersonRef
+from action_assistant.web.auth.keys import SKEW_S, Keys, PersonRef
 from action_assistant.web.auth.revocations import Revocations
 
 log: Final = logging.getLogger(__name__)
@@ -110,7 +110,7 @@ class ViewLinks:
         if record is None or not hmac.compare_digest(secret, self._secret(record)):
             raise Unauthenticated("This link is not known here. Ask for another one.")
         view = View(record.id, record.kind, record.thing, record.expires.timestamp())
-        if view.expired:
+        if view.expired or record.made_at.timestamp() > time.time() + SKEW_S:  # it was set back
             raise over_view(is_revoked=False)
         return view
 
