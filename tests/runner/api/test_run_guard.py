@@ -383,6 +383,12 @@ def test_rules_outlive_the_process_and_a_file_that_cannot_be_read_hides_all(
     database.close()
     ruled.start()
     assert hidden() == before
+    with PEOPLE["editor"].client(
+        ruled
+    ) as client:  # nothing of the body is lost while the rules are read
+        marks = {"note": "seen later"}
+        answer = client.patch(f"/api/runs/{runs.visible['plain']}/marks", json=marks, timeout=20)
+        assert answer.status_code == 200
     ruled.end()
     file = ruled.data / "graph-rules.json"
     kept = file.read_bytes()

@@ -292,7 +292,11 @@ class Access:
         identity: Identity | None = scope["state"].get("identity")
         if identity is not None and identity.person is _SCRAPER:
             identity = None  # as nobody: there is nothing else to be found out
-        asked = receive if scope["type"] == ScopeType.HTTP else None
+        asked: Receive | None = None
+        if scope["type"] == ScopeType.HTTP:
+            receive, asked = _after_body(
+                receive, has_body=headers.get("content-length", "0") != "0"
+            )
         view: View | None = scope["state"].get("view")
         if identity is not None:
             scope["state"].get(KNOWN, _nobody)(identity.person.id)
@@ -535,6 +539,27 @@ class Access:
             await send(message)
 
         return dressed
+
+
+def _after_body(receive: Receive, *, has_body: bool) -> tuple[Receive, Receive]:
+    """Return two functions for the messages of one request: for its route, and for whoever waits
+    until its client has disconnected. The latter takes nothing of the body, which a guard that works
+    for long would lose: it waits until the route has read it."""
+    is_read = anyio.Event()
+    if not has_body:
+        is_read.set()
+
+    async def for_route() -> Any:
+        message = await receive()
+        if not message.get("more_body", False):
+            is_read.set()
+        return message
+
+    async def after_body() -> Any:
+        await is_read.wait()
+        return await receive()
+
+    return for_route, after_body
 
 
 def _caller(identity: Identity, receive: Receive | None) -> Caller:
