@@ -63,9 +63,13 @@ def test_graphs_from_before_kill_9_are_served_after_it(tmp_path: Path) -> None:
     with product.editor() as editor:
         made = editor.post("/api/graphs", json={"name": "patrol"}).json()
     product.kill()
+    lost = product.cli("stop", "--all", "--data", str(product.data))
+    assert lost.returncode == 2
+    assert f"The last one, at {product.url}, was killed." in lost.stderr
     product.start()
     with product.editor() as editor:
         assert editor.get(f"/api/graphs/{made['id']}").json()["name"] == "patrol"
+    assert product.cli("stop", "--all", "--data", str(product.data)).returncode == 0
     assert product.end() == 0
 
 

@@ -203,6 +203,14 @@ def port(environ: Mapping[str, str] = os.environ) -> int:
     return int(text)
 
 
+def port_number(text: str) -> int:
+    """Parse the number of a port. Raise ValueError for another text."""
+    number = int(text)
+    if not 0 < number < 65536:
+        raise ValueError
+    return number
+
+
 def share(environ: Mapping[str, str] = os.environ) -> str:
     """Return how ACTION_ASSISTANT_SHARE lets others on the network in: "" (not at all), "http" or
     "tls". Raise CannotStart for other values."""

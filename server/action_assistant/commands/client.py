@@ -10,7 +10,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, TypeVar
+from urllib.parse import urlsplit
 
 import msgspec
 
@@ -18,6 +19,7 @@ from action_assistant import paths, settings
 from action_assistant.commands.stored_tokens import StoredToken, stored_token
 from action_assistant.errors import CannotStart, RequestRefused
 from action_assistant.logs import say
+from action_assistant.system.served_addresses import ServedAddress, served_address
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.token_text import token_id
 from action_assistant.web.network.certificate import Certificate
@@ -51,23 +53,49 @@ def add_server(parser: argparse.ArgumentParser, example: str) -> None:
     """Add the options by which a command finds its server, and an example (its arguments) to the
     help."""
     parser.epilog = f"example: {parser.prog} {example}".rstrip()
-    parser.add_argument(
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
         "--url",
         "--server",
         metavar="URL",
-        help="of the editor, or the public address of a server (default: the editor's port here)",
+        help="of the editor, or the public address of a server (default: that of the data folder)",
+    )
+    which.add_argument(
+        "--port", type=settings.port_number, metavar="N", help="of an editor on this computer"
     )
     parser.add_argument(
-        "--data", type=Path, default=paths.data(), metavar="DIR", help="that holds the token"
+        "--data",
+        type=Path,
+        default=paths.data(),
+        action=_NamedFolder,
+        metavar="DIR",
+        help="of the server, or that holds a token for it",
     )
+    parser.set_defaults(folder_is_named=False)
+
+
+class _NamedFolder(argparse.Action):
+    """Stores `--data`, and that it was given."""
+
+    def __call__(
+        self, parser: argparse.ArgumentParser, found: argparse.Namespace, value: Any, *_: object
+    ) -> None:
+        found.data = value
+        found.folder_is_named = True
+
+
+def names_server(options: argparse.Namespace) -> bool:
+    """Return whether the options of a command name its server by an address."""
+    return options.url is not None or options.port is not None
 
 
 class Server:
-    """A client of a running editor and its runner."""
+    """A client of a running editor and its runner. `no_editor`: why no request reaches an editor."""
 
-    def __init__(self, editor: "httpx.Client", runner_url: str) -> None:
+    def __init__(self, editor: "httpx.Client", runner_url: str, no_editor: str = "") -> None:
         self._client = editor
         self._runner_url = runner_url
+        self._no_editor = no_editor
 
     @property
     def url(self) -> str:
@@ -77,6 +105,8 @@ class Server:
     def editor(self, method: str, path: str, **body: Any) -> "httpx.Response":
         """Send a request to the editor, wait for the answer and return it. `body`: further
         arguments of httpx. Raise RequestRefused, with one sentence, if it is refused."""
+        if self._no_editor:
+            raise CannotStart(self._no_editor)
         return request(self._client, method, path, **body)
 
     def runner(self, method: str, path: str, **body: Any) -> "httpx.Response":
@@ -131,6 +161,69 @@ def sentence(answer: "httpx.Response") -> str:
         return f"{answer.request.url} answered {answer.status_code}."
 
 
+class _Found(NamedTuple):
+    """The place of a server. `url`: of the editor, or of a runner that serves a folder alone;
+    `runner`: of the runner, as far as the data folder says it. `supposed`: nobody has named the URL.
+    """
+
+    url: str
+    runner: str | None
+    supposed: bool
+    no_editor: str = ""
+
+
+def _found(options: argparse.Namespace, trust: ssl.SSLContext) -> _Found:
+    """Find the server that a command is meant for: that of its URL or port, else the one that serves
+    its data folder, else what the environment names. Raise CannotStart if a data folder was named
+    whose server is not known, so that no other server is asked."""
+    from_environment = None if options.folder_is_named else os.environ.get("ACTION_ASSISTANT_URL")
+    if named := options.url or (from_environment if options.port is None else None):
+        return _Found(named, None, supposed=False)
+    data = options.data.resolve()
+    addresses = [served_address(data, "editor"), served_address(data, "runner")]
+    editor, runner = (each if each is not None and each.lives else None for each in addresses)
+    first = editor or runner
+    if options.port is not None:
+        if first is None or not options.folder_is_named:
+            return _Found(_at_port(options.port, trust), None, supposed=True)
+        if editor is None or urlsplit(editor.url).port != options.port:
+            raise CannotStart(
+                f"{data} is not served at port {options.port} but at {first.url}: leave --port out."
+            )
+    if first is not None:
+        return _served(data, first, editor, runner)
+    ended = next((each for each in addresses if each is not None), None)
+    if ended is not None or (options.folder_is_named and _is_of_a_server(data)):
+        last = f" The last one, at {ended.url}, was killed." if ended is not None else ""
+        raise CannotStart(
+            f"No server serves {data} now, as far as the folder says, so nothing was sent to any "
+            f"server.{last} Name one of an older version, or on another computer, with --port or --url."
+        )
+    named = os.environ.get("ACTION_ASSISTANT_URL")
+    url = named or _at_port(settings.port(), trust)
+    return _Found(url, None, supposed=not named)
+
+
+def _served(
+    data: Path, first: ServedAddress, editor: ServedAddress | None, runner: ServedAddress | None
+) -> _Found:
+    """Return the place of the server that serves a folder. `first`: the editor if it lives, else the
+    runner. Raise CannotStart if its address is not valid here."""
+    if not all(each.is_here for each in (editor, runner) if each is not None):
+        raise CannotStart(
+            f"{data} is served at {first.url} in a container with a network of its own, or on another "
+            "computer. Run the command there, or name the server with --url."
+        )
+    no_editor = "" if editor is not None else f"No editor serves {data} now."
+    runner_url = None if runner is None else runner.url
+    return _Found(first.url, runner_url, supposed=True, no_editor=no_editor)
+
+
+def _is_of_a_server(data: Path) -> bool:
+    """Return whether a folder is the data folder of a server, and not only one with a token."""
+    return any((data / name).exists() for name in ("editor.db", "editor.database", "runner.db"))
+
+
 @contextmanager
 def running(options: argparse.Namespace, *, without_editor: bool = False) -> Iterator[Server]:
     """Yield a client, with the token, of the server that the options name. `without_editor`: where
@@ -138,12 +231,14 @@ def running(options: argparse.Namespace, *, without_editor: bool = False) -> Ite
     CannotStart if the server is not reached or not proven, RequestRefused if it refuses the token."""
     import httpx
 
-    with httpx.Client(**reach(options)) as client:
-        yield Server(client, _runner_url(client, options, without_editor=without_editor))
+    found = _found(options, _trust(options))
+    with httpx.Client(**_reach(options, found)) as client:
+        runner = found.runner or _runner_url(client, options, found, without_editor=without_editor)
+        yield Server(client, runner, found.no_editor)
 
 
 def _runner_url(
-    client: "httpx.Client", options: argparse.Namespace, *, without_editor: bool = False
+    client: "httpx.Client", options: argparse.Namespace, found: _Found, *, without_editor: bool
 ) -> str:
     """Return the URL of the runner. With a token that has expired the editor does not say it, and the
     one that was known at the login counts: such a token may still stop."""
@@ -156,14 +251,14 @@ def _runner_url(
             raise
         return stored.runner_url
     except CannotStart:
-        beside = _runner_beside(client.base_url, options) if without_editor else None
+        beside = _runner_beside(client.base_url, options, found) if without_editor else None
         if beside is None:
             raise
         return beside
     return url
 
 
-def _runner_beside(editor: "httpx.URL", options: argparse.Namespace) -> str | None:
+def _runner_beside(editor: "httpx.URL", options: argparse.Namespace, found: _Found) -> str | None:
     """Return the URL of the runner beside an editor that does not answer: the one that was known at
     the login, else the port after the editor's. Return None for an editor without a port in its
     URL, as behind a proxy, where nobody has signed in."""
@@ -173,7 +268,7 @@ def _runner_beside(editor: "httpx.URL", options: argparse.Namespace) -> str | No
     if editor.port is None:
         return None
     url = editor.copy_with(port=editor.port + 1)
-    if not _named(options):  # no editor was there to tell whether it speaks TLS
+    if found.supposed:  # no editor was there to tell whether it speaks TLS
         url = url.copy_with(scheme=_scheme(editor.port + 1, _trust(options)))
     return str(url).rstrip("/")
 
@@ -184,21 +279,25 @@ def reach(options: argparse.Namespace) -> dict[str, Any]:
 
     The client sends a token only after the server has proven that it knows the token: that of the
     environment or of the data folder, else the one that `login` has stored for this server. Raise
-    CannotStart if there is no token that can be read.
+    CannotStart if there is no token that can be read, or the server is not known.
     """
+    found = _found(options, _trust(options))
+    if found.no_editor:
+        raise CannotStart(found.no_editor)
+    return _reach(options, found)
+
+
+def _reach(options: argparse.Namespace, found: _Found) -> dict[str, Any]:
     from action_assistant.commands.token_proof import AfterProof
 
-    data = options.data.resolve()
-    named, trust = _named(options), _trust(options)
-    url = named or _here(trust)
-    stored = _given(url)
-    keys = _keys(data, url, stored)
+    stored = _given(found.url)
+    keys = _keys(options.data.resolve(), found.url, stored)
     return {
-        "base_url": url,
-        "auth": AfterProof(keys, stored, supposed=not named),
+        "base_url": found.url,
+        "auth": AfterProof(keys, stored, supposed=found.supposed),
         "timeout": 30,
         "trust_env": False,
-        "verify": trust,
+        "verify": _trust(options),
     }
 
 
@@ -234,18 +333,13 @@ def _keys(data: Path, url: str, stored: StoredToken | None) -> Keys | None:
         raise CannotStart(f"{error} Or sign in: `action-assistant login {url}`.") from error
 
 
-def _named(options: argparse.Namespace) -> str | None:
-    return options.url or os.environ.get("ACTION_ASSISTANT_URL")
-
-
 def _trust(options: argparse.Namespace) -> ssl.SSLContext:
     return Certificate(options.data.resolve()).trusting_too()
 
 
-def _here(trust: ssl.SSLContext) -> str:
-    """Return the URL of the server on this computer, http or https, which is tried. `trust`: the
-    certificates to accept."""
-    port = settings.port()
+def _at_port(port: int, trust: ssl.SSLContext) -> str:
+    """Return the URL of what listens at a port of this computer, http or https, which is tried.
+    `trust`: the certificates to accept."""
     return f"{_scheme(port, trust)}://127.0.0.1:{port}"
 
 

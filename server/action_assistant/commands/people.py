@@ -12,6 +12,7 @@ from action_assistant.commands.client import (
     add_server,
     command,
     decoded,
+    names_server,
     print_json,
     running,
 )
@@ -146,7 +147,7 @@ def _link_person(options: argparse.Namespace) -> int:
             return _link_at(server, options)
     except CannotStart:
         data = options.data.resolve()
-        if options.url or not data.is_dir():
+        if names_server(options) or not data.is_dir():
             raise
         from action_assistant.editor.people.members import make_offline
 
@@ -220,7 +221,7 @@ def _end_person(options: argparse.Namespace) -> int:
                 ) from error
     except CannotStart as silent:
         data = options.data.resolve()
-        if options.url or not data.is_dir():
+        if names_server(options) or not data.is_dir():
             raise
         from action_assistant.editor.people.members import known_offline
 
@@ -317,7 +318,7 @@ def _revoke(options: argparse.Namespace) -> int:
             return _revoke_at(server, options.id)
     except CannotStart as silent:
         data = options.data.resolve()
-        if options.url or not data.is_dir():
+        if names_server(options) or not data.is_dir():
             raise
         try:
             Revocations(own_folder(data)).add(options.id)

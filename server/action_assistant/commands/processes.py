@@ -40,7 +40,7 @@ def _add_editor(editor: argparse.ArgumentParser) -> None:
     _sharing(editor)
     _logging(editor)
     editor.add_argument(
-        "--runner-port", type=port_number, metavar="N", help="default: the next port"
+        "--runner-port", type=settings.port_number, metavar="N", help="default: the next port"
     )
     editor.set_defaults(handler=_editor)
 
@@ -53,7 +53,7 @@ def _add_runner(runner: argparse.ArgumentParser) -> None:
     _index_folders(runner)
     _logging(runner)
     runner.add_argument(
-        "--page-port", type=port_number, metavar="N", help="default: the port before"
+        "--page-port", type=settings.port_number, metavar="N", help="default: the port before"
     )
     runner.set_defaults(handler=_runner)
 
@@ -63,13 +63,6 @@ COMMANDS: Final = {
     "editor": _add_editor,
     "runner": _add_runner,
 }
-
-
-def port_number(text: str) -> int:
-    number = int(text)
-    if not 0 < number < 65536:
-        raise ValueError
-    return number
 
 
 def _backups(parser: argparse.ArgumentParser) -> None:
@@ -100,7 +93,7 @@ def _address(parser: argparse.ArgumentParser, *, port: int) -> None:
         help="default: 127.0.0.1; with --share every address of this computer",
     )
     parser.add_argument(
-        "--port", type=port_number, default=port, metavar="N", help="default: %(default)s"
+        "--port", type=settings.port_number, default=port, metavar="N", help="default: %(default)s"
     )
 
 
@@ -289,6 +282,7 @@ def _backup_plan(options: argparse.Namespace) -> "BackupPlan | None":
 def _editor(options: argparse.Namespace) -> int:
     gc.disable()  # until it listens: what is loaded by then stays
     from action_assistant.editor.app import create_app
+    from action_assistant.system.served_addresses import published
     from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
@@ -301,6 +295,7 @@ def _editor(options: argparse.Namespace) -> int:
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.port),
         direct=settings.direct_sockets(),
+        publish=lambda url: published(data, "editor", url),
     )
     return 0
 
@@ -308,6 +303,7 @@ def _editor(options: argparse.Namespace) -> int:
 def _runner(options: argparse.Namespace) -> int:
     gc.disable()  # until it listens: what is loaded by then stays
     from action_assistant.runner.app import create_app
+    from action_assistant.system.served_addresses import published
     from action_assistant.web.server.listen import serve as listen
 
     data = settings.data_folder(options.data.resolve())
@@ -336,5 +332,6 @@ def _runner(options: argparse.Namespace) -> int:
         proxies=chosen.reached.proxies,
         identity=_identity(chosen, chosen.page_port),
         direct=settings.direct_sockets(),  # for a fair order of its sockets; none is taken over
+        publish=lambda url: published(data, "runner", url),
     )
     return 0

@@ -5,7 +5,7 @@ import sys
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -289,7 +289,7 @@ def _stop(options: argparse.Namespace) -> int:
     unconfirmed, for `options.wait` seconds at most; print each doubt that is left. Return 0 if
     nothing is in doubt, else 1. Raise RequestRefused if the Stop is refused, CannotStart if the
     server does not answer."""
-    with running(options, without_editor=True) as server:
+    with _reached_for_stop(options) as server:
         path = "/api/stop" if options.all else f"/api/runs/{options.run}/stop"
         asked = insisting(server, "POST", path)
         with _following():
@@ -318,6 +318,18 @@ def _stop(options: argparse.Namespace) -> int:
     for said in dict.fromkeys(ends):
         print(one_line(said))
     return 1 if doubts else 0
+
+
+@contextmanager
+def _reached_for_stop(options: argparse.Namespace) -> Iterator[Server]:
+    """Yield the server that a Stop is for. Raise CannotStart, with a sentence that nothing was
+    stopped, if it is not found."""
+    with ExitStack() as stack:
+        try:
+            server = stack.enter_context(running(options, without_editor=True))
+        except CannotStart as error:
+            raise CannotStart(f"NOTHING WAS STOPPED. {error} {_LOOK_AT_ROBOT}") from error
+        yield server
 
 
 @contextmanager

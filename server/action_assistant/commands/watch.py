@@ -387,7 +387,10 @@ async def _visit(options: argparse.Namespace, graph: str, watched: WatchedGraph)
     watched.enter()
     # Anew each time: while the server was away, anybody may have taken its place, and has to prove
     # itself before it is sent the token.
-    found = reach(options)
+    try:
+        found = reach(options)
+    except CannotStart as error:
+        return error
     # The answer to an upgrade has no body that ends; bodies of other answers are read by `_read`.
     auth = found["auth"]
     auth.requires_response_body = False

@@ -25,11 +25,12 @@ pwd: Final = _module("pwd")
 resource: Final = _module("resource")
 
 
-def lock_file(descriptor: int) -> bool:
+def lock_file(descriptor: int, *, shared: bool = False) -> bool:
     """Lock an open file until it is closed or the process ends; return False at once if another
-    process has locked it. Raise CannotStart if the system has no such locks."""
+    process has locked it. A `shared` lock gets along with others of its kind. Raise CannotStart if
+    the system has no such locks."""
     try:
-        _locking(descriptor, wait=False)
+        _locking(descriptor, wait=False, shared=shared)
     except OSError:
         return False
     return True
@@ -41,13 +42,14 @@ def wait_for_lock(descriptor: int) -> None:
     _locking(descriptor, wait=True)
 
 
-def _locking(descriptor: int, *, wait: bool) -> None:
+def _locking(descriptor: int, *, wait: bool, shared: bool = False) -> None:
     if fcntl is None:
         raise CannotStart(
             "This system has no file locks that this program knows, so it cannot keep a journal here: "
             "docs/installing.md says what works on Windows."
         )
-    fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    kind = fcntl.LOCK_SH if shared else fcntl.LOCK_EX
+    fcntl.flock(descriptor, kind | (0 if wait else fcntl.LOCK_NB))
 
 
 def user_id() -> int | None:

@@ -55,7 +55,7 @@ WHOLE: Final = frozenset(
 #: Files that are created again, or that belong to this data folder only.
 _OWN: Final = frozenset(
     {
-        *(f"{branch}.db" for branch in BRANCHES),
+        *(f"{branch}.{kind}" for branch in BRANCHES for kind in ("db", "address")),
         *("editor.mark", "editor.database", "open.html", ARCHIVE, RESTORING),
         confirmations.FOLDER,
         *(backup_state.FILE, before_upgrade.FOLDER),

@@ -29,7 +29,6 @@ from action_assistant.commands.doctor import (
     process_checks,
 )
 from action_assistant.commands.doctor.installation import Installation
-from action_assistant.commands.processes import port_number
 from action_assistant.errors import CannotStart
 from action_assistant.interpreter import Interpreter, for_runner
 from action_assistant.journal.sqlite import unchanged
@@ -147,7 +146,7 @@ def _add_doctor(doctor: argparse.ArgumentParser) -> None:
     doctor.add_argument("--host", default="127.0.0.1", metavar="H", help="default: %(default)s")
     doctor.add_argument(
         "--port",
-        type=port_number,
+        type=settings.port_number,
         metavar="N",
         help="of the editor; default: ACTION_ASSISTANT_PORT",
     )

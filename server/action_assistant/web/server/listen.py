@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager, ExitStack
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any, Final
 
@@ -58,11 +59,13 @@ def serve(
     identity: "TlsIdentity | None" = None,
     proxies: tuple[Network, ...] = (),
     direct: bool = False,
+    publish: Callable[[str], AbstractContextManager[None]] | None = None,
 ) -> None:
     """Bind `host` and `port`, then make the application and serve it until the process is told to
     end or its parent dies. `identity`: serve TLS with its certificate. `proxies`: addresses whose
-    forwarding headers are trusted. `direct`: let applications take over their sockets. Raise
-    CannotStart if the address is taken or unknown."""
+    forwarding headers are trusted. `direct`: let applications take over their sockets. `publish`:
+    entered with the URL for programs of this computer once the application is set up, and left when
+    it shuts down. Raise CannotStart if the address is taken or unknown."""
     sockets = bound(host, port)
     try:
         if identity is not None:
@@ -77,7 +80,7 @@ def serve(
     app = ActivityTracker(forwarded, connections)
     config = _configured(app, identity, direct=direct)
     logging.getLogger("uvicorn.error").addFilter(_shorten_error)
-    server = _Server(config, endings, connections)
+    server = _Server(config, endings, connections, publish)
     _end_with_parent(server)
     server.run(sockets=sockets)
     if not server.started:
@@ -313,11 +316,17 @@ class _Server(uvicorn.Server):
     """A server that ends streams before it waits for open requests."""
 
     def __init__(
-        self, config: uvicorn.Config, endings: StreamEndings, connections: Connections
+        self,
+        config: uvicorn.Config,
+        endings: StreamEndings,
+        connections: Connections,
+        publish: Callable[[str], AbstractContextManager[None]] | None,
     ) -> None:
         super().__init__(config)
         self._endings = endings
         self._connections = connections
+        self._publish = publish
+        self._published = ExitStack()
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         """Run the startup of the application, then accept connections on `sockets` by `Connections`
@@ -330,12 +339,27 @@ class _Server(uvicorn.Server):
         for listener in sockets or []:
             self._connections.listen(listener, self._protocol, self.config.ssl)
         self.started = True
+        self._publish_address(sockets or [])
         # What is there now stays: looking through it for garbage again and again costs a busy
         # process a fifth of its time.
         gc.collect()
         gc.freeze()
         gc.set_threshold(*_GARBAGE)
         gc.enable()
+
+    def _publish_address(self, sockets: list[socket.socket]) -> None:
+        """Publish the address of the first socket. Without that, commands need --port."""
+        if self._publish is None or not sockets:
+            return
+        url = _local_url(sockets[0], secure=self.config.ssl is not None)
+        try:
+            self._published.enter_context(self._publish(url))
+        except OSError as error:
+            log.error(
+                "the data folder cannot keep the address %s (%s): commands on this computer need --port",
+                url,
+                error.strerror,
+            )
 
     def _protocol(self) -> asyncio.Protocol:
         return _Http(
@@ -345,9 +369,17 @@ class _Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Shut down: end streams, close the listeners, and wait for open requests. uvicorn calls
         this once."""
+        self._published.close()
         self._endings.begin()
         self._connections.close()
         await super().shutdown(sockets)
+
+
+def _local_url(listener: socket.socket, *, secure: bool) -> str:
+    """Return the URL by which programs of this computer reach a listening socket."""
+    host, port = listener.getsockname()[:2]
+    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(host, host)
+    return f"{'https' if secure else 'http'}://{f'[{host}]' if ':' in host else host}:{port}"
 
 
 def _shorten_error(record: logging.LogRecord) -> bool:
