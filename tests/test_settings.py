@@ -32,6 +32,19 @@ def test_the_ports_are_those_that_the_environment_says(
     assert found["base_url"] == "http://127.0.0.1:9000"
 
 
+@pytest.mark.parametrize(("said", "seconds"), [("", 60.0), ("OFF", None), ("2.5", 2.5)])
+def test_the_environment_sets_how_long_an_editor_may_be_silent(
+    said: str, seconds: float | None
+) -> None:
+    assert settings.watchdog({"ACTION_ASSISTANT_WATCHDOG": said}) == seconds
+
+
+@pytest.mark.parametrize("said", ["0", "soon", "nan", "inf", "-5"])
+def test_an_impossible_patience_is_refused(said: str) -> None:
+    with pytest.raises(CannotStart, match="from 1 to 86400"):
+        settings.watchdog({"ACTION_ASSISTANT_WATCHDOG": said})
+
+
 @pytest.mark.parametrize(
     ("said", "share", "tls"), [("", False, False), ("http", True, False), ("TLS", True, True)]
 )

@@ -12,7 +12,9 @@ from typing import Any
 import psutil
 import pytest
 
-from action_assistant.supervisor import EndSignal
+from action_assistant import supervisor
+from action_assistant.interpreter import Interpreter
+from action_assistant.supervisor import Child, EndSignal, Watchdog
 from support.product import Product, running
 
 
@@ -47,6 +49,63 @@ def test_a_process_that_dies_comes_back_and_the_other_stays(tmp_path: Path, name
         assert product.process(name).pid != first.pid
         assert other.is_running()
         assert f"{name} died (SIGKILL)" in product.log.read_text()
+
+
+def test_a_frozen_editor_is_started_anew_and_a_frozen_runner_is_reported(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("ACTION_ASSISTANT_WATCHDOG", "2")
+    with running(tmp_path / "data") as product:
+        editor, runner = product.process("editor"), product.process("runner")
+        editor.suspend()
+        eventually(lambda: not editor.is_running(), 60)
+        product.wait_until_ready()
+        runner.suspend()
+        eventually(lambda: "NO STOP MAY ARRIVE" in product.log.read_text(), 60)
+        runner.resume()
+        eventually(lambda: "runner answers again" in product.log.read_text(), 60)
+        assert product.process("editor").pid != editor.pid
+        assert product.process("runner").pid == runner.pid
+        log = product.log.read_text()
+        assert "editor has not answered for 2 s; ending it" in log
+        assert "editor died (SIGKILL); starting it again" in log
+
+
+@pytest.fixture
+def said(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Lines that the supervisor writes."""
+    lines: list[str] = []
+    monkeypatch.setattr(supervisor, "say", lambda line, *_: lines.append(line))
+    return lines
+
+
+def watched(name: str) -> tuple[Child, Watchdog]:
+    """A process that was started once, and what watches it."""
+    child = Child(name, [], 1, Interpreter(path=Path(sys.executable), origin="this"), {})
+    child.starts = 1
+    return child, Watchdog(child, "http://127.0.0.1", None, 60)
+
+
+def test_a_start_that_takes_hours_is_no_silence(said: list[str]) -> None:
+    """Tables are changed before the first answer, also at a start in between."""
+    child, watchdog = watched("editor")
+    for _ in range(1_000):
+        watchdog.note(1, answers=False, seconds=10)
+    watchdog.note(1, answers=True, seconds=10)
+    child.starts = 2
+    for _ in range(1_000):
+        watchdog.note(2, answers=False, seconds=10)
+    assert said == []
+
+
+@pytest.mark.parametrize(("name", "lines"), [("editor", 2), ("runner", 10)])
+def test_silence_is_said_at_once_and_each_minute(name: str, lines: int, said: list[str]) -> None:
+    _, watchdog = watched(name)
+    watchdog.note(1, answers=True, seconds=10)
+    for _ in range(60):
+        watchdog.note(1, answers=False, seconds=10)
+    assert len(said) == lines
+    assert "not answered for 20 s" in said[0]
 
 
 def test_children_do_not_outlive_a_killed_serve(tmp_path: Path) -> None:

@@ -61,6 +61,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_OIDC_GROUPS_CLAIM": "the claim with the groups of a person (groups)",
     "ACTION_ASSISTANT_OIDC_NAME": "the provider's name on the button (the host of the issuer)",
     "ACTION_ASSISTANT_NOTIFICATIONS": "a TOML file that names receivers of messages by webhook and mail",
+    "ACTION_ASSISTANT_WATCHDOG": "seconds without an answer after which `serve` starts the editor anew "
+    "(60); `off` for never",
     "ACTION_ASSISTANT_LIMITS": "`off` lifts rate and socket limits, for load tests",
     "ACTION_ASSISTANT_SOCKETS": "`asgi` has the messages of rooms go the long way through ASGI, should the "
     "direct one fail",
@@ -84,6 +86,8 @@ ARCHIVE: Final = "archive"
 RESTORING: Final = "restore.unfinished"
 #: The longest life of a token of a program, in days, where no setting says otherwise.
 TOKEN_DAYS: Final = 365.0
+#: Seconds of silence after which `serve` starts the editor anew, where no setting says otherwise.
+WATCHDOG_S: Final = 60.0
 #: The host that stands for every address of this computer, of both families.
 EVERYWHERE: Final = "*"
 _MIN_TOKEN: Final = 32  # characters, as of the token that programs present
@@ -321,6 +325,23 @@ def limits(environ: Mapping[str, str] = os.environ) -> bool:
     """Return whether rates and numbers of sockets are limited: they are unless
     ACTION_ASSISTANT_LIMITS is `off`."""
     return environ.get("ACTION_ASSISTANT_LIMITS", "").lower() != "off"
+
+
+def watchdog(environ: Mapping[str, str] = os.environ) -> float | None:
+    """Return the seconds without an answer after which `serve` starts the editor anew; None if it
+    never does. Raise CannotStart for a text that is neither `off` nor a number from 1 to 86,400."""
+    text = environ.get("ACTION_ASSISTANT_WATCHDOG", "").strip().lower()
+    if text == "off":
+        return None
+    try:
+        seconds = float(text or WATCHDOG_S)
+    except ValueError:
+        seconds = 0.0
+    if not 1 <= seconds <= 86_400:
+        raise CannotStart(
+            f"ACTION_ASSISTANT_WATCHDOG is a number of seconds from 1 to 86400, or `off`, not {text!r}."
+        )
+    return seconds
 
 
 def direct_sockets(environ: Mapping[str, str] = os.environ) -> bool:

@@ -86,6 +86,18 @@ def is_ours(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> bool:
     return keys.proven(challenge, proof, at=at if _is_address(host.strip("[]")) else None)
 
 
+def is_alive(base: str, trust: ssl.SSLContext | None, seconds: float) -> bool:
+    """Return whether the process at the URL `base` answers anything within some seconds."""
+    try:
+        with _opener(trust).open(f"{base}/healthz", timeout=seconds):
+            return True
+    except urllib.error.HTTPError as refusal:
+        refusal.close()
+        return True
+    except (OSError, HTTPException):
+        return False
+
+
 def _is_address(host: str) -> bool:
     try:
         ipaddress.ip_address(host)

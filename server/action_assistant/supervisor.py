@@ -20,11 +20,12 @@ from action_assistant.private_files import opener
 from action_assistant.settings import (
     EVERYWHERE,
     INDEX_FOLDERS,
+    WATCHDOG_S,
     Reachability,
     as_index_folders,
     more_hosts,
 )
-from action_assistant.share_links import invitations_as_text, is_ours
+from action_assistant.share_links import invitations_as_text, is_alive, is_ours
 from action_assistant.web.auth.keys import Keys
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.server.sockets import bound
@@ -34,6 +35,11 @@ _STEADY: Final = 30.0  # seconds after which a process counts as healthy again
 _BACK_OFF: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # seconds before the n-th restart in a row
 _TICK: Final = 0.1
 _ENDING: Final = 8.0  # seconds that a process gets to end by itself
+_ASKED_EACH: Final = 5.0  # seconds between two questions whether a process answers, at most
+_SAID_AFTER: Final = 15.0  # seconds of silence after which it is said, at most
+_SAID_EACH: Final = 60.0  # seconds of silence between two lines about it
+#: What hangs and may be ended: the editor keeps nothing in memory that it has acknowledged.
+_ENDED_WHEN_SILENT: Final = frozenset({"editor"})
 
 
 class BackupPlan(msgspec.Struct, frozen=True):
@@ -61,6 +67,7 @@ class ServePlan(msgspec.Struct, frozen=True, kw_only=True):
     behaviours: Path | None = None
     backups: BackupPlan | None = None
     index_folders: Mapping[str, Path] = {}
+    watchdog: float | None = WATCHDOG_S
 
 
 class EndSignal:
@@ -105,8 +112,8 @@ class Child:
         self._arguments = arguments
         self._process: subprocess.Popen[bytes] | None = None
         self._deaths = 0
-        self._starts = 0
         self._born = 0.0
+        self.starts = 0
         self._again = 0.0  # when to start, by the monotonic clock
 
     def start(self, parent: int) -> None:
@@ -114,8 +121,10 @@ class Child:
         dies."""
         environment = {**self._interpreter.environment(os.environ), **self._settings}
         environment["_ACTION_ASSISTANT_PARENT"] = str(parent)
+        for name in ("NOTIFY_SOCKET", "WATCHDOG_USEC", "WATCHDOG_PID"):
+            environment.pop(name, None)  # the service manager hears this process alone
         self._born = time.monotonic()
-        self._starts += 1
+        self.starts += 1
         self._process = subprocess.Popen(
             [self._interpreter.path, "-m", "action_assistant", *self._arguments],
             env=environment,
@@ -138,13 +147,19 @@ class Child:
         self._process = None
         # The process has reported that it cannot start. Once both have worked, neither ends the other: a runner
         # stops robots while the editor's database is away.
-        if code == 2 and self._starts == 1:
+        if code == 2 and self.starts == 1:
             return code
         self._deaths = 1 if now - self._born > _STEADY else self._deaths + 1
         wait = _BACK_OFF[min(self._deaths, len(_BACK_OFF)) - 1]
         self._again = now + wait
         say(f"{self.name} died ({_cause(code)}); starting it again in {wait:g} s")
         return None
+
+    def kill(self) -> None:
+        """End the process at once, also one that hears no signal; `tend` will start it again."""
+        process = self._process
+        if process is not None:
+            process.kill()
 
     def end(self) -> None:
         """Ask the process to end, wait for that, and kill it if it takes too long."""
@@ -158,6 +173,70 @@ class Child:
             self._process.kill()
             self._process.wait()
         self._process = None
+
+
+class Watchdog:
+    """Notices a process that lives and does not answer: says so, and ends the editor after `limit`
+    seconds of silence, so that it is started anew.
+
+    Silence counts from an answer on, so a start that changes tables for hours is none. It is counted
+    in questions without an answer, each with the time that it may take at most, so the sleep of the
+    computer is none either.
+    """
+
+    def __init__(
+        self, child: Child, origin: str, trust: ssl.SSLContext | None, limit: float
+    ) -> None:
+        self._child = child
+        self._url = f"{origin}:{child.port}"
+        self._trust = trust
+        self._limit = limit
+        self._pause = min(_ASKED_EACH, limit / 4)
+        self._ends = child.name in _ENDED_WHEN_SILENT
+        self._starts = 0  # of the process that answered last
+        self._silent = 0.0
+        self._lines = 0  # that were written about this silence
+        self._first_line = min(_SAID_AFTER, limit / 2)
+
+    def run(self) -> None:
+        """Ask for ever; run it on a daemon thread, since an answer may take long."""
+        while True:
+            starts, asked = self._child.starts, time.monotonic()
+            answers = is_alive(self._url, self._trust, self._pause)
+            took = min(time.monotonic() - asked, self._pause)
+            self.note(starts, answers=answers, seconds=took + self._pause)
+            time.sleep(self._pause)
+
+    def note(self, starts: int, *, answers: bool, seconds: float) -> None:
+        """Take up whether the process answered a question. `starts`: how often it had been started
+        before the question; `seconds`: the time that the question counts."""
+        if answers:
+            if self._lines:
+                say(f"{self._child.name} answers again after {self._silent:.0f} s")
+            self._heard(starts)
+            return
+        if not self._starts == self._child.starts == starts:
+            return  # it has never answered since its start
+        self._silent += seconds
+        if self._ends and self._silent >= self._limit:
+            say(f"{self._child.name} has not answered for {self._silent:.0f} s; ending it", "error")
+            self._heard(0)
+            self._child.kill()
+        elif self._silent >= self._first_line + self._lines * _SAID_EACH:
+            self._lines += 1
+            say(self._sentence(), "error")
+
+    def _heard(self, starts: int) -> None:
+        self._starts, self._silent, self._lines = starts, 0.0, 0
+
+    def _sentence(self) -> str:
+        said = f"{self._child.name} has not answered for {self._silent:.0f} s"
+        if self._ends:
+            return f"{said}; it is started anew after {self._limit:g} s"
+        return (
+            f"{said}: NO STOP MAY ARRIVE. Use the robots' hardware stop. It is left alone, since it may "
+            "be stopping robots; end it yourself if it is not"
+        )
 
 
 def serve(plan: ServePlan) -> int:
@@ -176,6 +255,9 @@ def serve(plan: ServePlan) -> int:
     say("starting …")
     for child in children:
         child.start(reading)
+        if plan.watchdog is not None:
+            watchdog = Watchdog(child, _origin(plan), trust, plan.watchdog)
+            threading.Thread(target=watchdog.run, name=f"watch {child.name}", daemon=True).start()
     threading.Thread(
         target=_announce_page, args=(plan, keys, trust, children, enough), name="greet", daemon=True
     ).start()
@@ -281,8 +363,7 @@ def _announce_page(
 ) -> None:
     """Wait until both processes answer, then print the URL of the page and open it in a browser. Do
     nothing if the program is told to end (`enough`) before."""
-    here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"
-    origin = f"{'https' if plan.tls else 'http'}://{f'[{here}]' if ':' in here else here}"
+    origin = _origin(plan)
     if not _wait_for_answers(origin, keys, trust, children, enough):
         return
     base = f"{origin}:{plan.port}"
@@ -308,6 +389,12 @@ def _announce_page(
         say(invitations_as_text(base, keys, trust, secret=not at_terminal))
     if opens:
         webbrowser.open(redirect.as_uri())
+
+
+def _origin(plan: ServePlan) -> str:
+    """Return the scheme and host, without a port, at which this computer reaches both processes."""
+    here = plan.host if plan.host not in {"0.0.0.0", "::", "localhost", EVERYWHERE} else "127.0.0.1"
+    return f"{'https' if plan.tls else 'http'}://{f'[{here}]' if ':' in here else here}"
 
 
 def _wait_for_answers(

@@ -262,6 +262,7 @@ def _serve(options: argparse.Namespace) -> int:
             index_folders=settings.index_folders(options.index_folder),
             opens=not options.no_open,
             backups=_backup_plan(options),
+            watchdog=settings.watchdog(),
         )
     )
 

@@ -54,6 +54,15 @@ def read_by_systemd(text: str, scope: Scope, folder: Path, *words: str) -> str:
 
 
 @systemd
+def test_systemd_reads_the_unit_of_an_editor_alone(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[3] / "ros" / "action-assistant-editor.service").read_text()
+    assert (
+        read_by_systemd(text.replace("User=robot", "User=daemon"), "system", tmp_path, "verify")
+        == ""
+    )
+
+
+@systemd
 @pytest.mark.parametrize("scope", ["system", "user"])
 @pytest.mark.parametrize("data", [None, "/var/lib/lab", '/srv/a folder/100 %/it\'s "ours" $HOME'])
 def test_systemd_reads_them_without_a_word(scope: Scope, data: str | None, tmp_path: Path) -> None:

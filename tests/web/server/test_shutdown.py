@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import httpx
 import pytest
@@ -24,6 +25,24 @@ CRUMBS = b"POST /api/session HTTP/1.1\r\nhost: localhost\r\ntransfer-encoding: c
 #: More than the kernels keep for both sides, and the server behind them.
 MANY_PINGS = frame(0x89, b"x" * 125, b"mask") * 40_000
 GOODBYE = frame(0x88, b"\x03\xe8", b"mask")
+
+
+def test_systemd_hears_that_a_process_is_ready_goes_on_and_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with TemporaryDirectory(dir="/tmp") as near, socket.socket(socket.AF_UNIX, 2) as manager:
+        manager.bind(f"{near}/notify")  # paths of sockets are short
+        manager.settimeout(30)
+        monkeypatch.setenv("NOTIFY_SOCKET", f"{near}/notify")
+        monkeypatch.setenv("WATCHDOG_USEC", "1000000")
+        with started("editor", tmp_path):
+            heard = {manager.recv(100), manager.recv(100)}
+            pings = [manager.recv(100) for _ in range(3)]
+        while (last := manager.recv(100)) == b"WATCHDOG=1":
+            pass
+    assert heard == {b"READY=1", b"WATCHDOG=1"}
+    assert pings == 3 * [b"WATCHDOG=1"]
+    assert last == b"STOPPING=1"
 
 
 class Place:

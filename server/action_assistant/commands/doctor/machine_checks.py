@@ -176,6 +176,9 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     ),
     "ACTION_ASSISTANT_NOTIFICATIONS": lambda value: receivers_of(Path(value)),
     "ACTION_ASSISTANT_LIMITS": _limits,
+    "ACTION_ASSISTANT_WATCHDOG": lambda value: settings.watchdog(
+        {"ACTION_ASSISTANT_WATCHDOG": value}
+    ),
     **{name: _log(name) for name in ("ACTION_ASSISTANT_LOG_FORMAT", "ACTION_ASSISTANT_LOG_LEVEL")},
     **{
         name: _metrics(name)

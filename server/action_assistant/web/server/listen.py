@@ -21,7 +21,7 @@ from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from action_assistant.errors import BadInput, CannotStart
 from action_assistant.public_url import Network
-from action_assistant.system import posix
+from action_assistant.system import posix, service_manager
 from action_assistant.web.auth.access import KNOWN
 from action_assistant.web.network.connections import Connections, has_unread
 from action_assistant.web.server.direct import DirectSocket, WebSocketProtocol, end_connection
@@ -48,6 +48,7 @@ _LENGTH_REQUIRED: Final = (
     b"connection: close\r\ncontent-length: 21\r\n\r\nA body has a length.\n"
 )
 _LOOK_S: Final = 60.0  # between two looks at the certificate
+_PINGS: Final = 4  # in the time within which systemd wants one
 _GARBAGE: Final = (10_000, 10, 10)  # objects, and collections of the younger generations
 
 
@@ -103,12 +104,19 @@ def _configured(app: ASGIApp, identity: "TlsIdentity | None", *, direct: bool) -
         ws_ping_interval=10,
         ws_ping_timeout=10,
         timeout_graceful_shutdown=GRACE,
+        timeout_notify=int((service_manager.watchdog_s() or 0) / _PINGS),
+        callback_notify=_ping if service_manager.watchdog_s() is not None else None,
         ssl_certfile=identity.certificate.chain if identity is not None else None,
         ssl_keyfile=str(identity.certificate.key) if identity is not None else None,
     )
     if identity is not None:
         identity.keep(config)
     return config
+
+
+async def _ping() -> None:
+    """Tell systemd that the loop, which calls this, goes on."""
+    service_manager.notify("WATCHDOG=1")
 
 
 class TlsIdentity:
@@ -340,6 +348,7 @@ class _Server(uvicorn.Server):
             self._connections.listen(listener, self._protocol, self.config.ssl)
         self.started = True
         self._publish_address(sockets or [])
+        service_manager.notify("READY=1")
         # What is there now stays: looking through it for garbage again and again costs a busy
         # process a fifth of its time.
         gc.collect()
@@ -369,6 +378,7 @@ class _Server(uvicorn.Server):
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         """Shut down: end streams, close the listeners, and wait for open requests. uvicorn calls
         this once."""
+        service_manager.notify("STOPPING=1")
         self._published.close()
         self._endings.begin()
         self._connections.close()
