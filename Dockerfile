@@ -8,7 +8,7 @@
 # Robots are reached from the smaller one, without compilers; the larger one builds.
 ARG ROS_IMAGE=ros:jazzy-ros-core-noble
 ARG ROS_BUILD_IMAGE=ros:jazzy-ros-base-noble
-ARG VERSION=0.1.0
+ARG VERSION=0.2.0.dev0
 ARG SOURCE_COMMIT=
 
 # The page and the wheel are the same for every architecture.
@@ -33,15 +33,16 @@ RUN scripts/image help /opt/help /out
 FROM --platform=$BUILDPLATFORM python:3.12.11-slim-bookworm AS wheel
 WORKDIR /source
 COPY requirements/build.txt ./requirements/
-COPY scripts/image scripts/wheel_commit.py ./scripts/
+COPY scripts/image scripts/build_version.py scripts/wheel_commit.py ./scripts/
 RUN scripts/image back-end /opt/back-end
 COPY --from=page /source/frontend/dist ./frontend/dist
 COPY --from=help /out ./build/help
 COPY pyproject.toml README.md LICENSE ./
 COPY migrations ./migrations
 COPY server ./server
+ARG VERSION
 ARG SOURCE_COMMIT
-RUN scripts/image wheel /opt/back-end /out
+RUN SOURCE_VERSION="$VERSION" scripts/image wheel /opt/back-end /out
 
 FROM python:3.12.11-slim-bookworm AS editor-dependencies
 COPY requirements/run.txt scripts/image /opt/build/

@@ -206,6 +206,11 @@ build: setup ## the wheel, with migrations, the built page and its help, in dist
 	@$(BIN)/pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 	@ls dist/*.whl
 
+.PHONY: images
+images: ## build the container images of this commit with Docker, and write their tag into .env
+	@touch .env && sed -i -E '/^(IMAGE_VERSION|SOURCE_COMMIT)=/d' .env && scripts/build_version.py env >>.env
+	@docker compose build
+
 .PHONY: release
 release: ## changelog, version, commit and tag in one go: VERSION=1.2.3
 	@scripts/release "$(VERSION)"

@@ -77,7 +77,9 @@ def test_every_image_has_a_version() -> None:
 
 
 def test_the_version_is_that_of_the_program() -> None:
-    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"][
+        "temoto-action-assistant"
+    ]["version"]
     assert arguments()["VERSION"] == version
     assert defaults()["IMAGE_VERSION"] == {version}
     for target in ("editor", "runner"):

@@ -57,8 +57,19 @@ def released(clone: Path, version: str) -> subprocess.CompletedProcess[str]:
 
 
 def version_of(folder: Path) -> str:
-    found: str = tomllib.loads((folder / "pyproject.toml").read_text())["project"]["version"]
+    found: str = tomllib.loads((folder / "pyproject.toml").read_text())["tool"][
+        "temoto-action-assistant"
+    ]["version"]
     return found
+
+
+def versions_in(folder: Path) -> set[str]:
+    """Return the versions that the program and its images have."""
+    texts = [
+        (folder / name).read_text() for name in ("Dockerfile", "docker-compose.yml", ".env.example")
+    ]
+    found = {each for text in texts for each in re.findall(r"VERSION(?:=|:-)(\d[\d.dev]*)", text)}
+    return {version_of(folder), *found}
 
 
 def version_in_ros(folder: Path) -> list[str]:
@@ -67,7 +78,7 @@ def version_in_ros(folder: Path) -> list[str]:
 
 
 def test_the_version_stands_in_one_place_and_ros_has_the_same() -> None:
-    assert version_in_ros(ROOT) == [version_of(ROOT)]
+    assert version_in_ros(ROOT) == [version_of(ROOT).removesuffix(".dev0")]
     assert '"version"' not in (ROOT / "frontend" / "package.json").read_text()
 
 
@@ -76,14 +87,16 @@ def test_a_release_is_one_commit_with_changelog_version_and_tag(clone: Path) -> 
     answer = released(clone, "1.2.3")
     assert answer.returncode == 0, answer.stderr
     assert git(clone, "status", "--porcelain") == ""
-    assert git(clone, "log", "--format=%s").splitlines() == ["release: 1.2.3", "begin"]
-    assert git(clone, "describe").strip() == "v1.2.3"
+    subjects = git(clone, "log", "--format=%s").splitlines()
+    assert subjects == ["release: begin 1.2.4", "release: 1.2.3", "begin"]
     assert git(clone, "cat-file", "-t", "v1.2.3").strip() == "tag"
-    assert version_of(clone) == "1.2.3"
+    assert versions_in(clone) == {"1.2.4.dev0"}
+    assert version_in_ros(clone) == ["1.2.4"]
+    assert git(clone, "rev-parse", "HEAD~1") == git(clone, "rev-parse", "v1.2.3^{}")
+    git(clone, "checkout", "--quiet", "v1.2.3")
+    assert versions_in(clone) == {"1.2.3"}
     assert version_in_ros(clone) == ["1.2.3"]
-    for name in ("Dockerfile", "docker-compose.yml", ".env.example"):
-        found = re.findall(r"VERSION(?:=|:-)(\d[\d.]*)", (clone / name).read_text())
-        assert set(found) == {"1.2.3"}, name
+    git(clone, "checkout", "--quiet", "main")
     now = (clone / "CHANGELOG.md").read_text()
     heading = re.search(
         r"^## Unreleased\n\n(## 1\.2\.3 - \d{4}-\d\d-\d\d)\n\n### ", now, re.MULTILINE

@@ -24,8 +24,8 @@ def head() -> str:
 
 
 def test_the_version_is_that_of_the_project() -> None:
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    assert project["version"] == version.VERSION
+    tools = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]
+    assert tools["temoto-action-assistant"]["version"] == version.VERSION
 
 
 def test_a_checkout_says_its_commit_and_that_it_is_one() -> None:

@@ -6,8 +6,11 @@ It is built, installed and asked for its health by the very steps of the contain
 import os
 import shutil
 import subprocess
+import sys
+import tarfile
 import zipfile
 from pathlib import Path
+from tempfile import mkdtemp
 
 import httpx
 import pytest
@@ -103,6 +106,112 @@ def _bare_environment(folder: Path) -> dict[str, str]:
         "ACTION_ASSISTANT_TOKEN": TOKEN,
         "LANG": os.environ.get("LANG", "C.UTF-8"),
     }
+
+
+BUILDER = (sys.executable, "-m", "hatchling", "build")
+#: What a wheel of a few lines needs, made by the same configuration.
+BUILDS = (
+    *("pyproject.toml", "README.md", "LICENSE", "scripts/build_version.py"),
+    *("scripts/wheel_commit.py", "server/action_assistant/version.py"),
+)
+IDENTITY = ("-c", "user.name=Ann", "-c", "user.email=ann@example.org")
+
+
+def git(folder: Path, *arguments: str) -> str:
+    command = ["git", *IDENTITY, "-C", str(folder), *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    """A repository of one commit and no tags with a package that is built as this one."""
+    folder = tmp_path / "small"
+    for name in (*BUILDS, "frontend/dist/index.html", "build/help/index.html"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        if (ROOT / name).is_file() and name in BUILDS:
+            shutil.copy(ROOT / name, folder / name)
+        else:
+            (folder / name).write_text("built")
+    for name in ("server/action_assistant/__init__.py", "migrations/env.py"):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_text("")
+    (folder / ".gitignore").write_text("dist/\nbuild/\n")
+    git(folder, "init", "--quiet", "--initial-branch=main")
+    git(folder, "add", ".")
+    git(folder, "commit", "--quiet", "--message", "one")
+    return folder
+
+
+def built(folder: Path, kind: str) -> Path:
+    """Build a package of a kind in a repository, and return its file."""
+    out = Path(mkdtemp(dir=folder.parent))
+    subprocess.run([*BUILDER, "-t", kind, "-d", str(out)], cwd=folder, check=True)
+    (found,) = out.iterdir()
+    return found
+
+
+def says(folder: Path, **environment: str) -> str:
+    """Return the version that would be built in a folder."""
+    command = [sys.executable, str(folder / "scripts" / "build_version.py")]
+    answer = subprocess.run(
+        command, env=os.environ | environment, capture_output=True, text=True, check=True
+    )
+    return answer.stdout.strip()
+
+
+def test_pip_upgrades_to_the_wheel_of_a_newer_commit_and_back(small: Path, tmp_path: Path) -> None:
+    """The command is that of docs/installing.md."""
+    assert "pip: `install --upgrade`" in (ROOT / "docs" / "installing.md").read_text()
+    older = built(small, "wheel")
+    (small / "server" / "action_assistant" / "__init__.py").write_text("NEW = 1")
+    git(small, "commit", "--quiet", "--all", "--message", "two")
+    newer, head = built(small, "wheel"), git(small, "rev-parse", "HEAD")
+    base = says(small).partition("+")[0]
+    assert base.endswith(".dev2")
+    assert newer.name == f"temoto_action_assistant-{base}+g{head[:8]}-py3-none-any.whl"
+    environment = tmp_path / "venv"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", environment], check=True)
+    python = str(environment / "bin" / "python")
+    shown = []
+    for wheel in (older, newer, older):
+        subprocess.run(
+            [
+                sys.executable,
+                "-m",
+                "pip",
+                "--python",
+                python,
+                "install",
+                "--quiet",
+                "--upgrade",
+                wheel,
+            ],
+            env=os.environ | {"PIP_NO_DEPS": "1"},
+            check=True,
+        )
+        text = "from importlib.metadata import version; print(version('temoto-action-assistant'))"
+        asked = subprocess.run([python, "-c", text], capture_output=True, text=True, check=True)
+        shown.append(asked.stdout.strip())
+    assert shown == [each.name.split("-")[1] for each in (older, newer, older)]
+
+
+def test_a_source_package_an_image_and_a_clone_without_history_know_their_version(
+    small: Path, tmp_path: Path
+) -> None:
+    version = says(small)
+    with tarfile.open(built(small, "sdist")) as archive:
+        archive.extractall(tmp_path / "unpacked", filter="data")
+    (unpacked,) = (tmp_path / "unpacked").iterdir()
+    assert says(unpacked) == version
+    git(small, "commit", "--quiet", "--allow-empty", "--message", "two")
+    git(tmp_path, "clone", "--quiet", "--depth=1", f"file://{small}", "shallow")
+    head = git(small, "rev-parse", "HEAD")[:8]
+    assert says(tmp_path / "shallow").endswith(f".dev0+g{head}")
+    shutil.rmtree(small / ".git")
+    assert says(small).endswith(".dev0")
+    assert says(small, SOURCE_VERSION=version.replace("+", "-")) == version
+    (small / "pyproject.toml").write_text('version = "1.2.3"')
+    assert says(small) == "1.2.3"
 
 
 @pytest.mark.long

@@ -1,9 +1,11 @@
 """Which program this is: its version, and the commit that it comes from as far as that is known.
 
-The version stands in pyproject.toml alone. A wheel carries the commit that it was built from
-(scripts/wheel_commit.py); in a checkout git is asked. Neither is guessed.
+Each wheel has a version of its own, and carries the commit that it was built from
+(scripts/build_version.py). A checkout has the version of pyproject.toml, the same for all commits until
+the next release, and git is asked for the commit. Neither is guessed.
 """
 
+import re
 import subprocess
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
@@ -12,14 +14,26 @@ from typing import Final
 
 from action_assistant import paths
 
-try:
-    VERSION: Final = version("temoto-action-assistant")
-except PackageNotFoundError:  # run from a folder that was never installed
-    VERSION = "0.0.0"  # type: ignore[misc]
-
 _CARRIED: Final = Path(__file__).with_name("commit.txt")
 _PATIENCE: Final = 2.0  # seconds for git
 _SHORT: Final = 8
+
+
+def _version() -> str:
+    """Return the version of a checkout, which may have moved on since it was installed, or of an
+    installed package."""
+    folder = paths.checkout()
+    if folder is not None:
+        text = (folder / "pyproject.toml").read_text()
+        if found := re.search(r'^version = "(.+)"$', text, re.MULTILINE):
+            return found[1]
+    try:
+        return version("temoto-action-assistant")
+    except PackageNotFoundError:  # run from a folder that was never installed
+        return "0.0.0"
+
+
+VERSION: Final = _version()
 
 
 @cache
@@ -33,7 +47,7 @@ def commit() -> str | None:
 
 
 def described() -> str:
-    """Return the version for people, for example `0.1.0 (commit 1a2b3c4d)`. The text also says if
+    """Return the version for people, for example `0.2.0.dev1234+g1a2b3c4d (commit 1a2b3c4d)`. The text also says if
     the program runs from a checkout, where files may have changed since the commit."""
     known = commit()
     if known is None:

@@ -11,7 +11,6 @@ import shutil
 import subprocess
 import sys
 import time
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
@@ -29,7 +28,17 @@ STANDS_IN: Final = {
     "ros-core": "ros:jazzy-ros-core-noble",
     "ros-base": "ros:jazzy-ros-base-noble",
 }
-VERSION: Final = str(tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"])
+VERSION: Final = (
+    subprocess.run(
+        [sys.executable, ROOT / "scripts" / "build_version.py"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    .stdout.strip()
+    .replace("+", "-")
+)
+os.environ["IMAGE_VERSION"] = VERSION  # whatever compose does here is about these images
 EDITOR: Final = f"temoto-action-assistant/editor:{VERSION}"
 RUNNER: Final = f"temoto-action-assistant/runner:{VERSION}"
 #: The commit from which the images say that they are built.

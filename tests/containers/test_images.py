@@ -27,7 +27,7 @@ def test_an_image_says_what_it_is(image: str) -> None:
     commit = labels["org.opencontainers.image.revision"]
     run("git", "merge-base", "--is-ancestor", commit, "HEAD")
     said = inside(image, "action-assistant --version")
-    assert said == f"action-assistant {VERSION} (commit {commit[:8]})\n"
+    assert said == f"action-assistant {VERSION.replace('-', '+')} (commit {commit[:8]})\n"
 
 
 @pytest.mark.parametrize("image", [EDITOR, RUNNER])

@@ -6,7 +6,6 @@ behind by `kill -9` is never taken for the one of a server that runs. The file h
 
 import os
 import socket
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -88,6 +87,7 @@ def _is_same(descriptor: int, path: Path) -> bool:
 
 def _place() -> str:
     """Return a text that is the same in all processes of one computer that share its network."""
-    if sys.platform != "linux":
+    try:
+        return f"{_BOOT.read_text().strip()}/{_NETWORK.stat().st_ino}"
+    except OSError:  # macOS
         return socket.gethostname()
-    return f"{_BOOT.read_text().strip()}/{_NETWORK.stat().st_ino}"
