@@ -24,7 +24,12 @@ _PLAIN: Final = re.compile(r"(?<![\w/(`.])(docs/[\w./-]+\.md)")
 _MODULE: Final = re.compile(
     r"`(?:action_assistant\.)?((?:editor|runner|web|journal|umrf)\.\w+)[\w.]*`"
 )
-_FILES: Final = frozenset({"editor.db", "runner.db", "editor.mark", "editor.database", "umrf.json"})
+_FILES: Final = frozenset(
+    {
+        *("editor.db", "runner.db", "editor.mark", "editor.database", "umrf.json"),
+        *("editor.address", "runner.address"),
+    }
+)
 _NAMED: Final = re.compile(r"`([A-Za-z_][\w.]*)`(?:,| \() ?`((?:server|frontend)/[^`]+\.\w+)`")
 _LINK: Final = re.compile(r"\]\(([^)\s#:]*)(?:#([^)\s]+))?\)")
 _HEADING: Final = re.compile(r"^#{1,6} (.+?)\s*$", re.MULTILINE)
