@@ -68,6 +68,8 @@ EXCEPT: Final = {
     "runner post /api/runs/{run}/hand_over": "in tests/runner/execution/test_led_rights.py",
     "runner post /api/runs/{run}/at_rest": "in tests/runner/execution/test_truth.py",
     "runner post /api/runs/{run}/go_on": "in tests/runner/execution/test_led_presses.py",
+    "runner post /api/runs/{run}/step": "in tests/runner/execution/test_led_steps.py",
+    "runner post /api/runs/{run}/wait": "in tests/runner/execution/test_led_steps.py",
     "runner post /api/runs/{run}/outcome": "in tests/runner/execution/test_led_presses.py",
 }
 

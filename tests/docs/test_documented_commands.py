@@ -60,6 +60,8 @@ LISTED: Final = {
     "action-assistant graphs --url": "speaks to another computer",
     "action-assistant login": "needs a person who confirms: tests/commands has one",
     "action-assistant run meet --robots": "needs two robots that may be led: tests/ros leads some",
+    "action-assistant runs wait": "needs a led run: tests/ros leads some",
+    "action-assistant runs step": "needs a led run that is held: tests/ros leads some",
     "action-assistant runs go-on": "needs a led run that is held: tests/ros leads some",
     "action-assistant audit verify": "needs that the server has ended, as `verify`, which is tried",
     "action-assistant incident": "needs the id of a run: tests/test_incident.py keeps some",

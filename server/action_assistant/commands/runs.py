@@ -1,4 +1,4 @@
-"""The command `runs` with its own commands: at-rest, go-on, since, examples, verify, archive and copy."""
+"""The command `runs` with its own commands: at-rest, wait, step, go-on, since, examples, verify, archive and copy."""
 
 import argparse
 import asyncio
@@ -29,11 +29,14 @@ from action_assistant.umrf.difference import Difference
 from action_assistant.umrf.difference_text import lines, without_looks
 
 if TYPE_CHECKING:  # slow to load, and most calls do not need it
+    import httpx
+
     from action_assistant.editor.history.course_search import SinceWhen
     from action_assistant.runner.analysis.expected_runs import Expectation
 
 
 _TIME: Final = "%Y-%m-%dT%H:%M:%S"
+_AT_REST: Final = frozenset({"unused", "proven", "seen", "unsent"})  # states of a robot
 _AGAIN_S: Final = 1.0  # after which an order without an answer is sent once more
 
 
@@ -43,7 +46,7 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
     runs.add_argument("--json", action="store_true", help="as JSON, for programs")
     runs.set_defaults(handler=_runs)
     more = runs.add_subparsers(
-        metavar="at-rest | go-on | since | verify | archive | restore | copy | examples"
+        metavar="at-rest | wait | step | go-on | since | verify | archive | restore | copy | examples"
     )
     rests = command(
         more,
@@ -58,14 +61,29 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
         more, "go-on", "let a held run go on: its robots may begin to move at once", "RUN"
     )
     goes_on.add_argument("run", metavar="RUN", help="id of the run")
-    goes_on.add_argument(
-        "--watching",
-        action="append",
-        default=[],
-        metavar="ROBOT",
-        help="you watch this robot, with its hardware stop within reach; again for each",
-    )
+    _add_watching(goes_on)
     goes_on.set_defaults(handler=_go_on)
+    waits = command(
+        more,
+        "wait",
+        "let a led run begin no further action; what is under way goes on (to stop it: stop)",
+        "RUN",
+    )
+    waits.add_argument("run", metavar="RUN", help="id of the run")
+    waits.add_argument("--reason", default="", metavar="TEXT", help="shown to everybody")
+    waits.set_defaults(handler=_wait)
+    steps = command(
+        more,
+        "step",
+        "let one action of a held run begin, then hold it again: its robot may begin to move at once",
+        "RUN --until Lift_0",
+    )
+    steps.add_argument("run", metavar="RUN", help="id of the run")
+    goal = steps.add_mutually_exclusive_group()
+    goal.add_argument("--action", default="", metavar="NAME", help="the one of those that wait")
+    goal.add_argument("--until", default="", metavar="NAME", help="all that come before this one")
+    _add_watching(steps)
+    steps.set_defaults(handler=_step)
     _add_archives(more)
     _add_copy(more)
     _add_since(more)
@@ -91,32 +109,75 @@ def _add_runs(runs: argparse.ArgumentParser) -> None:
 COMMANDS: Final = {"runs": _add_runs}
 
 
+def _add_watching(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--watching",
+        action="append",
+        default=[],
+        metavar="ROBOT",
+        help="you watch this robot, with its hardware stop within reach; again for each",
+    )
+
+
 def _go_on(options: argparse.Namespace) -> int:
     """Run the command that lets a held run go on, and return the exit code. Raise RequestRefused if
     it is not held."""
+    held = _press_held(options, "go_on", {})
+    print(one_line(f"it goes on; it was held: {held['why']}"))
+    return 0
+
+
+def _step(options: argparse.Namespace) -> int:
+    """Run the command that lets one action of a held run begin, and return the exit code. Raise
+    RequestRefused if it is not held, or no action waits to begin."""
+    held = _press_held(options, "step", {"action": options.action, "until": options.until})
+    ready = [each["action"] for each in held.get("next", ())]
+    goal = f"until {options.until}" if options.until else options.action or ready[0]
+    print(one_line(f"one step is made: {goal}; then it waits again"))
+    return 0
+
+
+def _press_held(options: argparse.Namespace, route: str, more: dict[str, Any]) -> Any:
+    """Send an order to a held run that may move robots, and return why the run was held. `more`: what
+    the order has besides that. Raise RequestRefused if the run is not held."""
     path = f"/api/runs/{options.run}"
     with running(options) as server:
         held = server.runner("GET", path).json()["held"]
         if held is None:
             raise RequestRefused("The run is not held; it goes on already.")
-        asked: dict[str, Any] = {"since": held["since"]}
+        asked: dict[str, Any] = {"since": held["since"], **more}
         if options.watching:
             asked["watching"] = dict.fromkeys(options.watching, True)
-        press(server, f"{path}/go_on", asked)
-    print(one_line(f"it goes on; it was held: {held['why']}"))
+        press(server, f"{path}/{route}", asked)
+    return held
+
+
+def _wait(options: argparse.Namespace) -> int:
+    """Run the command that lets a led run wait before its next action, and return the exit code."""
+    with running(options) as server:
+        asked = {"reason": options.reason}
+        shown = press(server, f"/api/runs/{options.run}/wait", asked).json()
+    rests = shown.get("rests", ())
+    going = [f"{each['action']} on {each['robot']}" for each in rests if each["state"] == "going"]
+    unknown = [each["robot"] for each in rests if each["state"] not in _AT_REST | {"going"}]
+    print(one_line(f"{shown['held']['why']} Let it go on: runs go-on {options.run}"))
+    if going:
+        print(one_line(f"STILL MOVING: {', '.join(going)}. To stop it: stop {options.run}"))
+    if unknown:
+        print(one_line(f"NOT KNOWN to be at rest: {', '.join(unknown)}"))
     return 0
 
 
-def press(server: Server, path: str, body: dict[str, Any]) -> None:
-    """Send an order that may move robots (POST of `body` to `path`), and wait for the answer. If no
-    answer comes, send it once more with the same request id, so that the two count once. Raise
-    CannotStart if there is no answer then either."""
+def press(server: Server, path: str, body: dict[str, Any]) -> "httpx.Response":
+    """Send an order to a led run (POST of `body` to `path`), and return the answer. If none comes, send
+    it once more with the same request id, so that the two count once. Raise CannotStart if there is no
+    answer then either."""
     press = body | {"request_id": str(uuid.uuid4())}
     try:
-        server.runner("POST", path, json=press)
+        return server.runner("POST", path, json=press)
     except CannotStart:
         time.sleep(_AGAIN_S)
-        server.runner("POST", path, json=press)
+        return server.runner("POST", path, json=press)
 
 
 def _runs(options: argparse.Namespace) -> int:

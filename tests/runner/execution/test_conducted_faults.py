@@ -24,17 +24,24 @@ from action_assistant.runner.links.port import CallBegan, Order, Registration
 from action_assistant.runner.links.simulator import SimulatorLink
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.runs.events import (
+    Author,
     Observed,
     PieceBegan,
     PieceEnded,
     Published,
+    Released,
     Requested,
     RunEvent,
     StopRequested,
 )
 from action_assistant.runner.runs.run import ENDED
 from action_assistant.runner.runs.views import time
-from action_assistant.runner.start.admission import GoOnRequest, StartRequest
+from action_assistant.runner.start.admission import (
+    GoOnRequest,
+    StartRequest,
+    StepRequest,
+    WaitRequest,
+)
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.kept_values import keeper
@@ -65,8 +72,11 @@ STEPS = [
 class Story:
     """One led run, what happens to it, and what must hold all the while."""
 
-    def __init__(self, seed: int, *, values: bool = False, stalls: bool = False) -> None:
+    def __init__(
+        self, seed: int, *, values: bool = False, stalls: bool = False, waits: bool = False
+    ) -> None:
         self.chance = random.Random(seed)
+        self.waits = random.Random(f"waits {seed}") if waits else None
         self.stalls = random.Random(f"stalls {seed}") if stalls else None
         self.seed = seed
         self.graph, self.calls = with_values(*drawn(seed), seed) if values else drawn(seed)
@@ -104,6 +114,10 @@ class Story:
         run = opened.run
         if run.held is not None or run.desired == "stopped":
             self.faults.append(f"{piece.graph.name} left for {robot} after the gate had closed")
+        assert self.control is not None
+        only = self.control._conductors._open[self.run].gate._let
+        if only is not None and only.node not in piece.graph.actions:
+            self.faults.append(f"{piece.graph.name} left for {robot} in a step of {only.node}")
 
     def judge(self, opened: OpenRun) -> None:
         """Called at every change: a run that is over must not move."""
@@ -177,6 +191,8 @@ class Story:
                 await anyio.sleep(self.chance.choice([0.01, 0.3, 1.0, 4.0]))
                 if self.stalls is not None and self.stalls.random() < 0.4:
                     stand_still(self.stalls.choice([1.5, 2.5, 3.5, 8.0]))
+                if self.waits is not None:
+                    await self._wait_or_step(control, self.waits)
             case "silent":
                 robot.silent = True
                 await anyio.sleep(self.chance.choice([0.5, 4.0, 12.0]))
@@ -206,6 +222,44 @@ class Story:
                 self.journal.down = False
             case "clock jumps":
                 self.jump_us += self.chance.choice([-3600, 3600, 1]) * 1_000_000
+
+    async def _wait_or_step(self, control: ExecutionService, chance: random.Random) -> None:
+        """One press of a person, or of two at once, on a run that waits or goes on."""
+        opened = control.open.get(self.run)
+        if opened is None:
+            return
+        if opened.run.held is None:
+            if chance.random() < 0.6:
+                with suppress(Refused):
+                    await control.wait(self.run, WaitRequest("Look."), BEN)
+                    assert opened.run.held is not None or opened.run.end is not None
+            return
+        goal = {"until": chance.choice(sorted(opened.run.actions))} if chance.random() < 0.3 else {}
+        asked = StepRequest(time(opened.run.held.at), **goal)
+
+        async def press(author: Author) -> None:
+            with suppress(Refused):
+                await control.step(self.run, asked, author)
+
+        async with anyio.create_task_group() as presses:
+            for author in (ANN, BEN)[: chance.randint(1, 2)]:
+                presses.start_soon(press, author)
+
+    def _hold_steps(self) -> None:
+        """Check that each step let one action begin at most, the one that it names. That nothing
+        leaves while the run is held is seen in the moment of leaving."""
+        limit, begun = "", 0
+        for each in self.journal.told(self.run):
+            match each:
+                case Released(step=step):
+                    limit, begun = step, 0
+                case PieceBegan(node=node, piece=piece) if limit:
+                    events = (
+                        self.journal.told(piece) if f"run/{piece}" in self.journal.streams else []
+                    )
+                    if any(isinstance(one, Published) for one in events):
+                        begun += 1
+                        assert (node, begun) == (limit, 1), (self.seed, self.log, each)
 
     def _make_well(self) -> None:
         for robot in self.robots.values():
@@ -260,6 +314,7 @@ class Story:
                 if each.piece in self.meant:
                     assert self.meant[each.piece] == each.outcome, (self.seed, each)
         self._hold_values()
+        self._hold_steps()
         assert self.journal.history(self.run).state in ENDED
 
     def _hold_values(self) -> None:
@@ -365,13 +420,14 @@ def foreign() -> Graph:
     return Graph(name="theirs", actions=graph.actions[:1], relations=graph.relations[:1])
 
 
-def lived(seed: int, *, values: bool = False, stalls: bool = False) -> str:
-    """Live through one story in virtual time. `stalls`: the runner's process also stands still."""
+def lived(seed: int, *, values: bool = False, stalls: bool = False, waits: bool = False) -> str:
+    """Live through one story in virtual time. `stalls`: the runner's process also stands still;
+    `waits`: people also make the run wait, and let it make steps."""
     found = ""
 
     async def main() -> None:
         nonlocal found
-        story = Story(seed, values=values, stalls=stalls)
+        story = Story(seed, values=values, stalls=stalls, waits=waits)
         found = await story.live()
         story.hold()
 
@@ -391,6 +447,13 @@ def test_values_are_those_of_the_code_whatever_happens(seed: int) -> None:
 @given(seed=st.integers(0, 2**32), stalls=st.booleans())
 def test_a_led_run_stays_safe_whatever_happens(seed: int, stalls: bool) -> None:
     lived(seed, stalls=stalls)
+
+
+@pytest.mark.timeout(0)
+@settings(max_examples=examples(8), deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(seed=st.integers(0, 2**32))
+def test_no_order_of_wait_step_go_on_stop_and_restart_begins_an_action_twice(seed: int) -> None:
+    lived(seed, waits=True)
 
 
 def test_a_clock_that_is_set_back_between_two_runners_leaves_the_run_stoppable() -> None:

@@ -12,7 +12,14 @@ from action_assistant.runner.analysis.annotations import IncidentKept, stream_ab
 from action_assistant.runner.review import audit_facts
 from action_assistant.runner.robots import rights
 from action_assistant.runner.robots.robot_events import stream_of_robot
-from action_assistant.runner.runs.events import Author, HandedOver, StoredKind, draft_of
+from action_assistant.runner.runs.events import (
+    Author,
+    HandedOver,
+    Held,
+    Released,
+    StoredKind,
+    draft_of,
+)
 from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.caller import Origin, acting_for
 from action_assistant.web.auth.keys import PersonRef
@@ -49,6 +56,21 @@ LOCK = rights.Lock(PersonRef("ada", "Ada"), 1, "its brake is loose")
             RUN,
             HandedOver(at=1, author=ADA, to=Author("ben", "Ben")),
             "handed the run r1 over to Ben",
+        ),
+        (
+            RUN,
+            Held(at=1, why="Ada made it wait: Look.", by=ADA, how="wait", reason="Look."),
+            "made the run r1 wait: Look.",
+        ),
+        (
+            RUN,
+            Released(at=1, author=ADA, step="Lift_0"),
+            "let the run r1 make one step: Lift_0",
+        ),
+        (
+            RUN,
+            Released(at=1, author=ADA, until="Lift_0"),
+            "let the run r1 make steps until Lift_0",
         ),
         (
             stream_about("r1"),

@@ -44,6 +44,7 @@ FOR_PEOPLE = {
     ("post", "/api/approvals/asked"),
     ("post", "/api/runs/{run}/at_rest"),
     ("post", "/api/runs/{run}/go_on"),
+    ("post", "/api/runs/{run}/step"),
     ("post", "/api/runs/{run}/outcome"),
     ("post", "/api/robots/{name}/drills"),
 }

@@ -772,13 +772,21 @@ export interface RunnerApi {
     /**
      * HeldShown
      * @description The hold of a led run, which begins nothing further: by whom (null: by the runner), why, and
-     *     since when.
+     *     since when. `how`: by a fault, by a person, after a step, or at a breakpoint; `next`: the actions
+     *     that wait to begin, the one that has waited longest first.
      */
     HeldShown: {
         by: RunnerApi["Author"] | null;
         why: string;
         /** Format: date-time */
         since: string;
+        /**
+         * @default trouble
+         * @enum {string}
+         */
+        how?: "breakpoint" | "step" | "trouble" | "wait";
+        /** @default [] */
+        next?: RunnerApi["NextShown"][];
     };
     /**
      * Hello
@@ -1072,6 +1080,14 @@ export interface RunnerApi {
         label?: string;
         /** @default 7 */
         days?: number;
+    };
+    /**
+     * NextShown
+     * @description An action (by its full name) that is ready to begin, and its robot.
+     */
+    NextShown: {
+        action: string;
+        robot: string;
     };
     /**
      * NoteChange
@@ -2263,6 +2279,26 @@ export interface RunnerApi {
         untold: number;
     };
     /**
+     * StepRequest
+     * @description Lets one action of a held run begin, then holds it again. `since`, `request_id`, `watching`: as in
+     *     `GoOnRequest`. `action`: the full name of the one to begin, "" for the one that has waited longest;
+     *     `until`: in place of it, all begin that come before this action.
+     */
+    StepRequest: {
+        /** Format: date-time */
+        since: string;
+        /** @default  */
+        request_id?: string;
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
+        /** @default  */
+        action?: string;
+        /** @default  */
+        until?: string;
+    };
+    /**
      * StopBody
      * @description The body of a Stop. The page makes one `stop_id` for each press, since one press may arrive
      *     on several ways.
@@ -2446,6 +2482,17 @@ export interface RunnerApi {
         };
     };
     /**
+     * WaitRequest
+     * @description Lets a led run begin nothing further. `reason`: shown to everybody; `request_id`: as in
+     *     `GoOnRequest`.
+     */
+    WaitRequest: {
+        /** @default  */
+        reason?: string;
+        /** @default  */
+        request_id?: string;
+    };
+    /**
      * Where
      * @description The place of a problem or note. `path` is a JSON pointer into the text that was given, or
      *     into the canonical text of a graph that was not read from a text.
@@ -2527,6 +2574,12 @@ export interface RunnerPaths {
     };
     "/api/runs/{run}/go_on": {
         post: RunnerOperations["goOn"];
+    };
+    "/api/runs/{run}/step": {
+        post: RunnerOperations["stepRun"];
+    };
+    "/api/runs/{run}/wait": {
+        post: RunnerOperations["waitRun"];
     };
     "/api/runs/{run}/outcome": {
         post: RunnerOperations["giveOutcome"];
@@ -2933,6 +2986,44 @@ interface RunnerOperations {
         requestBody: {
             content: {
                 "application/json": RunnerApi["GoOnRequest"];
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    stepRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["StepRequest"];
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    waitRun: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody?: {
+            content: {
+                "application/json": RunnerApi["WaitRequest"];
             };
         };
         responses: {

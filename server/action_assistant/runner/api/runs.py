@@ -54,6 +54,8 @@ from action_assistant.runner.start.admission import (
     GoOnRequest,
     ResumeRequest,
     StartRequest,
+    StepRequest,
+    WaitRequest,
     WordRequest,
     decoded,
     read_request,
@@ -263,6 +265,32 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
             return views.run_view(await services.control.go_on(run, asked, author_of(request), me))
 
     @post(
+        "/api/runs/{run:str}/step",
+        operation_id="stepRun",
+        status_code=202,
+        summary="Let one action of a held run begin, then hold it again: a robot may begin to move",
+        opt=reads(StepRequest),
+        guards=[StartNeeds(services, "go_on", "operate", of_people=True)],
+    )
+    async def step(run: str, request: _Asking) -> views.RunShown:
+        asked = decoded(await request.body(), StepRequest)
+        with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
+            me = identity_of(request)
+            return views.run_view(await services.control.step(run, asked, author_of(request), me))
+
+    @post(
+        "/api/runs/{run:str}/wait",
+        operation_id="waitRun",
+        status_code=202,
+        summary="Let a led run begin nothing further; what is under way goes on",
+        opt=reads(WaitRequest | None),
+        guards=[Needs("operate")],
+    )
+    async def wait(run: str, request: _Asking) -> views.RunShown:
+        asked = decoded(await request.body() or b"{}", WaitRequest)
+        return views.run_view(await services.control.wait(run, asked, author_of(request)))
+
+    @post(
         "/api/runs/{run:str}/outcome",
         operation_id="giveOutcome",
         status_code=200,
@@ -277,7 +305,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
             await services.control.give_outcome(run, asked, author_of(request), me)
         )
 
-    return [stop_all, stop, pause, resume, modify, at_rest, go_on, outcome]
+    return [stop_all, stop, pause, resume, modify, at_rest, go_on, step, wait, outcome]
 
 
 def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:

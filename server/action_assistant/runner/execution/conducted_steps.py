@@ -35,6 +35,7 @@ from action_assistant.umrf.model import Precondition
 from action_assistant.umrf.pieces import outcome_of
 from action_assistant.umrf.semantics import Call
 from action_assistant.web.auth.caller import Origin, acting_for
+from action_assistant.web.auth.identity import Identity
 
 #: Facts of the engine that plays the whole graph: only a proof ends what a robot does.
 CONDUCTED_FACTS: Final = msgspec.structs.replace(
@@ -198,6 +199,32 @@ class Step:
         self.was_held_back = False
         self.shown_inside = {}
         self.over, self.rested = anyio.Event(), anyio.Event()
+
+
+class StepLimit(msgspec.Struct, frozen=True):
+    """Limits how far a held run goes on: `only` one action begins, the one with the full name
+    `action`, or the one that has waited longest for ""; or all begin that come before the action
+    `until`. After that the run is held again."""
+
+    only: bool = False
+    action: str = ""
+    until: str = ""
+
+
+#: The limit of *Go on*.
+UNLIMITED: Final = StepLimit()
+
+
+class GoOn(msgspec.Struct, frozen=True):
+    """The press by which the person `author` lets a held run go on, for `lead` from then on, as far as
+    `limit` says. `request_id`: of the press, "" for none; `watching`: the robots that `lead` says to
+    watch."""
+
+    author: Author
+    lead: Identity
+    request_id: str
+    watching: tuple[str, ...]
+    limit: StepLimit
 
 
 class Gate:

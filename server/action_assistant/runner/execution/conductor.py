@@ -28,6 +28,7 @@ from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.conducted_steps import (
     GRAPH,
     RUNNER,
+    GoOn,
     Leading,
     LeftOpen,
     RestNews,
@@ -417,7 +418,7 @@ class Conductor:
     async def _hand_over(self, step: Step) -> None:
         """Send the piece of a step once the gate is open, if its robot may begin it; otherwise hold
         or stop the run, as the starter chose."""
-        await self.gate.wait()
+        await self.gate.admit(step)
         began = anyio.current_time()
         try:  # nothing begins while its causes are not in the journal
             with anyio.fail_after(_STORED_S):
@@ -489,7 +490,7 @@ class Conductor:
         """Raise NotSent if a piece that is about to leave may not begin. The call does not wait."""
         if self.gate.is_open and (why := self.gate.why_not_allowed(step.engine)):
             self.gate.hold_run(why)
-        if not self.gate.is_open or step.is_stopped:
+        if not self.gate.lets(step) or step.is_stopped:
             step.was_held_back = True
             raise NotSent("the run was held or stopped before it left")
         if self._stalls.stands_still:
@@ -516,6 +517,8 @@ class Conductor:
             self._states[step.node] = state
             self._run.tell(seen_of(step, action, state, self._clock_us()))
         self._rests.show(run)
+        if run.incarnation is not None:
+            self.gate.passed(step)
         for event in seen_inside(step, self._first.graph_name, self._clock_us()):
             self._run.tell(event)
         if run.end is None:
@@ -598,6 +601,7 @@ class Conductor:
         the robot ("shape"), by a person ("word"), or no piece was sent ("unsent")."""
         self._steps.pop(step.call.number, None)
         self._over.add(step.call.number)
+        self.gate.passed(step)
         ended = self._values.ended(step, outcome, how, self._clock_us())
         step.tell_end(self._run.tell, ended)
         if lacking := self._values.lacking(ended):
@@ -644,19 +648,16 @@ class Conductor:
 
     # --- the gate -----------------------------------------------------------------------------
 
-    async def go_on(
-        self, author: Author, lead: Identity, request_id: str, watching: tuple[str, ...]
-    ) -> None:
-        """Let a held run go on for `lead`, once every robot that has a step of it has answered.
-        `watching`: the robots that `lead` says to watch. Raise Conflict if no engine leads the run, and
-        as `LedGate.go_on` does."""
+    async def go_on(self, press: GoOn) -> None:
+        """Let a held run go on, once every robot that has a step of it has answered. Raise Conflict if
+        no engine leads the run, and as `LedGate.go_on` does."""
         if self._is_past_help:
             raise Conflict("What leads this run has failed too often: only Stop is left.")
         if not self._has_engine:
             raise Conflict("What leads this run is being begun again. Try that in some seconds.")
         names = {step.engine for step in self._steps.values() if not step.over.is_set()}
         names |= {piece.run.engine for piece in self._again.values() if piece.run.end is None}
-        await self.gate.go_on(author, lead, names, request_id, watching)
+        await self.gate.go_on(press, names)
         for step in self._steps.values():
             step.troubles &= {"ended"}
 

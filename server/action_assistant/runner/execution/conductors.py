@@ -12,6 +12,7 @@ import msgspec
 from action_assistant.errors import Conflict, OutcomeUnknown
 from action_assistant.runner.execution.conducted_steps import (
     CONDUCTED_FACTS,
+    GoOn,
     Leading,
     LeftOpen,
     Word,
@@ -49,6 +50,8 @@ from action_assistant.web.auth.identity import Identity
 log: Final = logging.getLogger(__name__)
 
 _PAGE: Final = 500  # events read at once
+_RESTARTED: Final = "The runner was restarted while it led this run."
+_BEFORE: Final = "Before that it was held: "
 _STORED_S: Final = 5  # for which a person waits until the journal has an outcome by word
 
 
@@ -126,7 +129,11 @@ class Conductors:
         texts = await self._runtime.run_in_worker(piece_texts, first.umrf, first.subgraphs)
         opened = self.open(first, run, texts, self._engine_for(first), seq=seq, left=left)
         if run.desired != "stopped":
-            self._open[run.id].gate.hold_run("The runner was restarted while it led this run.")
+            before = run.held.why.removeprefix(f"{_RESTARTED} {_BEFORE}") if run.held else ""
+            why = (
+                f"{_RESTARTED} {_BEFORE}{before}" if before not in {"", _RESTARTED} else _RESTARTED
+            )
+            self._open[run.id].gate.hold_run(why)
         for piece, last in left.again:  # each reports itself to the conductor (`_see`) once opened
             link = self._robots.link(piece.engine)
             self._runs.drive(self._runs.open(piece, link, owns_link=False, seq=last))
@@ -170,17 +177,22 @@ class Conductors:
         that a repeat of it waits for the first one. A request without an id ("") has no lock."""
         return self._claims.once(f"{run} {request_id}") if request_id else nullcontext()
 
-    async def go_on(
-        self,
-        run: str,
-        author: Author,
-        lead: Identity,
-        request_id: str,
-        watching: tuple[str, ...],
-    ) -> None:
-        """Let a held run go on for `lead`, who watches these robots. Raise Conflict if nothing can lead
-        it any more, or one of its robots may begin no piece."""
-        await self._conductor(run).go_on(author, lead, request_id, watching)
+    async def go_on(self, run: str, press: GoOn) -> None:
+        """Let a held run go on. Raise Conflict if nothing can lead it any more, or one of its robots
+        may begin no piece."""
+        await self._conductor(run).go_on(press)
+
+    async def wait(self, run: str, author: Author, reason: str, request_id: str) -> None:
+        """Let nothing further begin in a run, in the step of this call, then wait until that is
+        stored. `reason`: may be "". Raise Conflict if nothing leads the run, OutcomeUnknown if it is not
+        stored within 5 s: the run waits all the same."""
+        self._conductor(run).gate.wait_for_person(author, reason, request_id)
+        try:
+            with anyio.fail_after(_STORED_S):
+                await self._runs.by_id[run].recorder.flushed()
+        except TimeoutError:
+            text = "The run waits, but that could not be stored yet."
+            raise OutcomeUnknown(text) from None
 
     async def hand_over(
         self, run: str, author: Author, to: Identity, pass_batons: Callable[[], Awaitable[None]]

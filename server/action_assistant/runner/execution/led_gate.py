@@ -1,5 +1,8 @@
 """The gate of a led run, with the person for whom the run is led: it closes when that person may begin
 nothing on one of its robots any more, and a person who may lets the run go on.
+
+There is one gate. A person's *Wait*, the end of a step, a breakpoint, and each fault are reasons to
+hold it, and only *go on* or a step opens it. A step opens it for one call.
 """
 
 from collections.abc import Awaitable, Callable, Iterable
@@ -7,13 +10,27 @@ from typing import Final
 
 from msgspec.structs import replace
 
-from action_assistant.errors import Conflict
+from action_assistant.errors import BadInput, Conflict
 from action_assistant.kit.clock import ClockUs
-from action_assistant.runner.execution.conducted_steps import Gate, Tell
+from action_assistant.runner.execution.conducted_steps import (
+    Gate,
+    GoOn,
+    Step,
+    StepLimit,
+    Tell,
+)
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import Claim
-from action_assistant.runner.runs.events import Author, HandedOver, Held, Released, Requested
+from action_assistant.runner.runs.events import (
+    Author,
+    HandedOver,
+    Held,
+    HeldHow,
+    PieceWaits,
+    Released,
+    Requested,
+)
 from action_assistant.web.auth.identity import Identity
 
 
@@ -44,14 +61,95 @@ class LedGate(Gate):
         self._registry = robots
         self._clock_us = clock_us
         self._tell = tell
+        self._ready: dict[int, Step] = {}  # the steps that wait before the gate, by call
+        self._noted: set[int] = set()  # those of which that is recorded
+        self._let: Step | None = None  # the only step that may pass, since a person let it
+        self._let_by: Author | None = None
+        self._until = ""  # the action before which the run is held again
 
-    def hold_run(self, why: str, by: Author | None = None) -> None:
-        """Hold the run and record that, unless it is held or stopped already. `by`: None for the
-        runner."""
-        if self.held is None and not self.is_final:
-            held = Held(at=self._clock_us(), why=why, by=by)
-            self.hold(held)
-            self._tell(held)
+    def hold_run(
+        self, why: str, by: Author | None = None, *, how: HeldHow = "trouble", node: str = ""
+    ) -> None:
+        """Hold the run and record that, unless it is stopped, or held already for a reason of this
+        kind. A fault is recorded also where a person made the run wait, so that whoever lets it go on
+        has seen it. `by`: None for the runner; `node`: as in `Held`."""
+        self._hold(Held(at=self._clock_us(), why=why, by=by, how=how, node=node))
+
+    def wait_for_person(self, by: Author, reason: str, request_id: str) -> None:
+        """Hold the run before its next action, since a person wants that; do nothing if it is held.
+        `reason`: given by the person, may be ""; `request_id`: of the press."""
+        why = f"{by.name} made it wait: {reason}" if reason else f"{by.name} made it wait."
+        now = self._clock_us()
+        held = Held(at=now, why=why, by=by, how="wait", reason=reason, request_id=request_id)
+        self._hold(held, by.id)
+
+    def _hold(self, held: Held, author: str = "") -> None:
+        is_news = held.how == "trouble" and self.held is not None and self.held.how != "trouble"
+        if self.is_final or (self.held is not None and not is_news):
+            return
+        self.hold(held)
+        self._let, self._let_by, self._until = None, None, ""
+        self._tell(held, author)
+        for step in self._ready.values():
+            self._note_waiting(step)
+
+    def _note_waiting(self, step: Step) -> None:
+        call = step.call.number
+        if call not in self._noted:
+            self._noted.add(call)
+            now = self._clock_us()
+            self._tell(PieceWaits(at=now, call=call, node=step.node, engine=step.engine))
+
+    async def admit(self, step: Step) -> None:
+        """Wait until the gate lets the piece of this step pass, and record that it waits."""
+        self._halt_before(step)
+        if self.lets(step):
+            return
+        self._ready[step.call.number] = step
+        try:
+            if self.held is not None:
+                self._note_waiting(step)
+            while not self.lets(step):
+                await self._opened.wait()
+                self._halt_before(step)
+        finally:
+            del self._ready[step.call.number]
+            self._noted.discard(step.call.number)
+
+    def lets(self, step: Step) -> bool:
+        """Return whether the piece of this step may leave now."""
+        return self.is_open and self._let in (None, step)
+
+    def _halt_before(self, step: Step) -> None:
+        """Hold the run if it is to wait before this step."""
+        if self.is_open and step.node == self._until:
+            why = f"It went on until {step.node}, which waits to begin."
+            self.hold_run(why, self._let_by, how="step", node=step.node)
+
+    def passed(self, step: Step) -> None:
+        """Hold the run again if this step was the only one that might pass: its piece has left, or
+        it has ended without one."""
+        if step is self._let:
+            self.hold_run("One step was made.", self._let_by, how="step", node=step.node)
+
+    def _next(self, limit: StepLimit) -> Step | None:
+        """Return the only step that may pass by this limit; None if there is no such limit. Raise
+        BadInput for a name that no action has, Conflict if nothing waits, or not the named action, or the one before which to wait waits."""
+        for path, name in (("/action", limit.action), ("/until", limit.until)):
+            if name and name not in self._first.actions:
+                raise BadInput(f"{name} is no action of this run.", where={"path": path})
+        ready = [self._ready[call] for call in sorted(self._ready)]
+        if limit.until in {step.node for step in ready}:
+            text = f"{limit.until} waits to begin already: let it begin by a step."
+            raise Conflict(text, where={"path": "/until"})
+        if not limit.only:
+            return None
+        found = [step for step in ready if limit.action in {"", step.node}]
+        if found:
+            return found[0]
+        names = ", ".join(f"{step.node} on {step.engine}" for step in ready)
+        what = f"Only {names} waits to begin." if names else "No action waits to begin now."
+        raise Conflict(f"No step was made. {what}", where={"path": "/action"})
 
     def why_not_allowed(self, robot: str) -> str:
         """Return why the person for whom the run is led may begin nothing on a robot now; "" if they
@@ -78,33 +176,32 @@ class LedGate(Gate):
             self._tell(HandedOver(at=self._clock_us(), author=author, to=person), author.id)
             await pass_batons()
 
-    async def go_on(
-        self,
-        author: Author,
-        lead: Identity,
-        names: Iterable[str],
-        request_id: str,
-        watching: tuple[str, ...],
-    ) -> None:
-        """Wait for the answers of the robots with these names, then let a held run go on for `lead`.
-        Raise Conflict if one of them may begin no piece, if the run is held no more as it was, or if
-        `lead` may not start on one of its robots any more. `request_id`: of the press, "" for none;
-        `watching`: the robots that `lead` says to watch."""
-        held = self.held
-        claim = replace(self.claim, watching=frozenset(watching))
+    async def go_on(self, press: GoOn, names: Iterable[str]) -> None:
+        """Wait for the answers of the robots with these names, then let a held run go on. Raise
+        BadInput if the limit names no action of the run, Conflict if one of the robots may begin no
+        piece, if the run is held no more as it was, if nothing waits for a step, or if the person may
+        not start on one of its robots any more."""
+        held, lead = self.held, press.lead
+        step = self._next(press.limit)
+        claim = replace(self.claim, watching=frozenset(press.watching))
         await self._look.before_going_on(self._registry, names, self._first, lead, claim)
         if held is None or self.held is not held or self.is_final:
             raise Conflict("The run has gone on, or was stopped, meanwhile.")
+        if step is not self._next(press.limit):
+            raise Conflict("Another action waits to begin than before. Look at it first.")
         for name in sorted(self.robots):  # in the step in which the gate opens
             if why := self._look.why_not_allowed(name, lead, claim):
                 raise Conflict(f"Nothing has gone on. {why}", where={"path": "/robots"})
         self.person, self.claim = lead, claim
+        self._let, self._let_by, self._until = step, press.author, press.limit.until
         released = Released(
             at=self._clock_us(),
-            author=author,
+            author=press.author,
             since=held.at,
-            request_id=request_id,
-            watching=watching,
+            request_id=press.request_id,
+            watching=press.watching,
+            step=step.node if step is not None else "",
+            until=press.limit.until,
         )
-        self._tell(released, author.id)
+        self._tell(released, press.author.id)
         self.release()

@@ -4,7 +4,7 @@ It lives on one event loop. Open runs are in memory; the journal has all runs.
 """
 
 import logging
-from collections.abc import AsyncIterator, Callable, Iterable, Mapping
+from collections.abc import AsyncIterator, Callable, Iterable
 from contextlib import asynccontextmanager
 from functools import partial
 from typing import Any, Final
@@ -13,12 +13,17 @@ import anyio
 import msgspec
 from sqlalchemy import Row
 
-from action_assistant.errors import Conflict, Forbidden, NotFound
+from action_assistant.errors import Conflict, NotFound
 from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution import interventions
-from action_assistant.runner.execution.conducted_steps import Word
 from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.late_activity import LateActivity
+from action_assistant.runner.execution.led_commands import (
+    LedCommands,
+    claim_of,
+    no_piece,
+    operator_of,
+)
 from action_assistant.runner.execution.led_look import LedLook
 from action_assistant.runner.execution.open_runs import OpenRuns
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -36,22 +41,20 @@ from action_assistant.runner.robots.registration import (
     with_rights,
 )
 from action_assistant.runner.robots.registry import Robots
-from action_assistant.runner.robots.rights import OF_PEOPLE, Claim
+from action_assistant.runner.robots.rights import OF_PEOPLE
 from action_assistant.runner.robots.robot_events import Commanded
 from action_assistant.runner.runs import queries
 from action_assistant.runner.runs.events import Author, Ended
 from action_assistant.runner.runs.history import Past, RunHistory, RunnerJournal, whole_of
 from action_assistant.runner.runs.recorder import RunRecorder
-from action_assistant.runner.runs.run import Press, Run, go_on_press, outcome_press
+from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sight import RunGraphs, Unseen, run_graphs
-from action_assistant.runner.runs.views import microseconds, time
+from action_assistant.runner.runs.views import time
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.admission import (
-    GoOnRequest,
     GroupRequest,
     ResumeRequest,
     StartRequest,
-    WordRequest,
     watched_in,
 )
 from action_assistant.runner.start.approvals import Approvals
@@ -62,10 +65,8 @@ from action_assistant.runner.start.preflight import Preflight
 from action_assistant.runner.start.rights_registry import IdentityNow, RightsRegistry, unchanged
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop, StoppedAll
 from action_assistant.umrf.files.codec import Unreadable
-from action_assistant.umrf.model import Precondition
-from action_assistant.web.auth.caller import BackgroundTasks, origin_of
+from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.identity import Identity
-from action_assistant.web.auth.keys import Person
 from action_assistant.web.workers.lanes import RunInWorker
 
 log: Final = logging.getLogger(__name__)
@@ -74,12 +75,6 @@ _LOST: Final = (
     "The runner ended while this simulation went on, and the simulated engine with it. Nothing "
     "shows how it would have ended."
 )
-#: The outcomes that a person can give.
-_OUTCOMES: Final[Mapping[str, Precondition]] = {
-    "true": "on_true",
-    "false": "on_false",
-    "error": "on_error",
-}
 
 
 class ExecutionService:
@@ -134,6 +129,14 @@ class ExecutionService:
             sources=sources,
         )
         self._conductors = Conductors(robots, look, self._runs, self.history, simulator, runtime)
+        self._led = LedCommands(
+            self._conductors, self.rights, self.sight, movable=self._movable, find=self.find
+        )
+        self.go_on: Final = self._led.go_on
+        self.step: Final = self._led.step
+        self.wait: Final = self._led.wait
+        self.hand_over: Final = self._led.hand_over
+        self.give_outcome: Final = self._led.give_outcome
         self._starts = StartPipeline(
             self._runs, self._checks, self._stops, self._conductors, self.rights, runtime
         )
@@ -201,7 +204,7 @@ class ExecutionService:
         """Carry out a start, at most once per request id. Return after the one start message was sent.
         `identity`: that of the author; None for an operator without groups. Raise a subclass of Refused
         if the start is refused; nothing was sent then."""
-        starter = identity or _operator(author)
+        starter = identity or operator_of(author)
         self.rights.act(starter)
         return await self._starts.start(request, author, starter)
 
@@ -211,7 +214,7 @@ class ExecutionService:
         """Start one version on several robots, and return the runs and the robots that nothing was
         sent to. All starts are accepted before the first message is sent. `identity`: as for `start`.
         Raise a subclass of Refused if one start is refused; nothing was sent to any robot then."""
-        starter = identity or _operator(author)
+        starter = identity or operator_of(author)
         self.rights.act(starter)
         return await self._starts.start_group(group, author, starter)
 
@@ -221,7 +224,7 @@ class ExecutionService:
         """Return the pre-flight of a start on each engine; `starter` is the id of the person who
         would start, `identity` as for `start`. Only a get is sent. Raise Forbidden if the starter may
         not see the graph, or one inside."""
-        by = identity or _operator(Author(starter, ""))
+        by = identity or operator_of(Author(starter, ""))
         await self._checks.require_sight(group, by)
         return await self._checks.look(group, by)
 
@@ -310,7 +313,7 @@ class ExecutionService:
 
     async def pause(self, run: str, author: Author) -> Run:
         """Pause a run. Raise NotFound, Conflict if it cannot be paused, Unavailable if not sent."""
-        return await interventions.pause(_no_piece(await self._movable(run)), author)
+        return await interventions.pause(no_piece(await self._movable(run)), author)
 
     async def resume(
         self,
@@ -322,19 +325,10 @@ class ExecutionService:
         """Resume a paused run. Raise NotFound if there is no such run, Conflict if it is not
         paused, Unavailable if the message could not be sent, Forbidden or Conflict if the author may
         not start on its robot."""
-        opened = _no_piece(await self._movable(run))
+        opened = no_piece(await self._movable(run))
         watching = watched_in(asked.watching if asked else {}, opened.run.robots)
-        self._require_rights(opened.run, author, identity, _claim(opened.run, watching))
+        self._led.require_rights(opened.run, author, identity, claim_of(opened.run, watching))
         return await interventions.resume(opened, author, watching)
-
-    def _require_rights(
-        self, run: Run, author: Author, identity: Identity | None, claim: Claim | None = None
-    ) -> None:
-        """Raise Forbidden or Conflict unless the author may start on each robot of a run. `claim`: as
-        for `RightsRegistry.refusals`."""
-        by = identity or _operator(author)
-        self.rights.act(by)
-        self.rights.require(run.robots, by, claim)
 
     async def modify(
         self, run: str, body: bytes, author: Author, identity: Identity | None = None
@@ -342,8 +336,8 @@ class ExecutionService:
         """Give a run another version of its graph; `body` is an encoded ModifyRequest. Raise
         NotFound if there is no such run, Forbidden or Conflict if the author may not start on its
         robot, and what `interventions.modify` raises."""
-        opened = _no_piece(await self._movable(run))
-        by = identity or _operator(author)
+        opened = no_piece(await self._movable(run))
+        by = identity or operator_of(author)
         self.rights.act(by)
         self.rights.require(opened.run.robots, by, only=OF_PEOPLE)
         engine = self.robots.link(opened.run.engine)
@@ -354,107 +348,10 @@ class ExecutionService:
             engine=engine,
             approvals=self.approvals,
             run_in_worker=self._runtime.run_in_worker,
-            require=partial(self._require_rights, opened.run, author, identity),
+            require=partial(self._led.require_rights, opened.run, author, identity),
             sight=self.sight,
             identity=by,
         )
-
-    async def go_on(
-        self, run: str, asked: GoOnRequest, author: Author, identity: Identity | None = None
-    ) -> Run:
-        """Let a held led run go on, which may start actions on its robots; return the run.
-        `asked`: since when the person saw it held. A repeat of a request that was carried out
-        changes nothing, and returns the run as it is now. Raise NotFound if there is no such run,
-        Conflict if it is over, being stopped, not held since that time, or one of its robots does
-        not answer or may begin nothing; Forbidden or Conflict if the author may not start on each of
-        them."""
-        press = go_on_press(author, microseconds(asked.since))
-        async with self._conductors.once(run, asked.request_id):
-            found = await self._repeated(run, asked.request_id, press)
-            return found or await self._go_on(run, asked, author, identity)
-
-    async def _repeated(self, run: str, request_id: str, press: Press) -> Run | None:
-        """Return the run as it is now if a press with this request id has counted in it; None if none
-        has. Raise NotFound if there is no such run, Conflict if the request id belongs to another
-        press."""
-        if not request_id:
-            return None
-        found = await self.find(run)
-        known = found.pressed.get(request_id)
-        if known is None:
-            return None
-        if not known.is_repeated_by(press):
-            raise Conflict(
-                "This request_id belongs to another request.", where={"path": "/request_id"}
-            )
-        return found
-
-    async def _go_on(
-        self, run: str, asked: GoOnRequest, author: Author, identity: Identity | None
-    ) -> Run:
-        opened = await self._movable(run)
-        held = opened.run.held
-        if held is None:
-            raise Conflict("The run is not held; it goes on already.")
-        if time(held.at) != asked.since:
-            raise Conflict(
-                f"The run has gone on since and is held again: {held.why} Look at it first.",
-                where={"path": "/since"},
-            )
-        if opened.run.desired == "stopped":
-            raise Conflict("The run is being stopped.")
-        watching = watched_in(asked.watching, opened.run.robots)
-        self._require_rights(opened.run, author, identity, _claim(opened.run, watching))
-        lead = identity or _operator(author)
-        await self._conductors.go_on(run, author, lead, asked.request_id, watching)
-        return opened.run
-
-    async def hand_over(
-        self, run: str, to: str, author: Author, identity: Identity | None = None
-    ) -> Run:
-        """Hand a led run over to a person who has a page open, with all batons of its robots. It
-        goes on, unless it is held. Raise NotFound if there is no such run, Conflict or Forbidden if the
-        author lacks a baton or the other person may not start on a robot of it, Unavailable if it
-        could not be stored: then it is held."""
-        opened = await self._movable(run)
-        if opened.run.led is None:
-            raise Conflict("Only a run that is led has further starts to hand over.")
-        by, receiver = identity or _operator(author), self.rights.require_present(to)
-        if self.sight.hides(run_graphs(opened.run), receiver):
-            raise Forbidden("That person may not see the graph of this run.")
-        robots = opened.run.robots
-        events = self.rights.handing(robots, run, receiver, by, author)
-        self.rights.require(set(robots) - set(events), receiver)
-        passing = partial(self.rights.carry_out_handing, events, receiver, author)
-        await self._conductors.hand_over(run, author, receiver, passing)
-        return opened.run
-
-    async def give_outcome(
-        self, run: str, asked: WordRequest, author: Author, identity: Identity | None = None
-    ) -> Run:
-        """Take the outcome of an action in a led run from a person, where the robot does not
-        show it, and store it; return the run. A repeat of a request that was carried out changes
-        nothing. Raise NotFound if there is no such run, Conflict if no outcome is asked for,
-        OutcomeUnknown if it is not stored within 5 s, Forbidden or Conflict if the author may not start
-        on each robot of the run: the next action may begin."""
-        outcome = _OUTCOMES[asked.outcome]
-        press = outcome_press(author, asked.action, outcome, asked.piece, asked.reason)
-        word = Word(
-            outcome=outcome,
-            by=author,
-            reason=asked.reason,
-            piece=asked.piece,
-            origin=origin_of(author.id),
-            request_id=asked.request_id,
-        )
-        async with self._conductors.once(run, asked.request_id):
-            found = await self._repeated(run, asked.request_id, press)
-            if found is not None:
-                return found
-            opened = await self._movable(run)
-            self._require_rights(opened.run, author, identity)
-            await self._conductors.give_word(run, asked.action, word)
-            return opened.run
 
     async def confirm_rest(self, run: str, asked: interventions.RestRequest, author: Author) -> Run:
         """Record that a person has seen a run at rest (nothing moves), where its engine cannot
@@ -670,31 +567,6 @@ def _ignore_stop(_author: Author, _robot: str, _run: str) -> None:
     """Ignore a Stop that found nothing to stop."""
 
 
-def _operator(author: Author) -> Identity:
-    return Identity(Person(author.id, author.name, "operator"))
-
-
-def _claim(run: Run, watching: tuple[str, ...]) -> Claim:
-    """Return what a run brings to the rules of its robots when a person who watches these robots lets
-    it go on."""
-    return Claim(
-        digest=run.tree_digest or run.digest, watching=frozenset(watching), is_drill=run.drill
-    )
-
-
 def _wholes_of(run: Run) -> set[str]:
     """Return the ids of what a run is a part of: a group, and a led run whose piece it is."""
     return {run.group or "", run.piece.run if run.piece is not None else ""} - {""}
-
-
-def _no_piece(opened: OpenRun) -> OpenRun:
-    """Return the run unless it is a piece of a led run, to which only the conductor gives
-    orders; raise Conflict then."""
-    piece = opened.run.piece
-    if piece is not None:
-        raise Conflict(
-            f"This is {piece.node} in run {piece.run}, which is led: it can be stopped, not paused or "
-            "changed.",
-            where={"path": "/run", "run": piece.run},
-        )
-    return opened

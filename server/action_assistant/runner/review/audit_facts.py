@@ -68,6 +68,8 @@ class _Body(msgspec.Struct, frozen=True):
     node: str = ""
     outcome: str = ""
     how: str = ""
+    step: str = ""
+    until: str = ""
     name: str = ""
     robot: str = ""
     folder: str = ""
@@ -173,7 +175,15 @@ class RunnerFacts:
             case "run.held.v1":
                 if body.by is None:
                     return None
+                if body.how == "wait":
+                    because = f": {body.reason}" if body.reason else ""
+                    return self._about_run(whole, "starts", f"made {{run}} wait{because}")
+                if body.how:
+                    return None  # the step before it is the press of a person
                 return self._about_run(whole, "starts", f"held {{run}}: {body.why}")
+            case "run.released.v1" if body.step or body.until:
+                limit = f"one step: {body.step}" if body.step else f"steps until {body.until}"
+                return self._about_run(whole, "starts", f"let {{run}} make {limit}")
             case "robot.drilled.v1":
                 passed = body.proof_us is not None and body.saw_it_stop and body.hardware_stop
                 how = "it passed" if passed else "it failed"

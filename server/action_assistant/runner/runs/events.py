@@ -398,21 +398,45 @@ class PieceEnded(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     request_id: str = ""
 
 
+#: The kinds of reasons for which the gate of a led run is held.
+HeldHow: TypeAlias = Literal["trouble", "wait", "step", "breakpoint"]
+
+
 class Held(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """No further piece of a led run begins until a person lets it go on. `by`: None where the
-    runner itself holds it; `why`: the reason, as a sentence."""
+    runner itself holds it; `why`: the reason, as a sentence. `how`: because of a fault or a change of
+    rights ("trouble"), since a person made it wait, after a step, or at a breakpoint. `node`: the action
+    that was let through by the step, or before which it waits; `reason`, `request_id`: those of the
+    person who made it wait."""
 
     kind: ClassVar[str] = "run.held.v1"
 
     at: int
     why: str
     by: Author | None = None
+    how: HeldHow = "trouble"
+    node: str = ""
+    reason: str = ""
+    request_id: str = ""
+
+
+class PieceWaits(msgspec.Struct, frozen=True, kw_only=True):
+    """A call of a led run is ready to begin, and waits before the held gate. It waits until its piece
+    begins, or the call ends."""
+
+    kind: ClassVar[str] = "run.piece_waits.v1"
+
+    at: int
+    call: int
+    node: str
+    engine: str
 
 
 class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     """A person let a held run go on. `since`: when it was held; 0 in events of earlier versions;
     `request_id`: names the press, "" where the caller gave none. `watching`: the robots that they said
-    to watch."""
+    to watch. `step`: the only action that may begin, after which the run is held again, "" for no such
+    limit; `until`: the action before which it is held again, "" for none."""
 
     kind: ClassVar[str] = "run.released.v1"
 
@@ -421,6 +445,8 @@ class Released(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     since: int = 0
     request_id: str = ""
     watching: tuple[str, ...] = ()
+    step: str = ""
+    until: str = ""
 
 
 class HandedOver(msgspec.Struct, frozen=True, kw_only=True):
@@ -462,6 +488,7 @@ RunEvent: TypeAlias = (
     | PieceSeen
     | PieceRest
     | PieceEnded
+    | PieceWaits
     | Held
     | Released
     | HandedOver
@@ -494,6 +521,7 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
         PieceSeen,
         PieceRest,
         PieceEnded,
+        PieceWaits,
         Held,
         Released,
         HandedOver,

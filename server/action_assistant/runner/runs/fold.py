@@ -39,6 +39,7 @@ from action_assistant.runner.runs.events import (
     PieceEnded,
     PieceRest,
     PieceSeen,
+    PieceWaits,
     Proof,
     Published,
     Released,
@@ -59,6 +60,8 @@ from action_assistant.runner.runs.run import (
     Said,
     go_on_press,
     outcome_press,
+    step_press,
+    wait_press,
 )
 from action_assistant.runner.runs.sight import graphs_inside
 from action_assistant.runner.runs.visits import (
@@ -179,20 +182,23 @@ def follow(run: Run, event: RunEvent) -> Run:
             return _end(run, event)
         case PieceSeen():
             return _piece_seen(run, event)
-        case Held():
-            return replace(run, held=event)
-        case Released():
-            press = go_on_press(event.author, event.since)
-            return _pressed(replace(run, held=None, lead=event.author), event.request_id, press)
+        case Held(by=by):
+            held = replace(run, held=event)
+            return held if by is None else _pressed(held, event.request_id, wait_press(by))
+        case PieceWaits():
+            return replace(run, waits=run.waits | {event.call: (event.node, event.engine)})
+        case Released(author=by, since=since, step=step, until=until):
+            is_limited = bool(step or until)
+            press = step_press(by, since, step, until) if is_limited else go_on_press(by, since)
+            return _pressed(replace(run, held=None, lead=by), event.request_id, press)
         case HandedOver():
             return replace(run, lead=event.to)
         case PieceEnded():
             return _piece_ended(run, event)
         case PieceBegan():
             action = replace(run.actions.get(event.node, _UNSEEN), piece=event.piece)
-            return _piece_rest(
-                replace(run, actions=run.actions | {event.node: action}), _going(event)
-            )
+            actions, waits = run.actions | {event.node: action}, _without(run.waits, event.call)
+            return _piece_rest(replace(run, actions=actions, waits=waits), _going(event))
         case PieceRest():
             return _piece_rest(run, event)
         case Requested() | Unknown():
@@ -228,6 +234,7 @@ def _desired(run: Run, event: PauseRequested | ResumeRequested | StopRequested) 
                 stop_requested_at=event.at,
                 stopped_by=event.author,
                 held=None,
+                waits={},
             )
         case _:
             assert_never(event)
@@ -398,6 +405,7 @@ def _end(run: Run, event: Ended) -> Run:
         moves_again_at=None,
         unknown_since=run.unknown_since if event.state == "lost" else None,
         held=None,
+        waits={},
     )
 
 
@@ -420,7 +428,8 @@ def _piece_ended(run: Run, event: PieceEnded) -> Run:
         "inferred" if event.how == "word" else "observed",
         {name: shortened(text) for name, text in event.outputs.items()} or None,
     )
-    run = replace(run, actions=run.actions | {event.node: action})
+    waits = _without(run.waits, event.call)
+    run = replace(run, actions=run.actions | {event.node: action}, waits=waits)
     if event.by is not None and action.call == event.call and action.visits:
         visit = action.older + len(action.visits)
         word = Said(visit=visit, by=event.by, at=event.at, reason=event.reason)
@@ -444,6 +453,10 @@ def _pressed(run: Run, request: str, press: Press) -> Run:
         return run
     kept = tuple(run.pressed.items())[1 - KEPT :]
     return replace(run, pressed=dict(kept) | {request: press})
+
+
+def _without(waits: dict[int, tuple[str, str]], call: int) -> dict[int, tuple[str, str]]:
+    return {number: each for number, each in waits.items() if number != call}
 
 
 def _going(event: PieceBegan) -> PieceRest:

@@ -97,6 +97,17 @@ def go_on_press(by: Author, since: int) -> Press:
     return Press(by.id, ("go on", str(since)))
 
 
+def step_press(by: Author, since: int, action: str, until: str) -> Press:
+    """Return the record of a person's press of *Step*, for a led run that was held at `since`
+    (microseconds UTC). `action`: the one to begin; `until`: the one before which it waits again."""
+    return Press(by.id, ("step", str(since), action, until))
+
+
+def wait_press(by: Author) -> Press:
+    """Return the record of a person's press of *Wait*."""
+    return Press(by.id, ("wait",))
+
+
 def outcome_press(by: Author, action: str, outcome: str, piece: str, reason: str) -> Press:
     """Return the press that gives the outcome of an action by word. `piece`: the id of its piece;
     `outcome`: as `Precondition`, such as "on_true"."""
@@ -125,6 +136,8 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     led: Led | None = None  # of a led run
     piece: PieceOf | None = None  # of a piece of one
     held: Held | None = None  # why a led run begins nothing further
+    #: Of a held run: the actions that are ready to begin and wait, with their robots, by call.
+    waits: dict[int, tuple[str, str]] = {}
     lead: Author | None = None  # who let it go on last, or was handed it; None: its author
     tree_digest: str | None = None  # of the graph together with those inside; None if unknown
     batons: tuple[str, ...] = ()  # the robots whose baton the author held at the start

@@ -11,7 +11,14 @@ from sqlalchemy import Row
 from action_assistant.kit.moments import moment
 from action_assistant.runner.runs.counts import VisitCount, visit_counts
 from action_assistant.runner.runs.durations import DurationBounds, of_run
-from action_assistant.runner.runs.events import AtRest, Author, Overridden, Override, PieceRest
+from action_assistant.runner.runs.events import (
+    AtRest,
+    Author,
+    HeldHow,
+    Overridden,
+    Override,
+    PieceRest,
+)
 from action_assistant.runner.runs.run import Desired, Result, Run, Said, State
 from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgraphs_shown
 from action_assistant.runner.runs.sight import HIDDEN_NAME
@@ -160,13 +167,23 @@ class AtRestShown(msgspec.Struct, frozen=True):
     how: str
 
 
-class HeldShown(msgspec.Struct, frozen=True):
+class NextShown(msgspec.Struct, frozen=True):
+    """An action (by its full name) that is ready to begin, and its robot."""
+
+    action: str
+    robot: str
+
+
+class HeldShown(msgspec.Struct, frozen=True, omit_defaults=True):
     """The hold of a led run, which begins nothing further: by whom (null: by the runner), why, and
-    since when."""
+    since when. `how`: by a fault, by a person, after a step, or at a breakpoint; `next`: the actions
+    that wait to begin, the one that has waited longest first."""
 
     by: Author | None
     why: str
     since: datetime
+    how: HeldHow = "trouble"
+    next: tuple[NextShown, ...] = ()
 
     def __post_init__(self) -> None:
         hold_names(self, "why")
@@ -512,7 +529,10 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
 
 def _held(run: Run) -> HeldShown | None:
     held = run.held
-    return None if held is None else HeldShown(held.by, held.why, time(held.at))
+    if held is None:
+        return None
+    ready = tuple(NextShown(*run.waits[call]) for call in sorted(run.waits))
+    return HeldShown(held.by, held.why, time(held.at), held.how, ready)
 
 
 def _at_rest(seen: AtRest | None) -> AtRestShown | None:

@@ -51,6 +51,7 @@ _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 
 #: Made by the client, once per press; "" from a client that repeats nothing.
 _PressId = Annotated[str, msgspec.Meta(max_length=200)]
+_NameText = Annotated[str, msgspec.Meta(max_length=1000)]
 
 #: True for each robot of which a person says that they watch it.
 Watching: TypeAlias = Annotated[dict[_Name, bool], msgspec.Meta(max_length=100)]
@@ -102,6 +103,26 @@ class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     since: datetime
     request_id: _PressId = ""
     watching: Watching = {}
+
+
+class StepRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Lets one action of a held run begin, then holds it again. `since`, `request_id`, `watching`: as in
+    `GoOnRequest`. `action`: the full name of the one to begin, "" for the one that has waited longest;
+    `until`: in place of it, all begin that come before this action."""
+
+    since: datetime
+    request_id: _PressId = ""
+    watching: Watching = {}
+    action: _NameText = ""
+    until: _NameText = ""
+
+
+class WaitRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Lets a led run begin nothing further. `reason`: shown to everybody; `request_id`: as in
+    `GoOnRequest`."""
+
+    reason: Annotated[str, msgspec.Meta(max_length=1000)] = ""
+    request_id: _PressId = ""
 
 
 class ResumeRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
