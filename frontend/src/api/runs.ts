@@ -233,6 +233,30 @@ export function letGoOn(
   });
 }
 
+/** Let one action of a held run begin, if it is still held since this moment, and hold it again. */
+export function letStep(
+  runner: string,
+  run: string,
+  since: string,
+  action: string,
+  watching: Watching = {},
+): Promise<Run> {
+  return sendPress(`step ${run} ${since} ${action}`, (request) => {
+    const body = { since, request_id: request, watching, action };
+    return runnerAt(runner).post("/api/runs/{run}/step", { path: { run }, body });
+  });
+}
+
+/** Let a led run begin nothing further. What was begun goes on. */
+export function letWait(runner: string, run: string): Promise<Run> {
+  return sendPress(`wait ${run}`, (request) =>
+    runnerAt(runner).post("/api/runs/{run}/wait", {
+      path: { run },
+      body: { request_id: request },
+    }),
+  );
+}
+
 /** An outcome by the word of a person. */
 export type SaidOutcome = RunnerApi["WordRequest"]["outcome"];
 

@@ -23,6 +23,7 @@ import { useProgress } from "../status/progress-inside";
 import { RestList } from "../status/rest-list";
 import { useUnsure } from "../status/silence";
 import { StateLabel } from "../status/state-label";
+import { WaitButton } from "../status/wait-button";
 import { withWaits } from "../status/waits";
 import { Empty } from "../ui/empty";
 import { instant, useNow } from "../ui/times";
@@ -281,6 +282,7 @@ function Shown({ run: newest, bar, start }: { run: Run } & Omit<Props, "id">) {
         status: <RunStatus newest={newest} run={run} past={past} />,
         actions: (
           <>
+            <WaitButton run={newest} />
             <PinRun runner={runner} run={newest.id} />
             <RunActions runner={runner} run={newest} engines={engines} onStart={setAgain} />
           </>

@@ -20,14 +20,24 @@ test("a held run says what goes on all the same, and on which robot", () => {
   };
   const words = heldWords(run({ actions }), NONE);
   expect(words?.why).toBe("Waiting: Look_0 on David: the robot does not answer.");
-  expect(words?.moving).toMatch(/^What was begun goes on: Drive.* on .?Carol.?, Beep.* on the sim/);
+  expect(words?.moving).toMatch(/^STILL MOVING: Drive.* on .?Carol.?, Beep.* on the sim/);
   expect(words?.moving).not.toContain("Look");
 });
 
 test("what a robot does that does not answer is not known, and may go on", () => {
   const actions = { Drive_0: action("RUNNING", "Carol"), Look_0: action("RUNNING", "David") };
   const words = heldWords(run({ actions }), new Set(["David"]));
-  expect(words?.moving).toMatch(/goes on: Drive.* on .?Carol.?\. Not known, .*: Look.* on .?David/);
+  expect(words?.moving).toMatch(
+    /^STILL MOVING: Drive.* on .?Carol.?\. Not known, .*: Look.* on .?David/,
+  );
+});
+
+test("an action moves still until its rest is proven, also where it was seen to end", () => {
+  const actions = { Lift_0: action("FINISHED", "David") };
+  const words = (state: string) =>
+    heldWords(run({ actions, rests: [{ robot: "David", state, action: "Lift_0" }] }), NONE)?.moving;
+  expect(words("going")).toMatch(/^STILL MOVING: Lift.* on .?David.?\.$/);
+  expect(words("proven")).toBe("No action was seen to move.");
 });
 
 test("it never says that nothing moves, only that nothing was seen to", () => {

@@ -1,6 +1,6 @@
-/** A led run that waits for a person: the reason, what moves all the same, and *Go on*. */
+/** A led run that waits for a person: the reason, what moves all the same, *Step* and *Go on*. */
 import { notifications } from "@mantine/notifications";
-import { IconHandStop, IconPlayerPlayFilled } from "@tabler/icons-react";
+import { IconHandStop, IconPlayerPlayFilled, IconPlayerTrackNext } from "@tabler/icons-react";
 import { useMutation } from "@tanstack/react-query";
 import { errorText, isOutcomeUnknown } from "../api/http";
 import { enginesOf } from "../api/led-runs";
@@ -9,29 +9,43 @@ import { useLive } from "../api/page-link";
 import { useMay } from "../api/people";
 import { SIMULATOR } from "../api/robots";
 import { MOVES } from "../api/run-stop";
-import { letGoOn, type Run } from "../api/runs";
+import { letGoOn, letStep, type Run } from "../api/runs";
 import { HoldButton } from "../ui/hold-button";
 import { isolated } from "../words/isolated";
 import style from "./held-notice.module.css";
 import { actionWords } from "./level-places";
 import { OutcomeQuestions } from "./outcome-question";
+import { movingRests } from "./rests";
 import { ServiceNotices } from "./robot-rights";
 import { useWatching, WatchTicks } from "./watching";
 
-/** Return what goes on while a run is held, and what nobody knows since its robot does not answer. */
+const NEXT = 3; // buttons of actions that wait
+
+/** An action and its robot in words; the robot is "" in the simulator. */
+function placeWords(run: Run, action: string, robot: string): string {
+  return `${actionWords(run, action)} on ${robot ? isolated(robot) : "the simulator"}`;
+}
+
+/**
+ * Return what goes on while a run is held, until its rest is proven, and what nobody knows since its
+ * robot does not answer.
+ */
 function movingWords(run: Run, silent: ReadonlySet<string>): string {
-  const begun = Object.entries(run.actions ?? {}).filter(([, { state }]) => MOVES.has(state));
+  const seen = Object.entries(run.actions ?? {})
+    .filter(([, { state }]) => MOVES.has(state))
+    .map(([action, { robot }]) => ({ action, robot: robot ?? "" }));
+  const begun = [
+    ...seen,
+    ...movingRests(run).filter(({ action }) => !seen.some((each) => each.action === action)),
+  ];
   const said = (known: boolean) =>
     begun
-      .filter(([, { robot }]) => silent.has(robot ?? "") !== known)
-      .map(([name, { robot }]) => {
-        const where = robot ? isolated(robot) : "the simulator";
-        return `${actionWords(run, name)} on ${where}`;
-      })
+      .filter(({ robot }) => silent.has(robot) !== known)
+      .map(({ action, robot }) => placeWords(run, action, robot))
       .join(", ");
   const [goes, unknown] = [said(true), said(false)];
   const sentences = [
-    goes === "" ? "" : `What was begun goes on: ${goes}.`,
+    goes === "" ? "" : `STILL MOVING: ${goes}.`,
     unknown === "" ? "" : `Not known, and may go on: ${unknown}.`,
   ];
   return sentences.join(" ").trim() || "No action was seen to move.";
@@ -54,7 +68,7 @@ export function heldWords(
 
 function failure(error: unknown, run: Run) {
   const message = errorText(error);
-  if (!isOutcomeUnknown(error)) return { color: "red", title: "It does not go on", message };
+  if (!isOutcomeUnknown(error)) return { color: "red", title: "Nothing has begun", message };
   return {
     color: "red",
     autoClose: false as const,
@@ -63,14 +77,20 @@ function failure(error: unknown, run: Run) {
   };
 }
 
-function GoOnButton({ run, since }: { run: Run; since: string }) {
+function StartButtons({ run, since }: { run: Run; since: string }) {
   const { live, runner, now } = useLive();
   const watch = useWatching(enginesOf(run));
-  const goOn = useMutation({
-    mutationFn: () => letGoOn(runner ?? "", run.id, since, watch.watching),
+  const press = useMutation({
+    /** `action`: the only one to begin; null for all. */
+    mutationFn: (action: string | null) =>
+      action === null
+        ? letGoOn(runner ?? "", run.id, since, watch.watching)
+        : letStep(runner ?? "", run.id, since, action, watch.watching),
     onSuccess: (fresh) => live?.learn(fresh),
     onError: (error) => notifications.show(failure(error, run)),
   });
+  const obstacle = press.isPending ? "Asking …" : watch.obstacle;
+  const disabled = obstacle !== null || now.link !== "live";
   const robots = enginesOf(run).filter((engine) => engine !== SIMULATOR);
   const players = robots.map(isolated).join(", ");
   const moves =
@@ -78,14 +98,29 @@ function GoOnButton({ run, since }: { run: Run; since: string }) {
   return (
     <>
       <WatchTicks watch={watch} />
+      {(run.held?.next ?? []).slice(0, NEXT).map(({ action, robot }) => {
+        const place = placeWords(run, action, robot);
+        return (
+          <HoldButton
+            key={action}
+            size="compact-sm"
+            icon={<IconPlayerTrackNext size={13} aria-hidden />}
+            label={`Step: ${actionWords(run, action)}`}
+            name={`Let only ${place} begin, then wait again`}
+            question={`Let only ${place} begin? It may move at once.`}
+            disabled={disabled}
+            onHeld={() => press.mutate(action)}
+          />
+        );
+      })}
       <HoldButton
         size="compact-sm"
         icon={<IconPlayerPlayFilled size={13} aria-hidden />}
-        label={goOn.isPending ? "Asking …" : (watch.obstacle ?? "Hold to go on")}
+        label={obstacle ?? "Hold to go on"}
         name={`Let run ${run.number} go on`}
         question={`Let run ${run.number} go on? ${moves}`}
-        disabled={goOn.isPending || watch.obstacle !== null || now.link !== "live"}
-        onHeld={() => goOn.mutate()}
+        disabled={disabled}
+        onHeld={() => press.mutate(null)}
       />
     </>
   );
@@ -114,7 +149,7 @@ function HeldNotice({ run }: { run: Run }) {
         <b>{words.why}</b> {words.moving}
       </p>
       {may ? (
-        <GoOnButton key={run.held.since} run={run} since={run.held.since} />
+        <StartButtons key={run.held.since} run={run} since={run.held.since} />
       ) : (
         <span>Operators can let it go on.</span>
       )}

@@ -29,6 +29,13 @@ export function openRests(run: Run): RobotRest[] {
   return [...silent, ...others].filter(({ piece }) => piece);
 }
 
+/** Return the actions of a led run that go on as far as is known: their rest is not proven. */
+export function movingRests(run: Run): { action: string; robot: string }[] {
+  return (run.rests ?? [])
+    .filter(({ state, action }) => state === "going" && action)
+    .map(({ action, robot }) => ({ action: action ?? "", robot }));
+}
+
 const sentence = (text: string) => text.replace(/\.$/, "");
 
 export function restWords(rest: RobotRest, run: Run): Pick<RestLine, "tone" | "words"> {

@@ -23,6 +23,7 @@ import { serverTimeOf } from "../../clock/server-clock";
 import { boundsText } from "../../status/durations";
 import { useRunStatus } from "../../status/progress";
 import { StateLabel } from "../../status/state-label";
+import { WaitButton } from "../../status/wait-button";
 import { useWatching, WatchTicks } from "../../status/watching";
 import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { colorOfName } from "../../ui/name-colors";
@@ -179,6 +180,7 @@ export function RunHead(props: Props) {
         )}
         {goes && !run.robots && <ConfirmRestButton key={run.id} run={run} />}
         {goes && <PauseButton run={run} />}
+        <WaitButton run={run} />
         <Ways run={run} />
         {folded !== null && <FoldButton folded={folded} onFold={onFold} />}
       </span>
