@@ -58,7 +58,7 @@ def owner(product: Product) -> Iterator[httpx.Client]:
 
 
 class Named(NamedTuple):
-    """What a rule says of a person: by their own id, or by a group."""
+    """Names a person in a rule: by their own id, or by a group."""
 
     readers: bool = False
     editors: bool = False

@@ -256,7 +256,7 @@ async def test_a_stop_of_everything_passes_by_what_fails_in_one_run() -> None:
 
 @virtual
 async def test_a_stop_is_taken_before_it_is_asked_what_its_sender_may_see() -> None:
-    """And if that fails, it is answered without the names of others' graphs."""
+    """If that fails, the Stop is answered without the names of others' graphs."""
     async with Harness().runner() as control:
         run = (await control.start(order(sequence(), script=ENDLESS), ANN)).run.id
         desired: list[str] = []

@@ -291,7 +291,7 @@ async def test_a_baton_that_goes_while_a_piece_is_stored_keeps_it_from_leaving()
 
 
 def confirmed(identity: Identity, age_s: float = 0.0) -> Identity:
-    """The same person, who asks now and was confirmed so long ago."""
+    """Return the identity of a person who asks now and was confirmed so long ago."""
     now = clock_us() / 1e6
     return msgspec.structs.replace(identity, confirmed_at=now - age_s, asked_at=now)
 

@@ -103,7 +103,7 @@ HOUR = 3_600_000_000
 
 
 class Sights:
-    """What a runner learns from starts of one graph. `at`: seconds after or before now."""
+    """Gives a runner starts and statements, from which it learns rules. `at`: seconds after or before now."""
 
     def __init__(self, data: Path) -> None:
         self.data, self.now = data, NOW

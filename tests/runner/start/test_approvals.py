@@ -235,7 +235,7 @@ def test_a_browser_is_known_again_by_both_processes_after_somebody_has_signed_ou
 
 @virtual
 async def test_nobody_approves_or_asks_without_end() -> None:
-    """And nobody is kept from it by others, nor by asking about another robot."""
+    """Nobody is kept from it by others, nor by asking about another robot."""
     harness = Harness()
     approvals = Approvals(harness.journal, clock_us)
 

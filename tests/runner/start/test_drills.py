@@ -137,7 +137,7 @@ async def test_a_drill_takes_its_time_to_proof_from_the_run_and_outlives_the_run
 
 @virtual
 async def test_the_run_of_a_drill_is_changed_like_another_one() -> None:
-    """It needs no earlier drill; a run that was started with one needs that it still counts."""
+    """The change needs no earlier drill; a run that was started with one needs that it still counts."""
     robot = david()
     robot.pauses = True
     async with lab(Harness({"David": robot}), WEEKLY) as control:

@@ -52,7 +52,14 @@ def test_open_sockets_of_a_changed_person_close_within_a_second_and_come_back_ch
         assert (closed(first), closed(second)) == (4401, 4401)
         assert time.monotonic() - begun < 5  # a second, on a computer that has time for it
     with guest.socket(live), guest.socket(room):
-        pass
+        person = guest.http.get("/api/session").json()["person"]
+    name = f"Mary {what}" if what == "name" else f"Mari {what}"
+    assert (person["name"], person["role"] == "editor") == (name, what == "role")
+    rule = {"rule": {"readers": [group], "editors": []}}
+    with product.editor() as editor:
+        assert editor.put(f"/api/graphs/{graph}/rule", json=rule).status_code == 200
+    sees = guest.http.get(f"/api/graphs/{graph}/umrf").status_code
+    assert sees == (200 if what == "groups" else 404)
 
 
 def test_a_session_whose_role_rises_gets_a_new_id_and_the_old_one_ends(

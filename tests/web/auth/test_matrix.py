@@ -59,7 +59,7 @@ class Client(NamedTuple):
 
 
 class State(NamedTuple):
-    """What is true of a client after its revocation, or before."""
+    """The facts about a client after its revocation, or before."""
 
     role: Role
     in_group: bool
@@ -347,5 +347,6 @@ def test_every_cell_is_as_the_model_says_before_and_after_each_revocation(
             wrong += [(kind, role, scopes, "after", each) for each in worse]
             if kind == "robot_locked":
                 lab.robots.post("/api/robots/Rover/unlock", json={}).raise_for_status()
+    assert cells > 100
     print(f"{kind}: {cells} cells, {len(wrong)} wrong")  # noqa: T201 - the figure that is asked for
     assert wrong[:10] == []

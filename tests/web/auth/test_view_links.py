@@ -371,7 +371,7 @@ def test_sites_that_may_show_links_are_origins_by_name() -> None:
 
 
 def test_a_key_is_for_one_thing_under_one_token_until_one_end(tmp_path: Path) -> None:
-    """What the file of a link says is sealed by its key: it opens nothing else, nor for longer."""
+    """The key of a link seals what its file says: it opens nothing else, nor for longer."""
     revoked = Revocations(tmp_path)
     links = ViewLinks(tmp_path, KEYS, revoked, "graph")
     made = links.make("mine", "", 1, PersonRef("p", "P"))

@@ -129,7 +129,7 @@ class GraphFile(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class IndexWritten(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
-    """These files were written. `why`: why the other files were not, "" if all were."""
+    """Files were written into an index folder. `why`: why the other files were not, "" if all were."""
 
     kind: ClassVar[str] = "robot.index_written.v1"
 

@@ -1,4 +1,4 @@
-"""Who may see a run, by the rules of its graphs. The runner verifies them without the editor.
+"""Decides who may see a run, by the rules of its graphs, which the runner verifies without the editor.
 
 The rules come with the statement in the data folder, and with the sealed sights of starts: of both the
 newest counts for each graph. A run that somebody may not see shows its robot, its state,
