@@ -16,6 +16,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import ClientConnection
 
 from action_assistant.runner.api.live import Hub, Outbox, attend
+from action_assistant.runner.api.view import EncodedStates
 from action_assistant.runner.execution.start_checks import StartSources
 from action_assistant.runner.runs.sight import HIDDEN_NAME, RunSight, names_seen
 from action_assistant.web.auth.graph_rules import Rule
@@ -355,3 +356,31 @@ async def test_a_change_is_encoded_once_for_all_from_whom_a_run_is_hidden(tmp_pa
         assert "patrol" in hub.frame(opened).text
         lists = [hub.engines(hub.unseen(each)) for each in people]
         assert {id(each) for each in lists} == {id(lists[0])}
+
+
+@virtual
+async def test_the_state_for_links_is_encoded_once_however_many_look_at_once() -> None:
+    async with Harness().runner() as control:
+        hub = Hub(control, clock_us)
+        states = EncodedStates(lambda: hub)
+        run = (await control.start(order(carousel(), script=BUSY), ANN)).run.id
+        opened = control.open[run]
+        await anyio.sleep(1)
+
+        async def looked() -> set[int]:
+            found: set[int] = set()
+
+            async def look() -> None:
+                found.add(id(await states.of(opened)))
+
+            async with anyio.create_task_group() as tasks:
+                for _ in range(30):
+                    tasks.start_soon(look)
+            return found
+
+        first = await looked()
+        before = opened.revision
+        await anyio.sleep(1)
+        assert opened.revision > before
+        assert (len(first), len(await looked())) == (1, 1)
+        assert (await states.of(opened)).revision > before

@@ -143,7 +143,9 @@ class _EncodedHello(msgspec.Struct, frozen=True, tag="hello", tag_field="type"):
     runs: list[msgspec.Raw]
 
 
-class _EncodedMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
+class EncodedMessage(msgspec.Struct, frozen=True, tag="run", tag_field="type"):
+    """A message about a run that is encoded already."""
+
     run: msgspec.Raw
 
 
@@ -273,7 +275,7 @@ class Hub:
         if frame is None or frame.revision != opened.revision:
             began, view = anyio.current_time(), self.run_view(opened)
             run = msgspec.json.encode(views.hidden(view) if is_hidden else view)
-            text = msgspec.json.encode(_EncodedMessage(msgspec.Raw(run))).decode()
+            text = msgspec.json.encode(EncodedMessage(msgspec.Raw(run))).decode()
             now = anyio.current_time()
             next_ = now + _SHARE * (now - began)
             frame = EncodedRun(opened.revision, text, now - began, next_, run)

@@ -3,7 +3,7 @@
 They take no message and stop nothing: whoever looks is no person (decision 125).
 """
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any, Final
 from weakref import WeakKeyDictionary
 
@@ -14,7 +14,7 @@ from litestar.response import Stream
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import NotFound
-from action_assistant.runner.api.live import EncodedRun
+from action_assistant.runner.api.live import EncodedMessage, EncodedRun, Hub
 from action_assistant.runner.api.review import json_of
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.execution.run_loop import OpenRun
@@ -23,7 +23,6 @@ from action_assistant.runner.runs import views
 from action_assistant.runner.runs.shared_view import (
     SharedBeat,
     SharedRun,
-    SharedState,
     SharedStateMessage,
     shared_state,
 )
@@ -41,7 +40,7 @@ _Asking = Request[Any, Any, Any]
 
 def routes(services: RunnerServices, links: ViewLinks) -> list[ControllerRouterHandler]:
     """Return the routes by which a link shows its run, and those by which owners make links."""
-    states, streams = _EncodedStates(services), ViewStreams()
+    states, streams = EncodedStates(lambda: services.hub), ViewStreams()
 
     async def require(run: str) -> None:
         if not await services.worker_queries.newest(run):
@@ -59,9 +58,13 @@ def routes(services: RunnerServices, links: ViewLinks) -> list[ControllerRouterH
         if opened is None:
             found = await services.worker_queries.text(StoredRuns.shared, view.thing)
         else:
-            sent = await services.worker_queries.value(StoredRuns.sent, view.thing)
-            state = await states.of(opened)
-            found = msgspec.json.encode(SharedRun(state, msgspec.Raw(sent.umrf.encode())))
+            if opened not in services.sent:
+                sent = await services.worker_queries.value(StoredRuns.sent, view.thing)
+                services.sent[opened] = sent
+            state, umrf = await states.of(opened), services.sent[opened].umrf
+            found = msgspec.json.encode(
+                _EncodedShared(msgspec.Raw(state.run), msgspec.Raw(umrf.encode()))
+            )
         if not again:
             links.note_opening(view)
         return json_of(found, SharedRun)
@@ -89,34 +92,47 @@ def routes(services: RunnerServices, links: ViewLinks) -> list[ControllerRouterH
     return [one, events, *view_link_routes(links, require, services.audit)]
 
 
-class _EncodedStates:
-    """Encodes the state of an open run once for all who look at it by links."""
+class _EncodedShared(msgspec.Struct, frozen=True):
+    """A `SharedRun` whose parts are encoded already."""
 
-    def __init__(self, services: RunnerServices) -> None:
-        self._services = services
+    run: msgspec.Raw
+    umrf: msgspec.Raw
+
+
+class EncodedStates:
+    """Encodes the state of an open run once for all who look at it by links, however many these are and
+    however often they ask."""
+
+    def __init__(self, hub: Callable[[], Hub]) -> None:
+        self._hub = hub
         self._frames: WeakKeyDictionary[OpenRun, EncodedRun] = WeakKeyDictionary()
+        self._turns: WeakKeyDictionary[OpenRun, anyio.Lock] = WeakKeyDictionary()
 
-    async def of(self, opened: OpenRun) -> SharedState:
-        """Return the present state of an open run. The loop stays free while it is made."""
-        await self._services.hub.prepare_view(opened)
-        return shared_state(self._services.hub.run_view(opened))
-
-    async def text(self, opened: OpenRun) -> str:
-        """Return the present state as the text of a message. Wait while it was encoded too often."""
-        frame = self._frames.get(opened)
-        if frame is None or frame.revision != opened.revision:
+    async def of(self, opened: OpenRun) -> EncodedRun:
+        """Return the state of an open run as it is now, or later: as a message, and alone. Wait while
+        it was encoded too often. The loop stays free while a large one is made."""
+        wanted = opened.revision
+        async with self._turns.setdefault(opened, anyio.Lock()):
+            frame = self._frames.get(opened)
             if frame is not None:
-                await anyio.sleep(frame.next - anyio.current_time())
-            began, revision = anyio.current_time(), opened.revision
-            text = msgspec.json.encode(SharedStateMessage(await self.of(opened))).decode()
+                if frame.revision >= wanted:
+                    return frame
+                await anyio.sleep(max(0.0, frame.next - anyio.current_time()))
+            hub = self._hub()
+            began = anyio.current_time()
+            await hub.prepare_view(opened)
+            revision = opened.revision
+            state = msgspec.json.encode(shared_state(hub.run_view(opened)))
+            text = msgspec.json.encode(EncodedMessage(msgspec.Raw(state))).decode()
             now = anyio.current_time()
-            frame = EncodedRun(revision, text, now - began, now + _SHARE * (now - began))
+            next_ = now + _SHARE * (now - began)
+            frame = EncodedRun(revision, text, now - began, next_, state)
             self._frames[opened] = frame
-        return frame.text
+            return frame
 
 
 async def _followed(
-    services: RunnerServices, states: _EncodedStates, streams: ViewStreams, view: View
+    services: RunnerServices, states: EncodedStates, streams: ViewStreams, view: View
 ) -> AsyncIterator[bytes]:
     """Yield the states of the run of a link as server-sent events, and a beat each second, until it
     is over and stored."""
@@ -124,8 +140,9 @@ async def _followed(
         revision = None
         while (opened := services.control.open.get(view.thing)) is not None:
             if opened.revision != revision:
-                revision = opened.revision
-                yield _event((await states.text(opened)).encode())
+                frame = await states.of(opened)
+                revision = frame.revision
+                yield _event(frame.text.encode())
                 await anyio.sleep(_GAP_S)
             with anyio.move_on_after(_BEAT_S):
                 await services.control.change(view.thing, revision)
