@@ -7,7 +7,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from action_assistant.errors import Forbidden, Unavailable
+from action_assistant.errors import Conflict, Forbidden, Unavailable
+from action_assistant.runner.execution.start_checks import StartSources
 from action_assistant.runner.robots.registration import HeldGraph, Robot, seen_by
 from action_assistant.runner.runs import views
 from action_assistant.runner.runs.sight import HIDDEN_NAME, RunGraphs, RunSight, Unseen
@@ -17,7 +18,7 @@ from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Keys, Person
 from runner.execution.test_conductor import Lab, shared
 from runner.execution.test_led_rights import SLOW
-from runner.harness import ANN, order, sequence, until, virtual
+from runner.harness import ANN, Harness, order, sequence, until, virtual
 
 ANY = Unseen("vic")
 SOME = Unseen("vic", frozenset({"secret"}))
@@ -173,3 +174,32 @@ async def test_what_starts_teach_is_bounded_and_nothing_hidden_is_forgotten(
     with pytest.raises(Unavailable, match="bring it all rules"):
         await sights.start(-5, CLOSED, "d")
     assert sights.is_hidden
+
+
+@virtual
+async def test_a_change_needs_the_sight_of_the_graph_that_is_sent(tmp_path: Path) -> None:
+    """That of another version, which everybody may see, would show them what nobody has judged."""
+    sights, harness = Sights(tmp_path), Harness()
+    sights.say(0, CLOSED)
+    harness.sources = StartSources(sight=sights.runner)
+    first, second = order(sequence(), graph="g1"), order(sequence(actions=4))
+
+    def sight(digest: str) -> Sight:
+        at = NOW + 60_000_000
+        return sights.seals.sealed(Sight("v1", digest, ("g1",), (OPEN,), at))
+
+    def body(of: Sight) -> bytes:
+        fields = {"version": "v1", "digest": second.digest, "umrf": second.umrf, "sight": of}
+        return msgspec.json.encode(fields)
+
+    script = msgspec.Raw(b'{"behaviours":{"*":[{"never":true}]}}')
+    asked = msgspec.structs.replace(first, sight=sight(first.digest), script=script)
+    async with harness.runner() as control:
+        run = (await control.start(asked, ANN)).run.id
+        await until(lambda: control.open[run].run.state == "running")
+        with pytest.raises(Conflict, match="not known who may see"):
+            await control.modify(run, body(sight(first.digest)), ANN)
+        await control.modify(run, body(sight(second.digest)), ANN)
+        assert len(control.open[run].run.actions) == 4
+        control.stop_all(ANN)
+        await until(lambda: run not in control.open)

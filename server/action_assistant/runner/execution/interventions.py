@@ -21,6 +21,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.runs.sight import RunSight, run_graphs
 from action_assistant.runner.start.admission import (
+    Prepared,
     StartRequest,
     Watching,
     claim_of,
@@ -111,6 +112,8 @@ async def modify(
     facts = SIMULATED if engine is None else engine.facts
     start = _as_start(asked, run)
     ready = await run_in_worker(prepared, start, facts, run.id)
+    if sight.has_rules and not run.unsighted:
+        _require_own_sight(asked.sight, ready)
     if engine is not None:
         await approvals.require(engine.registration, ready.digest, author.id)
         await _require_matched(engine, ready.umrf, run_in_worker)
@@ -145,10 +148,21 @@ async def _require_sight(
     if not sight.has_rules or run.unsighted:
         return
     if asked.sight is None or not set(asked.sight.graphs) <= set(run_graphs(run).graphs):
-        raise Conflict(
-            "It is not known who may see all graphs of this version. Stop the run, and start the version.",
-            where={"path": "/sight"},
-        )
+        raise _unknown_sight()
+
+
+def _require_own_sight(sight: Sight | None, ready: Prepared) -> None:
+    """Raise Conflict unless a sight belongs to the graph that was sent: that of another version says
+    nothing about who may see this one."""
+    if sight is None or sight.digest not in {ready.digest, ready.tree_digest}:
+        raise _unknown_sight()
+
+
+def _unknown_sight() -> Conflict:
+    return Conflict(
+        "It is not known who may see all graphs of this version. Stop the run, and start the version.",
+        where={"path": "/sight"},
+    )
 
 
 def _as_start(asked: ModifyRequest, run: Run) -> StartRequest:
