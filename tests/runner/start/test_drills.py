@@ -294,6 +294,36 @@ def releasing(monkeypatch: pytest.MonkeyPatch) -> Published:
     return published
 
 
+def test_releases_are_listed_once_and_a_withdrawn_one_never_counts_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lists = 0
+    scandir = os.scandir
+
+    def listed(path: Path) -> Any:
+        nonlocal lists
+        lists += 1
+        return scandir(path)
+
+    monkeypatch.setattr(os, "scandir", listed)
+    ours, editors = ReleasedVersions(tmp_path), ReleasedVersions(tmp_path)
+    digests = [f"{number:064x}" for number in range(3)]
+    assert ours.of(digests[0]) is None
+    for digest in digests[:2]:
+        editors.add(msgspec.structs.replace(release(digest), version=f"v{digest[-1]}"))
+    assert ours.of(digests[0]) is not None
+    os.utime(tmp_path / "released", (1_000, 1_000))  # it has not changed for long
+    assert ours.of(digests[1]) is not None
+    before = lists
+    assert [ours.of(each) is not None for each in digests] == [True, True, False]
+    assert lists == before
+    (tmp_path / "released" / f"{digests[0]}-v0.json").unlink()
+    os.utime(tmp_path / "released", (1_000, 1_000))  # as if nobody had seen the folder change
+    assert [ours.of(each) is not None for each in digests] == [False, True, False]
+    editors.add(msgspec.structs.replace(release(digests[2]), version="v2"))
+    assert ours.of(digests[2]) is not None
+
+
 RELEASED: Final = Rules(released_only=True)
 
 

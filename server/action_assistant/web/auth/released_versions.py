@@ -9,6 +9,8 @@ missing or cannot be read releases nothing.
 import logging
 import os
 import re
+import time
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from datetime import datetime
 from pathlib import Path
@@ -33,6 +35,7 @@ log: Final = logging.getLogger(__name__)
 FOLDER: Final = "released"
 _SUFFIX: Final = ".json"
 _DIGEST: Final = re.compile(r"[0-9a-f]{64}")
+_SETTLED_NS: Final = 3_000_000_000  # until a folder's time has changed with its next entry for sure
 _ID: Final = re.compile(r"[A-Za-z0-9_-]{1,100}")
 
 
@@ -51,19 +54,37 @@ class ReleasedVersions:
 
     def __init__(self, data: Path) -> None:
         self._folder = data / FOLDER
+        self._by_digest: dict[str, list[Path]] = {}
+        self._listed_at = 0  # when the folder had changed last, as it was listed
 
     def of(self, digest: str) -> Release | None:
         """Return a release of exactly the graph with this digest; None if there is none. Raise
         Unavailable if that cannot be read."""
         try:
-            for path in self._paths():
-                if path.name.startswith(f"{digest}-") and (found := _read(path)) is not None:
+            for path in self._of_digest(digest):
+                if (found := _read(path)) is not None:
                     return found
         except OSError as error:
             raise Unavailable(
                 f"Which versions are released cannot be read now: {error.strerror}."
             ) from error
         return None
+
+    def _of_digest(self, digest: str) -> list[Path]:
+        """Return the files about a digest. The folder is listed when it has changed: a start asks for
+        each robot, on the event loop. A file that was deleted since is found to be gone."""
+        try:
+            changed = self._folder.stat().st_mtime_ns
+        except FileNotFoundError:
+            return []
+        if changed != self._listed_at:
+            now = time.time_ns()
+            found: defaultdict[str, list[Path]] = defaultdict(list)
+            for path in self._paths():
+                found[path.name.partition("-")[0]].append(path)
+            self._by_digest = dict(found)
+            self._listed_at = changed if now - changed > _SETTLED_NS else 0
+        return self._by_digest.get(digest, [])
 
     def add(self, release: Release) -> None:
         """Store a release durably; one of the same version and digest that is there stays. Raise
@@ -92,14 +113,21 @@ class ReleasedVersions:
             self.add(release)
 
     def _delete(self, paths: Iterable[Path]) -> None:
-        try:
-            for path in paths:
+        """Delete files, also after one that cannot be deleted. Raise Unavailable for that one."""
+        failed: OSError | None = None
+        for path in paths:
+            try:
                 keep_damaged(path, Release)
                 path.unlink(missing_ok=True)
+            except OSError as error:
+                failed = error
+        try:
             if self._folder.is_dir():
                 sync(self._folder)
         except OSError as error:
-            raise Unavailable(f"The release could not be withdrawn: {error.strerror}.") from error
+            failed = error
+        if failed is not None:
+            raise Unavailable(f"The release could not be withdrawn: {failed.strerror}.") from failed
 
     def _listed(self) -> list[Path]:
         try:
