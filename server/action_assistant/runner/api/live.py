@@ -369,6 +369,7 @@ class Outbox:
         self._hub = hub
         self._is_allowed = is_allowed
         self._unseen: Unseen | None = None
+        self._hidden: dict[str, bool] = {}  # by run, since the last look: whether it is hidden
         self._look_at = 0.0  # when to look again what the person may see, in seconds of the loop
         self._answers: deque[str] = deque()
         self._changed: dict[str, OpenRun] = {}
@@ -421,7 +422,16 @@ class Outbox:
         """Look now at what the person may see; return what they may not."""
         self._look_at = anyio.current_time() + _LOOK_S
         self._unseen = self._hub.unseen(self.identity)
+        self._hidden.clear()
         return self._unseen
+
+    def _hides(self, opened: OpenRun) -> bool:
+        """Return whether the person may not see a run. This is asked for each run that has changed, at
+        each message."""
+        found = self._hidden.get(opened.run.id)
+        if found is None:
+            found = self._hidden[opened.run.id] = _is_hidden(opened, self._unseen)
+        return found
 
     def _look_again(self) -> None:
         """Send everything anew if a rule, or the role or groups of the person, have changed what they
@@ -433,8 +443,8 @@ class Outbox:
             self.mark_engines()
 
     def _due(self, run: str, opened: OpenRun) -> float:
-        is_hidden = _is_hidden(opened, self._unseen)
-        return max(self._next.get(run, 0.0), self._hub.due(opened, is_hidden=is_hidden))
+        due = self._hub.due(opened, is_hidden=self._hides(opened))
+        return max(self._next.get(run, 0.0), due)
 
     def _pick(self, beat: float) -> str | None:
         """Return the text of the next message: answers first, then a heartbeat if the time `beat`
@@ -463,7 +473,7 @@ class Outbox:
         for run, opened in self._changed.items():
             if self._due(run, opened) <= now:
                 del self._changed[run]
-                frame = self._hub.frame(opened, is_hidden=_is_hidden(opened, self._unseen))
+                frame = self._hub.frame(opened, is_hidden=self._hides(opened))
                 self._next[run] = now + max(_GAP_S, _SHARE * frame.cost)
                 if opened.run.end is not None and opened.recorder.idle:
                     self._next.pop(run)
