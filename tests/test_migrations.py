@@ -207,7 +207,7 @@ def test_scripts_are_found_also_where_the_path_is_unusual(
     strange.mkdir()
     (strange / "migrations").symlink_to(paths.migrations())
     monkeypatch.setattr(paths, "migrations", lambda: strange / "migrations")
-    assert migrate(f"sqlite:///{tmp_path / 'editor.db'}", "editor") == "editor_0015"
+    assert migrate(f"sqlite:///{tmp_path / 'editor.db'}", "editor") == "editor_0016"
 
 
 @branches

@@ -117,7 +117,7 @@ async def open_services(
                     services.change_index.kept_up(),
                     services.inboxes.kept_up(),
                     services.notifications.sending(),
-                    services.graph_checks.names.read_ahead(),
+                    services.graph_checks.kept_up(),
                     services.audit.writing(journal),
                 ):
                     await services.versions.write_releases()

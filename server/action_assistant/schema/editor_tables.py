@@ -139,6 +139,15 @@ key_change_head: Final = Table(
     Column("document", LargeBinary, nullable=False),
     Column("form", BigInteger),
 )
+#: What lists show of each graph, as MessagePack (`Facts`). `form`: a digest of the code that computed it.
+#: Computed again from the document whenever it is not there.
+graph_facts: Final = Table(
+    "graph_facts",
+    EDITOR,
+    Column("graph", Text, primary_key=True),
+    Column("form", LargeBinary, nullable=False),
+    Column("facts", LargeBinary, nullable=False),
+)
 #: A person for whom an owner has made a personal link, or who came by a provider. `groups`: ids of groups,
 #: as JSON. `until`: when the right to do more than Stop ends. `provider`: as whom the provider knows them,
 #: as JSON.

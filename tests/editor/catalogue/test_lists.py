@@ -11,11 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from action_assistant.editor.app import open_services
+from action_assistant.editor.catalogue import catalogue, graph_facts
 from action_assistant.editor.catalogue.graph_checks import GraphChecks
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.crdt import messages
 from action_assistant.editor.documents.contents import labels_of
 from action_assistant.editor.log.graph_events import graph_stream
+from action_assistant.editor.services import EditorServices
 from action_assistant.settings import EditorSettings
 from action_assistant.umrf.model import Graph
 from action_assistant.umrf.problem_kinds import ProblemCounts
@@ -77,6 +79,66 @@ async def test_a_graph_that_did_not_change_is_not_checked_again(tmp_path: Path) 
     assert {summary.told for summary in summaries} == {ProblemCounts(made.wrong, made.to_fill_in)}
 
 
+def _watched(services: EditorServices) -> list[str]:
+    """Return a list to which the name of each piece of work is added that a worker does for graphs."""
+    asked: list[str] = []
+    given = services.graph_reader._run_in_worker
+
+    async def watching(work: Any, /, *values: Any) -> Any:
+        asked.append(work.__name__)
+        return await given(work, *values)
+
+    services.graph_reader._run_in_worker = watching
+    return asked
+
+
+async def test_after_a_restart_the_list_reads_no_document(tmp_path: Path) -> None:
+    settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+    async with open_services(settings) as services:
+        await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        before = await services.catalogue.all()
+    async with open_services(settings) as services:
+        asked = _watched(services)
+        assert await services.catalogue.all() == before
+        assert asked == []
+
+
+async def test_facts_that_another_version_computed_give_names_and_no_problems(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+    async with open_services(settings) as services:
+        made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
+        now = await services.catalogue.all()
+    monkeypatch.setattr(graph_facts, "form", lambda: b"another")
+    async with open_services(settings) as services:
+        asked = _watched(services)
+        await services.graph_checks.names.refresh()
+        assert services.graph_checks.names.called(made.name) == [made.id]
+        assert asked == []
+        assert await services.catalogue.all() == now
+        assert "info" in asked
+
+
+async def test_a_list_of_many_unknown_graphs_comes_at_once_and_is_completed_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
+    async with open_services(settings) as services:
+        for number in range(3):
+            body = json.dumps({**NAV, "graph_name": f"graph {number}"}).encode()
+            await services.catalogue.bring(body, "ada")
+        now = await services.catalogue.all()
+    monkeypatch.setattr(graph_facts, "form", lambda: b"another")
+    monkeypatch.setattr(catalogue, "READ_FOR_A_LIST", 1)
+    async with open_services(settings) as services:
+        first = await services.catalogue.all()
+        assert [view.name for view in first] == [view.name for view in now]
+        assert sum(view.problems is not None for view in first) <= 1
+        await services.graph_checks.computed()
+        assert await services.catalogue.all() == now
+
+
 @given(st.one_of(st.lists(texts), texts, st.dictionaries(st.text(max_size=3), texts)))
 def test_labels_that_are_none_are_left_out(value: object) -> None:
     attributes = json.dumps({"labels": value})
@@ -109,12 +171,13 @@ async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
     "fault", [GaveUp("This took longer than it may."), RecursionError("too deep"), KeyError("name")]
 )
 async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_the_others(
-    tmp_path: Path, fault: Exception
+    tmp_path: Path, fault: Exception, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
     async with open_services(settings) as services:
         made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
         others = {view.id for view in await services.catalogue.all()} - {made.id}
+    monkeypatch.setattr(graph_facts, "form", lambda: b"another")
     async with open_services(settings) as services:
         asked = services.graph_reader._run_in_worker
 

@@ -1,5 +1,6 @@
 """Makes, imports, lists, renames, deletes and recovers graphs, and makes the documents of library actions."""
 
+import asyncio
 from collections.abc import Awaitable, Callable, Collection, Sequence
 from datetime import datetime
 from typing import Any, Final
@@ -8,7 +9,7 @@ import msgspec
 from sqlalchemy import Row, Select, bindparam, func, select
 
 from action_assistant.editor.catalogue import server_edits
-from action_assistant.editor.catalogue.graph_checks import GraphChecks
+from action_assistant.editor.catalogue.graph_checks import GraphChecks, GraphSummary
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents.contents import Counts, GraphInfo, info_of
 from action_assistant.editor.interchange import document_edits, importing
@@ -29,6 +30,8 @@ from action_assistant.web.workers.lanes import RunInWorker, run_here
 
 NAME_LIMIT: Final = 200  # characters
 DESCRIPTION_LIMIT: Final = 10_000
+_AT_ONCE: Final = 50  # graphs of a list between two turns of others
+READ_FOR_A_LIST: Final = 200  # documents that a list waits for
 _LARGE_FILE: Final = 256 * 1024  # bytes of an imported file that is stored in a commit of its own
 
 
@@ -120,15 +123,33 @@ class Catalogue:
         self, *, deleted: bool = False, kind: h.DocumentKind = "graph"
     ) -> list[GraphView]:
         """Return all documents of a kind, the last changed first: without deleted ones and drafts
-        or, with `deleted`, only deleted ones."""
+        or, with `deleted`, only deleted ones. Facts that need the documents of many graphs are None,
+        and are computed for a later call."""
         graph = editor_tables.graph.c
         shown = [graph.deleted_at.is_(None), graph.draft_of.is_(None)]
         chosen = _rows().where(
             graph.kind == kind, *([graph.deleted_at.is_not(None)] if deleted else shown)
         )
-        await self._checks.names.refresh()
         rows = await self._journal.query(chosen)
-        views = [await self._view(row) for row in rows]
+        if self._checks.names.are_read or len(rows) <= READ_FOR_A_LIST:
+            await self._checks.names.refresh()
+        views: list[GraphView] = []
+        later: dict[str, int] = {}
+        to_read = READ_FOR_A_LIST if self._checks.names.are_read else 0
+        for start in range(0, len(rows), _AT_ONCE):
+            some = rows[start : start + _AT_ONCE]
+            await self._checks.facts.recall([row.id for row in some])
+            for row in some:
+                is_known = self._checks.is_known(row.id, row.seq)
+                if to_read or (is_known and self._checks.names.are_read):
+                    to_read -= not is_known
+                    views.append(await self._view(row))
+                else:
+                    later[row.id] = row.seq
+                    summary = self._checks.known_summary(row.id, row.seq)
+                    views.append(self._shown(row, summary))
+            await asyncio.sleep(0)  # edits of others come first
+        self._checks.compute_later(later)
         return sorted(views, key=lambda view: view.updated_at, reverse=True)
 
     async def create(
@@ -309,14 +330,16 @@ class Catalogue:
 
     async def _view(self, row: Row[Any]) -> GraphView:
         summary = await self._checks.summary(row.id, row.seq)
-        its_name, its_description = summary.called(row.kind)
-        name = row.name if its_name is None else its_name
-        description = row.description if its_description is None else its_description
+        name, description = _called(row, summary)
         if (name, description) != (row.name, row.description):
             now = h.GraphDescribed(name, description, summary.seq)
             await self._journal.append(
                 h.about_stream(row.id), [h.draft(h.DESCRIBED, h.SERVER, now)]
             )
+        return self._shown(row, summary)
+
+    def _shown(self, row: Row[Any], summary: GraphSummary) -> GraphView:
+        name, description = _called(row, summary)
         room = self._rooms.open_room(h.graph_stream(row.id))
         told = summary.told
         return GraphView(
@@ -342,6 +365,16 @@ class Catalogue:
             drafts=row.drafts,
             folder=row.folder,
         )
+
+
+def _called(row: Row[Any], summary: GraphSummary) -> tuple[str, str]:
+    """Return the name and the description of a graph: those of its document where they are known,
+    else those of its `row`."""
+    name, description = summary.called(row.kind)
+    return (
+        row.name if name is None else name,
+        row.description if description is None else description,
+    )
 
 
 async def _do_nothing() -> None:

@@ -1,13 +1,15 @@
 """Checks graphs together with the graphs inside of them, and returns what lists show of each."""
 
+import asyncio
 import logging
-import sys
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable, Mapping
+from contextlib import asynccontextmanager
 from hashlib import sha256
 from typing import Final
 
 import msgspec
 
+from action_assistant.editor.catalogue.graph_facts import CountsInside, Facts, GraphFacts
 from action_assistant.editor.catalogue.graph_names import GraphNames, NamedGraph
 from action_assistant.editor.catalogue.graph_reader import GraphReader
 from action_assistant.editor.documents import contents, document
@@ -19,13 +21,15 @@ from action_assistant.journal.journal import Journal
 from action_assistant.kit.lru_cache import LruCache
 from action_assistant.umrf.problem_kinds import ProblemCounts
 from action_assistant.umrf.semantics.matching import BUDGET
+from action_assistant.web.auth.caller import Caller, set_caller
 from action_assistant.web.workers.lanes import HOPELESS, Crashed
 
 log: Final = logging.getLogger(__name__)
 
 _REMEMBERED: Final = 32  # moments of graphs
 _COUNTED: Final = 5000
-_NAMES: Final = 500_000  # of actions, over all graphs that are remembered
+#: The caller for whom facts are computed in the background: its place in the queue of workers is its own.
+_OURSELVES: Final = Caller("facts of graphs")
 #: Graphs inside of one. More than that is told, and not looked at.
 _INSIDE: Final = 200
 
@@ -49,15 +53,6 @@ class GraphSummary(msgspec.Struct, frozen=True):
         """Return the name and the description of a document; for a library document those of its
         action. A value is None if it is not known."""
         return (self.name, self.description) if kind == "graph" or not self.first else self.first
-
-
-class _About(msgspec.Struct, frozen=True):
-    """The facts about a graph without its sub-graphs after its change `seq`. `newest` was its last change when
-    they were asked for."""
-
-    seq: int
-    newest: int
-    info: GraphInfo
 
 
 class _Member(msgspec.Struct, frozen=True):
@@ -111,10 +106,13 @@ class GraphChecks:
         self.caller_sees: Final = caller_sees
         self._rooms = rooms
         self._reader = reader
-        self.names: Final = GraphNames(journal, self._name)
-        self._abouts = LruCache[str, _About](_COUNTED, _NAMES)
+        self.facts: Final = GraphFacts(journal)
+        self._later: dict[str, int] = {}  # the newest change by graph
+        self._wanted = asyncio.Event()
+        self._idle = asyncio.Event()
+        self._idle.set()
+        self.names: Final = GraphNames(journal, self._name, self._known_names)
         self._hopeless = LruCache[str, tuple[int, Refused]](_COUNTED)
-        self._counts = LruCache[str, tuple[int, bytes, Counts, ProblemCounts]](_COUNTED)
         self._problems = LruCache[tuple[str, int, bytes], bytes](_REMEMBERED)
         self._digests = LruCache[tuple[str, int], str](_COUNTED)
         self._uses = LruCache[tuple[str, int], tuple[str, tuple[str, ...]]](_REMEMBERED)
@@ -184,7 +182,7 @@ class GraphChecks:
         """Remember the state of a new graph and its result `about`, so that neither has to be
         computed again."""
         self._reader.made(graph, state)
-        self._remember(graph, _About(1, 1, about))
+        self.facts.put(graph, Facts(1, 1, about))
 
     async def summary(self, graph: str, newest: int) -> GraphSummary:
         """Return what lists show of a graph, up to its newest change (`newest`: its number). The
@@ -195,7 +193,8 @@ class GraphChecks:
             named = await self._resolved(about.info.name, about.info.uses)
             counts, told = about.info.problems, about.info.told
             if named:
-                counts, told = await self._counted(graph, about.seq, named)
+                inside = await self._counted(graph, about, named)
+                counts, told = inside.problems, inside.told
         except HOPELESS as error:  # others are in the list too
             log.error("%s: nothing can be said of change %d: %s", graph, newest, error.detail)
             return GraphSummary(newest)
@@ -204,36 +203,85 @@ class GraphChecks:
         except Exception:  # neither may a document whose contents no worker expected
             log.exception("%s: nothing can be said of change %d", graph, newest)
             return GraphSummary(newest)
-        info = about.info
-        return GraphSummary(
-            about.seq,
-            info.name,
-            info.description,
-            info.actions,
-            counts,
-            told,
-            info.robots,
-            info.labels,
-            about.seq + 1 if about.seq < newest else None,
-            info.first,
-        )
+        return _summary(about, newest, counts, told)
 
-    async def _counted(
-        self, graph: str, seq: int, named: NamedInside
-    ) -> tuple[Counts, ProblemCounts]:
-        key, known = named.key(), self._counts.get(graph)
-        if known is None or known[:2] != (seq, key):
-            sight, inside = await self._sight(graph, seq), await self._seen(named, partly=True)
+    def is_known(self, graph: str, newest: int) -> bool:
+        """Return whether facts about a graph after its newest change are in memory, so that a
+        summary needs no document; also True if that document cannot be read."""
+        known = self.facts.get(graph)
+        if known is not None and known.is_current and known.newest >= newest:
+            return True
+        hopeless = self._hopeless.get(graph)
+        return hopeless is not None and hopeless[0] >= newest
+
+    def compute_later(self, newest: Mapping[str, int]) -> None:
+        """Compute the facts about graphs in the background: `newest` has the number of the newest
+        change of each, by its id."""
+        if newest:
+            self._later |= newest
+            self._idle.clear()
+            self._wanted.set()
+
+    @asynccontextmanager
+    async def kept_up(self) -> AsyncIterator[None]:
+        """Return a context while which names are read ahead, and facts are computed and stored in
+        the background."""
+        computing = asyncio.create_task(self._compute(), name="facts of graphs")
+        try:
+            async with self.facts.kept_up(), self.names.read_ahead():
+                yield
+        finally:
+            computing.cancel()
+            await asyncio.wait([computing])
+
+    async def computed(self) -> None:
+        """Wait until no facts are left to be computed in the background."""
+        await self._idle.wait()
+
+    async def _compute(self) -> None:
+        set_caller(_OURSELVES)
+        while True:
+            await self._wanted.wait()
+            self._wanted.clear()
+            while self._later:
+                graph, newest = self._later.popitem()
+                try:
+                    await self.names.refresh()
+                    await self.summary(graph, newest)
+                except Refused as error:
+                    log.warning("%s: its facts are not computed: %s", graph, error.detail)
+                except Exception:  # whatever one document holds, the others are computed
+                    log.exception("%s: its facts cannot be computed", graph)
+            self._idle.set()
+
+    def known_summary(self, graph: str, newest: int) -> GraphSummary:
+        """Return what is in memory for lists about a graph, without its problems. Without facts
+        after its newest change the summary has the number of that change only."""
+        known = self.facts.get(graph)
+        if known is None or known.newest < newest:
+            return GraphSummary(newest)
+        return _summary(known, newest, None, None)
+
+    async def _counted(self, graph: str, about: Facts, named: NamedInside) -> CountsInside:
+        key = named.key()
+        if about.inside is None or about.inside.key != key:
+            sight = await self._sight(graph, about.seq)
+            inside = await self._seen(named, partly=True)
             found = await self._reader.ask(contents.counted, sight, inside)
-            known = self._counts.put(graph, (seq, key, *found))
-        return known[2:]
+            counted = CountsInside(key, *found)
+            now = self.facts.get(graph)
+            if now is not None and now.seq == about.seq:  # else an edit came in between
+                self.facts.put(graph, msgspec.structs.replace(about, inside=counted))
+            return counted
+        return about.inside
 
-    async def _about(self, graph: str, newest: int) -> _About:
+    async def _about(self, graph: str, newest: int, *, is_current: bool = True) -> Facts:
         """Return the facts about a graph, without those inside, from the cache or a worker.
-        `newest`: the number of its newest change. Raise Unavailable if it cannot be read, TooLarge
-        if it needs too much memory."""
-        known = self._abouts.get(graph)
-        if known is not None and known.newest >= newest:
+        `newest`: the number of its newest change. `is_current`: False also takes facts that another
+        version of this program computed. Raise Unavailable if it cannot be read, TooLarge if it
+        needs too much memory."""
+        known = self.facts.get(graph)
+        if known is not None and known.newest >= newest and known.is_current >= is_current:
             return known
         hopeless = self._hopeless.get(graph)
         if hopeless is not None and hopeless[0] >= newest:
@@ -245,13 +293,7 @@ class GraphChecks:
             if not isinstance(error, Crashed):  # a worker that died may have held up others
                 self._hopeless.put(graph, (newest, error))
             raise
-        return self._remember(graph, _About(sight.seq, max(newest, sight.seq), info))
-
-    def _remember(self, graph: str, about: _About) -> _About:
-        uses = tuple(map(sys.intern, about.info.uses))  # most graphs use the same actions
-        info = msgspec.structs.replace(about.info, uses=uses)
-        about = msgspec.structs.replace(about, info=info)
-        return self._abouts.put(graph, about, len(uses))
+        return self.facts.put(graph, Facts(sight.seq, max(newest, sight.seq), info))
 
     async def _name(self, graph: str, newest: int, kind: DocumentKind) -> str:
         """Return the name of a document of this kind; of a library document that of its action.
@@ -260,10 +302,21 @@ class GraphChecks:
         room = self._rooms.open_room(graph_stream(graph))
         if room is not None and kind == "graph":
             return await room.read(lambda replica, _: document.name_of(replica.doc))
-        info = (await self._about(graph, newest)).info
-        if kind == "graph":
-            return info.name
-        return info.first[0] if info.first is not None else ""
+        return _name_in((await self._about(graph, newest, is_current=False)).info, kind)
+
+    async def _known_names(
+        self, documents: Mapping[str, tuple[int, DocumentKind]]
+    ) -> dict[str, str]:
+        """Return the names of those documents that need not be read, by id. `documents`: the newest
+        change and the kind of each. Raise Unavailable if the journal cannot be read."""
+        await self.facts.recall(documents)
+        found: dict[str, str] = {}
+        for graph, (newest, kind) in documents.items():
+            known = self.facts.get(graph)
+            is_open = self._rooms.open_room(graph_stream(graph)) is not None
+            if known is not None and known.newest >= newest and not is_open:
+                found[graph] = _name_in(known.info, kind)
+        return found
 
     async def _names_at(self, sight: GraphAtSeq) -> tuple[str, tuple[str, ...]]:
         """Return the name of a graph at a change (`sight`), and the names of its actions."""
@@ -308,7 +361,7 @@ class GraphChecks:
         if known is None:
             return None
         try:
-            about = await self._about(known.graph, known.seq)
+            about = await self._about(known.graph, known.seq, is_current=False)
         except (*HOPELESS, NotFound):
             return None
         if about.info.name != name:  # renamed meanwhile; the next call has the new name
@@ -328,3 +381,27 @@ class GraphChecks:
             return await self._reader.at(graph, seq)
         except Refused:  # its history is damaged after that
             return await self._reader.now(graph)
+
+
+def _name_in(info: GraphInfo, kind: DocumentKind) -> str:
+    if kind == "graph":
+        return info.name
+    return info.first[0] if info.first is not None else ""
+
+
+def _summary(
+    about: Facts, newest: int, problems: Counts | None, told: ProblemCounts | None
+) -> GraphSummary:
+    info = about.info
+    return GraphSummary(
+        about.seq,
+        info.name,
+        info.description,
+        info.actions,
+        problems,
+        told,
+        info.robots,
+        info.labels,
+        about.seq + 1 if about.seq < newest else None,
+        info.first,
+    )

@@ -7,7 +7,7 @@ import asyncio
 import logging
 from bisect import insort
 from collections import Counter
-from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable
+from collections.abc import AsyncIterator, Awaitable, Callable, Collection, Iterable, Mapping
 from contextlib import asynccontextmanager
 from typing import Any, Final
 
@@ -32,6 +32,9 @@ _OURSELVES: Final = Caller("graph names")
 
 #: The name of a document after a change of it, or of a later one.
 ReadName = Callable[[str, int, DocumentKind], Awaitable[str]]
+#: Return the names that are known without reading documents, by id. Its argument has the newest change and the kind
+#: of each document.
+KnownNames = Callable[[Mapping[str, tuple[int, DocumentKind]]], Awaitable[dict[str, str]]]
 
 
 class NamedGraph(msgspec.Struct, frozen=True):
@@ -52,9 +55,10 @@ class _Document(msgspec.Struct, frozen=True):
 class GraphNames:
     """Finds graphs and library actions by their names. Each refresh reads only what has changed."""
 
-    def __init__(self, journal: Journal, read_name: ReadName) -> None:
+    def __init__(self, journal: Journal, read_name: ReadName, known_names: KnownNames) -> None:
         self._journal = journal
         self._read_name = read_name
+        self._known_names = known_names
         self._refreshing = Lock()
         self._next: asyncio.Task[None] | None = None  # has not begun yet
         self._tasks: set[asyncio.Task[None]] = set()
@@ -96,6 +100,11 @@ class GraphNames:
         """Return whether a graph or an action of the library has this name."""
         return name in self._graphs or bool(self._actions[name])
 
+    @property
+    def are_read(self) -> bool:
+        """Whether every name was read once, so that a refresh reads only what has changed since."""
+        return self._position is not None
+
     async def refresh(self) -> None:
         """Read the names that were stored since the last call. Raise Unavailable if the journal
         cannot be read."""
@@ -134,10 +143,19 @@ class GraphNames:
             self._seqs |= seqs
             changed = await self._look_up(abouts)
             changed |= (seqs.keys() | self._again) & self._documents.keys()
+            to_read = sorted(changed & self._seqs.keys())
             limit = CapacityLimiter(_AT_ONCE)
-            async with create_task_group() as reading:
-                for graph in changed & self._seqs.keys():
-                    reading.start_soon(self._read, graph, limit)
+            for start in range(0, len(to_read), _ROWS):
+                some = to_read[start : start + _ROWS]
+                known = await self._known_names(
+                    {graph: (self._seqs[graph], self._documents[graph].kind) for graph in some}
+                )
+                for graph, name in known.items():
+                    self._call(graph, name)
+                async with create_task_group() as reading:
+                    for graph in some:
+                        if graph not in known:
+                            reading.start_soon(self._read, graph, limit)
             self._position = position
 
     async def _news(self) -> tuple[int, dict[str, int], set[str]]:
@@ -184,10 +202,8 @@ class GraphNames:
 
     async def _read(self, graph: str, limit: CapacityLimiter) -> None:
         async with limit:
-            document = self._documents[graph]
-            self._again.discard(graph)
             try:
-                name = await self._read_name(graph, self._seqs[graph], document.kind)
+                name = await self._read_name(graph, self._seqs[graph], self._documents[graph].kind)
             except (GaveUp, TooLarge, NotFound):
                 name = ""
             except Refused:  # not now
@@ -196,7 +212,12 @@ class GraphNames:
             except Exception:  # whatever one document holds, the names of the others are read
                 log.exception("%s: its name cannot be read", graph)
                 name = ""
-            self._set_document(graph, msgspec.structs.replace(document, name=name))
+            self._call(graph, name)
+
+    def _call(self, graph: str, name: str) -> None:
+        """Store the name that was read of a document."""
+        self._again.discard(graph)
+        self._set_document(graph, msgspec.structs.replace(self._documents[graph], name=name))
 
     def _set_document(self, graph: str, document: _Document | None) -> None:
         """Replace what is stored of the document with this id by `document`; None removes it, since
