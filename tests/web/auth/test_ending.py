@@ -4,6 +4,7 @@ import asyncio
 import contextlib
 import os
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,8 +14,10 @@ import pytest
 
 from action_assistant.errors import NotFound, Unavailable
 from action_assistant.web.auth import sessions
-from action_assistant.web.auth.keys import Keys, Session
-from action_assistant.web.auth.revocations import Revocations, SessionGuards
+from action_assistant.web.auth.identity import Credential, Standing
+from action_assistant.web.auth.keys import Keys, PersonRef, Session
+from action_assistant.web.auth.released_versions import Release, ReleasedVersions
+from action_assistant.web.auth.revocations import Revocations, SessionGuards, sealed_standing
 from action_assistant.web.auth.session_files import SessionFiles
 from editor.process import running as editor_running
 from journal import servers
@@ -360,3 +363,64 @@ async def test_a_revoked_session_also_ends_when_the_folder_cannot_be_listed(
     await asyncio.sleep(0.3)
     (tmp_path / "revoked" / f"session-{session.id}").touch()
     assert await task
+
+
+async def test_a_session_whose_standing_cannot_be_read_keeps_no_other_one_open(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    revoked = Revocations(tmp_path)
+    broken, ended = (Keys("k" * 43).new_session(name) for name in ("broken", "ended"))
+    looks = iter(range(100))  # the first one is that of the beginning
+    failed = asyncio.Event()
+
+    def standing(credential: Credential) -> Standing:
+        if credential.person.name == "broken" and next(looks) > 0:
+            failed.set()
+            raise ZeroDivisionError
+        return sealed_standing(credential)
+
+    guards = SessionGuards(revoked, standing)
+
+    async def open_(session: Session) -> bool:
+        with guards.hold(session) as guard:
+            try:
+                await asyncio.sleep(30)
+            except asyncio.CancelledError:
+                guard.let_go()
+            return guard.is_cut
+
+    sockets = [asyncio.create_task(open_(each)) for each in (broken, ended)]
+    async with asyncio.timeout(25):
+        await failed.wait()
+        revoked.end(ended.id)
+        assert await sockets[1]
+    assert caplog.text.count("cannot be read whether a session has ended") == 1
+    sockets[0].cancel()
+    assert not await sockets[0]
+
+
+def test_signing_a_person_out_ends_idle_sessions_too(tmp_path: Path) -> None:
+    revoked, keys = Revocations(tmp_path), Keys("k" * 43)
+    idle = keys.new_session("Mari", person_id="mari")
+    files = SessionFiles(tmp_path, revoked, is_over=lambda session: session.id == idle.id)
+    files.note(idle)
+    assert files.every() == []
+    assert files.end_all_of("mari").ids == [idle.id]
+    assert revoked.ended(idle)  # whatever limits an owner gives later
+
+
+def test_one_release_that_cannot_be_withdrawn_or_stored_keeps_no_other_one(tmp_path: Path) -> None:
+    releases = ReleasedVersions(tmp_path)
+
+    def release(digit: str) -> Release:
+        by = PersonRef("mari", "Mari")
+        return Release(version="v1", digest=digit * 64, by=by, at=datetime.now(UTC))
+
+    releases.add(release("b"))
+    folder = tmp_path / "released"
+    for digit in "acd":
+        (folder / f"{digit * 64}-v1.json").mkdir()  # neither deleted nor written as a file
+    with pytest.raises(Unavailable):
+        releases.make_equal([release("d"), release("e")])
+    assert not (folder / f"{'b' * 64}-v1.json").exists()
+    assert releases.of("e" * 64) is not None

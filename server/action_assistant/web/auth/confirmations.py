@@ -172,9 +172,10 @@ class Confirmations:
     def prune(self) -> None:
         """Delete the files of confirmations that are too old for every rule."""
         with contextlib.suppress(OSError):
-            for path in self._folder.iterdir():
-                if self._clock() - path.stat().st_mtime > LONGEST_S:
-                    path.unlink(missing_ok=True)
+            for path in list(self._folder.iterdir()):
+                with contextlib.suppress(OSError):  # the other process may delete it, too
+                    if self._clock() - path.stat().st_mtime > LONGEST_S:
+                        path.unlink(missing_ok=True)
 
     def _keep(self, made: Confirmation, *, is_stored: bool = False) -> None:
         """Keep a confirmation in memory and as a file. A full disk is an error with `is_stored` only."""

@@ -125,10 +125,11 @@ class PeopleFiles:
 
     def _write_now(self) -> bool:
         """Return whether all persons are written after another attempt."""
-        with self._writing, contextlib.suppress(Unavailable):
+        with self._writing:
             for person in tuple(self._unwritten.values()):
-                self._replace(person.id, person)
-                del self._unwritten[person.id]
+                with contextlib.suppress(Unavailable):
+                    self._replace(person.id, person)
+                    del self._unwritten[person.id]
         return not self._unwritten
 
     def _path(self, name: str) -> Path:

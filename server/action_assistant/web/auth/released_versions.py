@@ -105,15 +105,24 @@ class ReleasedVersions:
         self._delete(path for path in self._listed() if _version_of(path) == version)
 
     def make_equal(self, releases: Iterable[Release]) -> None:
-        """Store exactly these releases, and delete all others. Raise Unavailable if that cannot be
-        written."""
+        """Store exactly these releases, and delete all others. Raise Unavailable if that of one cannot
+        be written, after all were tried."""
         wanted = {self._path(each): each for each in releases}
-        self._delete(path for path in self._listed() if path not in wanted)
+        unwritten: Unavailable | None = None
+        try:
+            self._delete(path for path in self._listed() if path not in wanted)
+        except Unavailable as error:
+            unwritten = error
         for release in wanted.values():
-            self.add(release)
+            try:
+                self.add(release)
+            except Unavailable as error:
+                unwritten = unwritten or error
+        if unwritten is not None:
+            raise unwritten
 
     def _delete(self, paths: Iterable[Path]) -> None:
-        """Delete files, also after one that cannot be deleted. Raise Unavailable for that one."""
+        """Delete files. Raise Unavailable if one cannot be deleted, after all were tried."""
         failed: OSError | None = None
         for path in paths:
             try:

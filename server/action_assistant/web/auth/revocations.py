@@ -130,9 +130,15 @@ class Revocations:
 
     def write_again(self) -> None:
         """Write to disk the marks of all that was ended and whose mark could not be written
-        before. Raise Unavailable if they still cannot."""
+        before. Raise Unavailable if one still cannot, after all were tried."""
+        unwritten: Unavailable | None = None
         for mark in tuple(self._unwritten):
-            self._mark(mark)
+            try:
+                self._mark(mark)
+            except Unavailable as error:
+                unwritten = error
+        if unwritten is not None:
+            raise unwritten
 
     def _mark(self, mark: str) -> None:
         self._marks.add(mark)
@@ -224,7 +230,7 @@ class SessionGuard:
         outlives: bool,
         follows_groups: bool,
     ) -> None:
-        self.is_cut = False
+        self.is_cut = self._has_failed = False
         self._standing = standing
         self._first = standing(credential)
         self._follows_groups = follows_groups
@@ -235,7 +241,15 @@ class SessionGuard:
 
     def look(self, ends: Callable[[Credential], bool]) -> None:
         """Cut it if the session or token has ended, or its person has other rights by now: with
-        these the client comes back at once."""
+        these the client comes back at once. A failure is logged once, and ends no check of others."""
+        try:
+            self._check(ends)
+        except Exception:
+            if not self._has_failed:
+                log.exception("it cannot be read whether a session has ended")
+            self._has_failed = True
+
+    def _check(self, ends: Callable[[Credential], bool]) -> None:
         over = ends(self._credential)
         self._looks += 1
         if not over and self._looks % _STANDING_EACH == 0:

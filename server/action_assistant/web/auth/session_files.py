@@ -135,6 +135,12 @@ class SessionFiles:
         """Return the sessions that are still valid, newest first, and delete the files of those
         that never will be again. The file of an idle session stays, since it proves that; so does one
         that cannot be read."""
+        lasting = [each for each in self._stored() if not (each.expired or self._is_over(each))]
+        return sorted(map(self._shown, lasting), key=lambda each: each.expires, reverse=True)
+
+    def _stored(self) -> list[NotedSession]:
+        """Return the sessions that may be valid again, such as idle ones, and delete the files of
+        others."""
         found = []
         with contextlib.suppress(FileNotFoundError):
             for path in list(self._folder.glob("*.json")):
@@ -143,9 +149,9 @@ class SessionFiles:
                     continue
                 if time.time() >= session.expires or self._revoked.ends(session):
                     self._forget(path)
-                elif not (session.expired or self._is_over(session)):
-                    found.append(self._shown(session))
-        return sorted(found, key=lambda each: each.expires, reverse=True)
+                else:
+                    found.append(session)
+        return found
 
     def end(self, session: str) -> None:
         """End one session, in both processes. Raise NotFound if it is not open; raise Unavailable
@@ -156,9 +162,9 @@ class SessionFiles:
         self._forget(self._path(session))
 
     def end_all_of(self, person: str, *, but: str | None = None) -> "EndedSessions":
-        """End the open sessions of a person, except the one with the id `but`: all of them, also where
-        the folder cannot store that of some."""
-        theirs = [each.id for each in self.every() if each.person.id == person and each.id != but]
+        """End the sessions of a person, also idle ones, except the one with the id `but`: all of them,
+        also where the folder cannot store that of some."""
+        theirs = [each.id for each in self._stored() if each.person.id == person and each.id != but]
         unwritten: list[Unavailable] = []
         for each in theirs:
             try:
