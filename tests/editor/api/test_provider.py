@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import httpx
@@ -140,16 +141,46 @@ def test_a_person_comes_in_with_the_role_of_their_groups(
     assert sum("signed in" in each for each in told) == 3
 
 
-def test_a_person_without_a_mapped_group_is_refused_and_put_out(browser: Open) -> None:
+def test_a_person_without_a_mapped_group_is_refused_and_put_out(
+    editor: Editor, browser: Open
+) -> None:
     uku = browser()
     for groups in ((), ("others",), ("lab ",), ("LAB",), ("admins,lab",)):
         refused = uku.come("uku", *groups)
         assert (refused.status_code, "none of your groups" in refused.text) == (403, True)
         assert uku.http.get("/api/session").status_code == 401
     assert uku.come("uku", "lab").status_code == 200
+    day = (datetime.now(UTC) + timedelta(days=3)).isoformat()
+    assert change(editor, uku.person["id"], until=day).status_code == 200
+    made = uku.http.post("/api/tokens", json={"name": "nightly", "scopes": ["edit"]}).json()
+    program = {"authorization": f"Bearer {made['token']}"}
+
+    def reads() -> int:
+        return httpx.get(f"{editor.url}/api/graphs", headers=program, trust_env=False).status_code
+
+    unknown = browser()
+    assert unknown.come("uku", "lab").status_code == 200
+    for file in (editor.data / "sessions").glob("*.json"):
+        file.unlink()  # as on a full disk
+    assert uku.http.get("/api/session").status_code == 200  # notes this one
+    assert (reads(), unknown.http.get("/api/graphs").status_code) == (200, 200)
     other = browser()
-    assert other.come("uku").status_code == 403
-    assert uku.http.get("/api/graphs").status_code == 401  # rights that are gone, everywhere
+    for _ in range(2):
+        assert other.come("uku").status_code == 403
+        for out in (uku, unknown):
+            assert (
+                out.http.get("/api/graphs").status_code == 401
+            )  # rights that are gone, everywhere
+        assert reads() == 401
+    assert uku.come("uku", "lab").status_code == 200
+    assert (uku.http.get("/api/graphs").status_code, reads()) == (200, 200)
+    with editor.client() as owner:
+        people = owner.get("/api/members").json()["people"]
+        assert [each["until"][:10] for each in people if each["id"] == uku.person["id"]] == [
+            day[:10]
+        ]
+        audit = owner.get("/api/audit", params={"kind": "people"}).text
+        assert audit.count("let in by no group") == 1
 
 
 def test_an_owner_lowers_a_person_for_good_and_raises_nobody(editor: Editor, browser: Open) -> None:

@@ -26,13 +26,13 @@ from action_assistant.editor.people.identity_provider import (
     ProviderIdentity,
     Question,
 )
-from action_assistant.editor.people.provided import provided, provided_id
+from action_assistant.editor.people.provided import provided, provided_id, refused
 from action_assistant.editor.services import EditorState
-from action_assistant.errors import Conflict, Forbidden, Unauthenticated
+from action_assistant.errors import Conflict, Forbidden, Unauthenticated, Unavailable
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import one_line
 from action_assistant.settings import LOOPBACK
-from action_assistant.web.audit.events import Confirmed
+from action_assistant.web.audit.events import Confirmed, SessionEnded
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import (
     Open,
@@ -264,9 +264,7 @@ class ProviderSignIn:
         members.refuse_ended(person)
         role = settings.role(found.groups)
         if role is None:
-            ended = await to_thread.run_sync(self._browsers.end_all_of, person)
-            if ended.left is not None:
-                log.error("sessions of %s: %s", person, ended.left.detail)
+            await self._put_out(person, found)
             raise Forbidden(
                 f"{settings.name} knows you, but none of your groups there may come in here. Ask "
                 "the person who runs this server."
@@ -279,6 +277,22 @@ class ProviderSignIn:
         self._sessions.note_sign_in(session, "oidc", request)
         await to_thread.run_sync(self._browsers.note, session, browser_of(request), address)
         return session
+
+    async def _put_out(self, person: str, found: ProviderIdentity) -> None:
+        """End the sessions of a person whom no group lets in any more, and let their tokens, and sessions
+        that nobody has noted, do nothing but Stop."""
+        ended = await to_thread.run_sync(self._browsers.end_all_of, person)
+        for session in ended.ids:
+            self._audit.note(SessionEnded(session), person)
+        left = [] if ended.left is None else [ended.left.detail]
+        try:
+            await refused(self._app_state.services.members, found.issuer, found.subject)
+        except Unavailable as error:
+            left.append(error.detail)
+        if left:
+            log.error(
+                "%s may not come in any more, and is not quite out: %s", person, "; ".join(left)
+            )
 
     async def _prove(
         self,

@@ -17,6 +17,7 @@ ADDED: Final = "member.added.v1"
 CHANGED: Final = "member.changed.v1"
 CAME: Final = "member.came.v1"
 RENEWED: Final = "member.renewed.v1"
+REFUSED: Final = "member.refused.v1"
 ENDED: Final = "member.ended.v1"
 LINKED: Final = "link.made.v1"
 LINK_USED: Final = "link.used.v1"
@@ -32,7 +33,9 @@ T = TypeVar("T")
 class ProviderRecord(msgspec.Struct, frozen=True):
     """The person as their OpenID Connect provider called them at their last sign-in: the name, the
     role that its groups give there, and the groups here (ids) that they give. `lowered`: the role
-    that an owner gave instead, which is lower and stays so; None where none did."""
+    that an owner gave instead, which is lower and stays so; None where none did. `refused`: no group let
+    them in when they came last, which was their last day; `until`: the last day before that, in
+    microseconds since 1970; None for none."""
 
     issuer: str
     subject: str
@@ -40,6 +43,8 @@ class ProviderRecord(msgspec.Struct, frozen=True):
     role: Role
     groups: tuple[str, ...] = ()
     lowered: Role | None = None
+    refused: bool = False
+    until: int | None = None
 
 
 class MemberState(msgspec.Struct, frozen=True):
@@ -112,6 +117,7 @@ def fold(event: Event, read: Callable[[Event, type[Any]], Any]) -> Sequence[Exec
             | "member.changed.v1"
             | "member.came.v1"
             | "member.renewed.v1"
+            | "member.refused.v1"
             | "member.ended.v1"
         ):
             return _member(event, read)

@@ -76,6 +76,10 @@ _PEOPLE: Final[Mapping[str, tuple[AuditKind, str]]] = {
     e.CHANGED: ("people", "set name, role and groups of {name} ({role}{ends})"),
     e.CAME: ("people", "came in by the identity provider for the first time, as {role}"),
     e.RENEWED: ("people", "got name, role and groups anew from the identity provider ({role})"),
+    e.REFUSED: (
+        "people",
+        "was let in by no group of the identity provider, and may only stop runs",
+    ),
     e.ENDED: ("people", "ended the person {who} everywhere"),
     e.LINKED: ("people", "made a personal link for {who}"),
     e.LINK_USED: ("people", "came in by a personal link with {browser}"),

@@ -23,6 +23,7 @@ import msgspec
 from msgspec.structs import replace
 from sqlalchemy import select
 
+from action_assistant import private_files
 from action_assistant.editor.log import graph_events as h
 from action_assistant.editor.log import people_events as e
 from action_assistant.editor.people.late_records import LateRecords
@@ -38,13 +39,7 @@ from action_assistant.errors import (
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.kit.moments import sent_us
-from action_assistant.private_files import (
-    DamagedFile,
-    log_unreadable,
-    make_folder,
-    read_json,
-    replace_file,
-)
+from action_assistant.private_files import make_folder, replace_file
 from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.schema import editor_tables
@@ -233,6 +228,9 @@ class Members:
                 groups=now.groups if groups is None else self._known(groups),
             )
             record = self._records.get(person)
+            lasts = new.until is None or new.until > datetime.now(UTC)
+            if record is not None and record.refused and lasts:
+                record = replace(record, refused=False, until=None)  # an owner lets them in again
             if record is not None and role is not None:
                 record = _lowered(record, role, now.role)
             await self.store(e.CHANGED, author, new, record)
@@ -420,8 +418,8 @@ class Members:
         async with self.turn:
             try:
                 offline = await asyncio.to_thread(_offline_in, path)
-            except (OSError, DamagedFile) as error:
-                log_unreadable(path, error)
+            except (OSError, private_files.DamagedFile) as error:
+                private_files.log_unreadable(path, error)
                 return
             person = offline.person
             if offline.id not in self._owner_of:
@@ -588,10 +586,10 @@ class Members:
 
 
 def _offline_in(path: Path) -> OfflineLink:
-    """Return the link that the command line has stored in a file. Raise OSError or DamagedFile."""
-    found = read_json(path, OfflineLink)
+    """Return the link that the command line has stored in a file. Raise OSError or private_files.DamagedFile."""
+    found = private_files.read_json(path, OfflineLink)
     if not all(0 <= each < _LATEST for each in (found.expires, found.person.until or 0.0)):
-        raise DamagedFile("it has a time that no calendar has")
+        raise private_files.DamagedFile("it has a time that no calendar has")
     return found
 
 

@@ -10,6 +10,7 @@ from msgspec.structs import replace
 
 from action_assistant.editor.log import people_events as e
 from action_assistant.editor.people.members import NAME_LIMIT, Member, Members
+from action_assistant.kit.moments import moment
 from action_assistant.safe_text import is_name
 from action_assistant.web.auth.keys import PersonRef
 from action_assistant.web.auth.people_files import PersonFile
@@ -34,6 +35,9 @@ async def provided(
         known, before = members.known(person)
         given = tuple(each.id for each in members.groups() if each.name in groups)
         lowered = None if before is None else before.lowered
+        until = None if known is None else known.until
+        if before is not None and before.refused:
+            until = None if before.until is None else moment(before.until)
         record = e.ProviderRecord(issuer, subject, name, role, given, lowered)
         if lowered is not None and rank(lowered) < rank(role):
             role = lowered
@@ -57,10 +61,25 @@ async def provided(
                 name=_free(members, name, person) if is_renamed else known.name,
                 role=role,
                 groups=tuple(dict.fromkeys((*own, *given))),
+                until=until,
             )
             came = await members.store(e.RENEWED, person, new, record)
         members.refuse_ended(person)  # they may have been ended meanwhile
         return came
+
+
+async def refused(members: Members, issuer: str, subject: str) -> None:
+    """Let a person whom no group of their provider lets in any more do nothing but Stop, with all
+    sessions and tokens, until a sign-in lets them in or an owner gives another last day. Raise
+    Unavailable if that cannot be stored."""
+    person = provided_id(issuer, subject)
+    async with members.turn:
+        known, before = members.known(person)
+        if known is None or before is None or before.refused:
+            return
+        until = None if known.until is None else int(known.until.timestamp() * 1e6)
+        over = replace(known, until=datetime.now(UTC))
+        await members.store(e.REFUSED, person, over, replace(before, refused=True, until=until))
 
 
 def provided_id(issuer: str, subject: str) -> str:
