@@ -4,7 +4,6 @@ import io
 import ipaddress
 import secrets
 import ssl
-import urllib.error
 import urllib.request
 from http.client import HTTPException
 from typing import Any, Final
@@ -55,7 +54,7 @@ def invitations_as_text(
             if role not in found:
                 made = _ask(base, keys, trust, "POST", {"role": role})
                 found[role] = msgspec.json.decode(made, type=ShareLink)
-    except (OSError, urllib.error.URLError, msgspec.DecodeError) as error:
+    except (OSError, ValueError, RecursionError, HTTPException) as error:
         return f"the links for others could not be made: {error}"
     if secret:
         return (
@@ -79,7 +78,7 @@ def is_ours(base: str, keys: Keys, trust: ssl.SSLContext | None = None) -> bool:
     try:
         with _opener(trust).open(url, timeout=1) as answer:
             proof = msgspec.json.decode(answer.read(_PROOF), type=ServerProof)
-    except (OSError, urllib.error.URLError, msgspec.DecodeError, HTTPException):
+    except (OSError, ValueError, RecursionError, HTTPException):
         return False
     host, _, port = base.partition("://")[2].rpartition(":")
     at = f"{host.strip('[]')}:{port}"

@@ -360,7 +360,7 @@ def decoded(answer: "httpx.Response", kind: type[T]) -> T:
     have another form."""
     try:
         return msgspec.json.decode(answer.content, type=kind)
-    except msgspec.DecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise CannotStart(
             f"{answer.request.url} answers in another form than this version expects ({error})."
         ) from error

@@ -59,7 +59,7 @@ class AfterProof(httpx.Auth):
         """Return the token that the server has proven to know; None if there is none."""
         try:
             given = msgspec.json.decode(answer.content, type=ServerProof)
-        except msgspec.DecodeError:
+        except (ValueError, RecursionError):
             return None
         at = _peer(answer) if self._supposed else None
         if self._keys is not None and self._keys.proven(challenge, given, at=at):

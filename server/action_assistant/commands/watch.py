@@ -277,7 +277,7 @@ class WatchedGraph:
 
     def _meet(self, presence: messages.Presence) -> None:
         for entry in presence.entries:
-            with suppress(msgspec.DecodeError):
+            with suppress(ValueError, RecursionError):
                 state = msgspec.json.decode(entry.state, type=_State | None)
                 if state is not None and state.user.name:
                     self._names[entry.client] = state.user.name

@@ -105,6 +105,9 @@ NOW = int(time.time())
         ({"sub": None}, "sub"),
         ({"sub": ""}, "sub"),
         ({"sub": ["mari"]}, "sub"),
+        ({"sub": 7}, "sub"),
+        ({"sub": "x" * 256}, "names nobody"),
+        ({"sub": "mari\u202e"}, "names nobody"),
         ({"exp": NOW - 300}, "expired"),
         ({"exp": None}, "exp"),
         ({"exp": "tomorrow"}, "exp"),
@@ -121,6 +124,15 @@ async def test_a_claim_that_does_not_belong_to_the_question_signs_nobody_in(
     server.claims |= claims
     with pytest.raises(Unauthenticated, match=why):
         await signed_in(asking(server), server)
+
+
+async def test_a_name_of_any_form_is_a_short_text(server: Provider) -> None:
+    for name in ("Mari\0\r\nBcc: all", "Mari" * 15_000):
+        server.claims["name"] = name
+        found = await signed_in(asking(server), server)
+        assert len(found.name) <= 200
+        assert found.name.encode().startswith(b"Mari")
+        assert found.name.isprintable()
 
 
 async def test_clocks_may_differ_by_two_minutes(server: Provider) -> None:
@@ -230,7 +242,14 @@ async def test_a_provider_that_describes_itself_wrongly_is_not_used(
 @pytest.mark.parametrize("path", ["/.well-known/openid-configuration", "/token", "/keys", "/me"])
 @pytest.mark.parametrize(
     ("status", "content"),
-    [(200, b"x" * 600_000), (200, b"[" * 100_000), (302, b"{}"), (500, b"{}"), (200, b"[]")],
+    [
+        (200, b"x" * 600_000),
+        (200, b"[" * 100_000),
+        (200, b'{"a":"\xff"}'),
+        (302, b"{}"),
+        (500, b"{}"),
+        (200, b"[]"),
+    ],
 )
 async def test_answers_of_another_form_sign_nobody_in(
     path: str, status: int, content: bytes, server: Provider

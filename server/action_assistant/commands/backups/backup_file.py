@@ -208,7 +208,7 @@ class Package:
             if entry.file_size > _LONGEST:
                 raise self._damaged(f"{_ABOUT} is too long")
             about = msgspec.json.decode(self._zip.read(entry), type=BackupManifest)
-        except (zipfile.BadZipFile, msgspec.DecodeError, zlib.error, EOFError) as error:
+        except (zipfile.BadZipFile, ValueError, RecursionError, zlib.error, EOFError) as error:
             raise self._no_backup(error) from error
         if about.format > FORMAT:
             raise self._newer(about, f"format {about.format}", f"{FORMAT}")

@@ -90,7 +90,7 @@ def health(asking: httpx.Client, base: str) -> ProcessAnswer:
     now = time.time()
     try:
         version = msgspec.json.decode(answer.content, type=_Health).version
-    except msgspec.DecodeError:
+    except (ValueError, RecursionError):
         version = ""
     return ProcessAnswer(
         base=base,

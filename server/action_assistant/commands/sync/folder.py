@@ -347,7 +347,7 @@ class Folder:
         try:
             text = self.read(_STATE)
             entries = {} if text is None else msgspec.json.decode(text, type=dict[str, msgspec.Raw])
-        except (OSError, msgspec.DecodeError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             reason = why(error) if isinstance(error, OSError) else str(error)
             raise CannotStart(f"Cannot read {path}: {reason}.") from error
         known: dict[str, SyncedFile] = {}
@@ -356,7 +356,7 @@ class Folder:
                 if not _is_graph_file(name):
                     raise msgspec.ValidationError("that is no file of a graph in this folder")
                 known[name] = msgspec.json.decode(entry, type=SyncedFile)
-            except msgspec.ValidationError as error:
+            except (ValueError, RecursionError) as error:
                 self._unread[name] = msgspec.Raw(entry)
                 told = f"{name}: its entry in {_STATE} is not used: {error}"
                 self._trouble.append(FolderTrouble(told, name))

@@ -25,6 +25,8 @@ _T = TypeVar("_T")
 _PATIENCE_S: Final = 5.0  # for one answer
 _EXCHANGE_S: Final = 12.0  # for all answers of one sign-in
 _MOST: Final = 512_000  # bytes of an answer
+_ID: Final = 255  # characters of a subject
+_NAME: Final = 200  # characters that are read of a name
 _MOST_KEYS: Final = 50
 _MOST_GROUPS: Final = 2_000
 _KEPT_S: Final = 600.0  # for which what the provider says of itself is not asked again
@@ -67,7 +69,7 @@ class Question(msgspec.Struct, frozen=True):
 
 
 class ProviderIdentity(msgspec.Struct, frozen=True):
-    """The person of whom a provider has spoken. `name` and `groups` are written by anybody.
+    """The person of whom a provider has spoken. `name`, of one short line, and `groups` are written by anybody.
     `asked_s`: for how many seconds the person had been signed in at the provider when it answered;
     None if it does not say."""
 
@@ -320,12 +322,15 @@ class IdentityProvider:
         return await self._json("GET", url, headers={"authorization": f"Bearer {access}"})
 
     def _person(self, claims: Mapping[str, Any]) -> ProviderIdentity:
-        at = claims.get("auth_time")
+        at, subject = claims.get("auth_time"), claims["sub"]
+        is_id = isinstance(subject, str) and len(subject) <= _ID and subject.isprintable()
+        if not is_id:  # OpenID Connect Core, 2
+            raise self._wrong("it names nobody")
         named = (claims.get(each) for each in ("name", "preferred_username", "email"))
         return ProviderIdentity(
             self.settings.issuer,
-            claims["sub"],
-            next((each for each in named if isinstance(each, str) and each.strip()), ""),
+            subject,
+            next((_shown(each) for each in named if isinstance(each, str) and each.strip()), ""),
             _texts(claims.get(self.settings.claim)),
             int(claims["iat"]) - at if isinstance(at, int) and not isinstance(at, bool) else None,
         )
@@ -337,7 +342,7 @@ class IdentityProvider:
             status, content = await self._answer(method, url, **more)
             try:
                 found = msgspec.json.decode(content)
-            except (msgspec.DecodeError, RecursionError):
+            except (ValueError, RecursionError):  # no JSON, no text, or too deep
                 found = None
             if 400 <= status < 500 and method == "POST" and isinstance(found, dict):
                 raise Unauthenticated(
@@ -398,6 +403,11 @@ def _texts(claim: object) -> tuple[str, ...]:
     if isinstance(claim, list):
         given = claim[:_MOST_GROUPS]
     return tuple(each for each in given if isinstance(each, str))
+
+
+def _shown(name: str) -> str:
+    """Return the begin of a name, with blanks for what cannot be printed or written."""
+    return "".join(each if each.isprintable() else " " for each in name[:_NAME])
 
 
 def _reason(error: Exception) -> str:
