@@ -321,6 +321,8 @@ def _runs(walk: Walk) -> None:
     until("the run is over", lambda: client.get(f"/api/runs/{run}").json()["ended_at"])
     walk("runner", "patch", "/api/runs/{run}/marks", {"note": "odd"}, run=run)
     walk("runner", "post", "/api/runs/{run}/incident", {"reason": "odd"}, run=run)
+    around = {"since": "2026-11-28T10:00:00Z", "until": "2026-11-28T12:00:00Z"}
+    walk("editor", "post", "/api/audit/kept", {"run": run, **around})
     walk("runner", "post", "/api/expectations", {"name": "as before", "run": run})
     walk("runner", "delete", "/api/expectations/{name}", name="as before")
     walk("runner", "post", "/api/stop")

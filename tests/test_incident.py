@@ -107,6 +107,9 @@ def test_the_file_holds_everything_sound_and_no_secret(
     assert any(
         row["event"] == "invitation.made.v1" for row in json.loads(parts["audit-of-editor.json"])
     )
+    with owner(product) as http:  # the editor was told to keep its part
+        kept = http.get("/api/audit", params={"kind": "starts"}).json()["rows"]
+    assert (kept[0]["event"], kept[0]["run"]) == ("audit.kept.v1", run)
     readme = parts["README.txt"].decode()
     assert "all events are what was written" in readme
     assert not [line for line in readme.splitlines() if line.startswith((".", "=", "<"))]

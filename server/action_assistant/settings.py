@@ -41,6 +41,8 @@ VARIABLES: Final[Mapping[str, str]] = {
     "ACTION_ASSISTANT_LOG_LEVEL": "`debug`, `info`, `warning` or `error`, as --log-level",
     "ACTION_ASSISTANT_METRICS_TOKEN": "a token that opens /metrics and nothing else",
     "ACTION_ASSISTANT_METRICS_TOKEN_FILE": "a file with that token",
+    "ACTION_ASSISTANT_AUDIT_DAYS": "days for which sign-ins, refusals and other rows that only the audit "
+    "has are kept, by whole months (for ever)",
     "ACTION_ASSISTANT_TOKEN_DAYS": "the longest life of a token of a program, in days (365)",
     "ACTION_ASSISTANT_BACKUP_TO": "the folder of regular backups, as --backup-to of serve and --into of "
     "backup",
@@ -128,6 +130,7 @@ class EditorSettings(msgspec.Struct, frozen=True, kw_only=True):
     frames: tuple[str, ...] = ()
     oidc: Mapping[str, str] = {}
     notifications: Path | None = None
+    audit_days: float | None = None
 
 
 class Keep(msgspec.Struct, frozen=True, kw_only=True):
@@ -162,6 +165,7 @@ class RunnerSettings(msgspec.Struct, frozen=True, kw_only=True):
     metrics_token: str | None = None
     sessions: str = ""
     notifications: Path | None = None
+    audit_days: float | None = None
 
 
 def check_environment(environ: Mapping[str, str] = os.environ) -> None:
@@ -369,6 +373,12 @@ def token_days(environ: Mapping[str, str] = os.environ) -> float:
     malformed."""
     days = _days("ACTION_ASSISTANT_TOKEN_DAYS", environ)
     return TOKEN_DAYS if days is None else days
+
+
+def audit_days(environ: Mapping[str, str] = os.environ) -> float | None:
+    """Return for how many days rows that only the audit has are kept; None for ever. Raise CannotStart
+    if the variable is malformed."""
+    return _days("ACTION_ASSISTANT_AUDIT_DAYS", environ)
 
 
 def _days(name: str, environ: Mapping[str, str]) -> float | None:

@@ -1,7 +1,14 @@
 /** The order of rows over both logs, and the files. */
 import fc from "fast-check";
 import { expect, test } from "vitest";
-import { type AuditRow, auditFilterOf, auditQueryOf, csvOf, mergedRows } from "./audit-log";
+import {
+  type AuditRow,
+  auditFilterOf,
+  auditQueryOf,
+  csvOf,
+  droppedText,
+  mergedRows,
+} from "./audit-log";
 
 function row(log: string, position: number, at: number): AuditRow {
   const time = new Date(at).toISOString();
@@ -65,4 +72,12 @@ test("a filter in the address of the page is the same filter again", () => {
   const filter = auditFilterOf(new URLSearchParams("person=p1&kind=stops,starts&since=2026-11-28"));
   expect(auditFilterOf(auditQueryOf(filter))).toEqual(filter);
   expect(auditQueryOf(auditFilterOf(new URLSearchParams(""))).toString()).toBe("");
+});
+
+test("a sentence says which rows were dropped, when, and by which setting", () => {
+  const dropped = { until: "2026-05-31T23:59:00Z", at: "2026-11-28T10:00:00Z", days: 90 };
+  expect(droppedText("runner", dropped)).toBe(
+    "The runner keeps for 90 days what only the audit has, such as sign-ins and refusals: " +
+      "such rows up to 2026-05-31 were dropped on 2026-11-28.",
+  );
 });

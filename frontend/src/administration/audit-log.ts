@@ -88,16 +88,28 @@ function fetchPage(
   return runnerAt(runner).get("/api/audit", request) as Promise<AuditPage>;
 }
 
+export type DroppedRows = NonNullable<AuditPage["dropped"]>;
+
 /** What is known of the log of one process. `backTo`: the instant to which it was read, 0 if to its
- * begin; `problem`: why it cannot be read. */
+ * begin; `problem`: why it cannot be read; `dropped`: old rows that it has dropped, null for none. */
 export interface ReadLog {
   readonly rows: readonly AuditRow[];
   readonly backTo: number;
   readonly problem: string | null;
+  readonly dropped: DroppedRows | null;
+}
+
+/** Return a sentence about the rows that a process has dropped. */
+export function droppedText(log: LogName, { until, at, days }: DroppedRows): string {
+  const day = (time: string) => time.slice(0, 10);
+  return (
+    `The ${log} keeps for ${days} days what only the audit has, such as sign-ins and refusals: ` +
+    `such rows up to ${day(until)} were dropped on ${day(at)}.`
+  );
 }
 
 /** Rows of all logs, newest first. A row waits until the other logs were read as far back. */
-export function mergedRows(logs: readonly ReadLog[]): readonly AuditRow[] {
+export function mergedRows(logs: readonly Omit<ReadLog, "dropped">[]): readonly AuditRow[] {
   const read = Math.max(0, ...logs.filter((log) => log.problem === null).map((log) => log.backTo));
   return logs
     .flatMap((log) => log.rows)
@@ -127,6 +139,7 @@ export function useAuditLog(name: LogName, runner: string | undefined, filter: A
     rows: pages.flatMap((page) => page.rows),
     backTo: last?.before === null || Number.isNaN(backTo) ? 0 : backTo,
     problem: query.error === null ? null : errorText(query.error),
+    dropped: pages[0]?.dropped ?? null, // a process of an earlier version says nothing of it
   };
   return { log, query };
 }
@@ -154,6 +167,7 @@ export async function fetchEverything(
       let before: number | null = null;
       do {
         const page: AuditPage = await fetchPage(log, runner, asked(filter, 1000, before), FILE_MS);
+        if (before === null && page.dropped) lacks.push(droppedText(log, page.dropped));
         rows.push(...page.rows);
         before = page.before;
         onRows(logs.flat().length + rows.length);

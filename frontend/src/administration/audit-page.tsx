@@ -18,6 +18,7 @@ import {
   auditFilterOf,
   auditQueryOf,
   csvOf,
+  droppedText,
   fetchEverything,
   type LogName,
   mergedRows,
@@ -79,6 +80,14 @@ function Inside() {
       <Download filter={filter} runner={runner} />
       <Away log="editor" problem={logs.editor.log.problem} />
       <Away log="runner" problem={logs.runner.log.problem} />
+      {(["editor", "runner"] as const).map((name) => {
+        const { dropped } = logs[name].log;
+        return dropped === null ? null : (
+          <p key={name} className="m-0 quiet-12" role="status">
+            {droppedText(name, dropped)}
+          </p>
+        );
+      })}
       <section className="page-card min-w-0" aria-label="Audit" aria-busy={waits}>
         {rows.length === 0 && !waits && older.length === 0 ? (
           <Empty icon={<IconFileSearch size={22} />} title="Nothing is found">
@@ -94,9 +103,10 @@ function Inside() {
         <Older waits={waits} backTo={older.map(({ log }) => log.backTo)} onLook={lookBack} />
       </section>
       <p className="m-0 quiet-12">
-        Everything is kept as long as the logs are: a part of a log cannot be cut out without
-        breaking its chain. <code>action-assistant audit verify</code> proves both chains and prints
-        the line to keep elsewhere.
+        What happened to graphs, runs, robots and people is kept as long as the logs are; sign-ins,
+        refusals and the like as long as the administrator has set, by whole months.{" "}
+        <code>action-assistant audit verify</code> proves both chains and prints the line to keep
+        elsewhere.
       </p>
     </>
   );

@@ -61,7 +61,8 @@ export function IncidentDialog({ runner, run, onClose }: Props) {
 const AROUND_MS = 3_600_000;
 const PAGES = 10; // of the editor's audit
 
-/** Keep a run, and return its file. The runner has no access to the editor's audit: it goes along. */
+/** Keep a run, and return its file. The runner has no access to the editor's audit: it goes along, and
+ * the editor is told to keep it. */
 async function keepIncident(runner: string, run: Run, reason: string): Promise<Blob> {
   const url = `${runner}/api/runs/${encodeURIComponent(run.id)}/incident`;
   const body = { reason, editor_audit: await editorAudit(run) };
@@ -74,6 +75,11 @@ async function editorAudit(run: Run): Promise<readonly EditorApi["AuditRow"][]> 
   const until = new Date((instant(run.ended_at) ?? serverNow()) + AROUND_MS).toISOString();
   const rows: EditorApi["AuditRow"][] = [];
   let before: number | undefined;
+  try {
+    await editor.post("/api/audit/kept", { body: { run: run.id, since, until } });
+  } catch {
+    // An editor of an earlier version keeps everything.
+  }
   try {
     for (let page = 0; page < PAGES; page += 1) {
       const query = { since, until, before, limit: 500 };

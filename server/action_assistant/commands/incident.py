@@ -1,7 +1,8 @@
 """`incident`: keeps a run from being archived, and writes all that is known of it into one file."""
 
 import argparse
-from datetime import datetime, timedelta
+import contextlib
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any, Final
 
@@ -45,13 +46,17 @@ def _incident(options: argparse.Namespace) -> int:
 
 def _editor_audit(server: Server, run: dict[str, Any]) -> list[Any]:
     """Return the rows of the editor's audit from one hour before a run was requested until one hour
-    after its end (until now if it has not ended), at most 5,000. If the editor refuses or does not
+    after its end (until now if it has not ended), at most 5,000, and have it keep them. If the editor refuses or does not
     answer, return the rows got so far."""
     begin = datetime.fromisoformat(run["requested_at"]) - _AROUND
     ended = run.get("ended_at")
     query: dict[str, Any] = {"since": begin.isoformat(), "limit": _PAGE}
+    end = (datetime.fromisoformat(ended) if ended else datetime.now(UTC)) + _AROUND
     if ended:
-        query["until"] = (datetime.fromisoformat(ended) + _AROUND).isoformat()
+        query["until"] = end.isoformat()
+    kept = {"run": run["id"], "since": begin.isoformat(), "until": end.isoformat()}
+    with contextlib.suppress(CannotStart, RequestRefused):  # one of an earlier version keeps all
+        server.editor("POST", "/api/audit/kept", json=kept)
     found: list[Any] = []
     for _ in range(_PAGES):
         try:

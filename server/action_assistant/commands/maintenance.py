@@ -33,7 +33,7 @@ def _add_verify(verify: argparse.ArgumentParser) -> None:
         "action-assistant verify --head --sign ~/heads.pem >> heads.txt; "
         "action-assistant verify --against heads.txt --key ~/heads.pem"
     )
-    _where(verify)
+    add_place(verify)
     verify.add_argument(
         "--head",
         action="store_true",
@@ -62,14 +62,14 @@ def _add_verify(verify: argparse.ArgumentParser) -> None:
 
 def _add_rebuild(rebuild: argparse.ArgumentParser) -> None:
     rebuild.epilog = "example: action-assistant rebuild --data ./data"
-    _where(rebuild)
+    add_place(rebuild)
     rebuild.set_defaults(handler=_rebuild)
 
 
 COMMANDS: Final = {"verify": _add_verify, "rebuild": _add_rebuild}
 
 
-def _where(parser: argparse.ArgumentParser) -> None:
+def add_place(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--data", type=Path, default=paths.data(), metavar="DIR", help="default: %(default)s"
     )
@@ -109,7 +109,7 @@ def _verify(options: argparse.Namespace) -> int:
     proving = None if options.key is None else head_line.proving_key(options.key, data)
     given = [head_line.read(line, proving) for line in _lines(options.against)]
     now: dict[Branch, heads.LogHead] = {}
-    journals = _journals(options)
+    journals = journals_of(options)
     strange = {each.branch: _strange(each) for each in journals}
     for branch, sentences in strange.items():
         for sentence in sentences:
@@ -128,7 +128,7 @@ def _verify(options: argparse.Namespace) -> int:
         outcomes = [await _is_as_then(journal, branch, line, events, data) for line in given]
         return all(outcomes)
 
-    code = _for_each(data, journals, look)
+    code = for_each(data, journals, look)
     for line in given:
         for branch in line.heads.keys() - strange.keys():
             print(f"{branch}: the line of {line.time} speaks of it, and it is not there")
@@ -163,7 +163,7 @@ def _lines(given: str | None) -> list[str]:
     return lines
 
 
-def _strange(journal: "_KnownJournal") -> list[str]:
+def _strange(journal: "KnownJournal") -> list[str]:
     """Return sentences about objects in the schema of a journal that are not this program's. A
     database on a server is not checked, since it may have other users."""
     if not journal.url.startswith("sqlite:"):
@@ -228,10 +228,10 @@ def _rebuild(options: argparse.Namespace) -> int:
         print(f"{branch}: tables made again from {await journal.rebuild()} events")
         return True
 
-    return _for_each(options.data.resolve(), _journals(options), again)
+    return for_each(options.data.resolve(), journals_of(options), again)
 
 
-class _KnownJournal(NamedTuple):
+class KnownJournal(NamedTuple):
     """One journal of a data folder, and the fold that computes its tables."""
 
     branch: Branch
@@ -239,7 +239,7 @@ class _KnownJournal(NamedTuple):
     fold: Fold
 
 
-def _journals(options: argparse.Namespace) -> list[_KnownJournal]:
+def journals_of(options: argparse.Namespace) -> list[KnownJournal]:
     """Return all journals of the data folder. Raise CannotStart if there are none."""
     from action_assistant.editor.log import database_location
     from action_assistant.editor.log.graph_events import fold as editor_fold
@@ -247,20 +247,20 @@ def _journals(options: argparse.Namespace) -> list[_KnownJournal]:
 
     data = options.data.resolve()
     settled(data)
-    found: list[_KnownJournal] = []
+    found: list[KnownJournal] = []
     url = database_location.journal_of(data, options.database)
     if url is not None:
-        found.append(_KnownJournal("editor", url, editor_fold))
+        found.append(KnownJournal("editor", url, editor_fold))
     if (data / "runner.db").is_file():
-        found.append(_KnownJournal("runner", f"sqlite:///{data / 'runner.db'}", runner_fold))
+        found.append(KnownJournal("runner", f"sqlite:///{data / 'runner.db'}", runner_fold))
     if not found:
         raise CannotStart(f"There is no journal in {data}.")
     return found
 
 
-def _for_each(
+def for_each(
     data: Path,
-    journals: Sequence[_KnownJournal],
+    journals: Sequence[KnownJournal],
     handler: Callable[[Branch, Journal], Awaitable[bool]],
 ) -> int:
     """Open each journal in turn and call `handler` with it; return the exit code: 0 if each call

@@ -236,6 +236,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         frames=settings.frame_origins(),
         oidc=settings.oidc(),
         notifications=settings.notifications(),
+        audit_days=settings.audit_days(),
     )
 
 
@@ -325,6 +326,7 @@ def _runner(options: argparse.Namespace) -> int:
         metrics_token=settings.metrics_token(),
         sessions=settings.sessions(),
         notifications=settings.notifications(),
+        audit_days=settings.audit_days(),
     )
     listen(
         lambda: create_app(chosen),

@@ -4,11 +4,12 @@ import asyncio
 import logging
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import anyio
-from litestar import Litestar
+from litestar import Litestar, Request
 from litestar.types import ASGIApp, ControllerRouterHandler
 
 from action_assistant import paths
@@ -47,8 +48,10 @@ from action_assistant.errors import BadInput
 from action_assistant.journal.copies import before_upgrade
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
+from action_assistant.web.audit.events import KEEPING, AuditKept, draft_of
 from action_assistant.web.audit.log import AuditLog
-from action_assistant.web.audit.routes import audit_routes
+from action_assistant.web.audit.retention import AuditRetention, kept_for_incidents
+from action_assistant.web.audit.routes import audit_routes, keeping_routes
 from action_assistant.web.audit.rows import AuditFilter
 from action_assistant.web.auth.confirmation_routes import confirmation_routes
 from action_assistant.web.auth.confirmations import Confirmations
@@ -119,6 +122,7 @@ async def open_services(
                     services.notifications.sending(),
                     services.graph_checks.kept_up(),
                     services.audit.writing(journal),
+                    AuditRetention(journal, settings.audit_days, kept_for_incidents).sweeping(),
                 ):
                     await services.versions.write_releases()
                     if new:
@@ -247,6 +251,7 @@ def _routes(
         *members.routes(app_state, addresses, browsers),
         *guarded(_graph_routes(app_state, addresses), app_state),
         *audit_routes(lambda wanted: _audit(app_state.services, wanted)),
+        *keeping_routes(partial(_keep_audit, app_state)),
     ]
 
 
@@ -272,6 +277,13 @@ async def _audit(services: EditorServices, wanted: AuditFilter) -> bytes:
     return await services.workers.graphs(
         audit_facts.page_in_worker, services.journal.address, wanted
     )
+
+
+async def _keep_audit(
+    app_state: EditorState, kept: AuditKept, request: Request[Any, Any, Any]
+) -> None:
+    services, person = await app_state.acting(request)
+    await services.journal.append(KEEPING, [draft_of(kept, person.id)])
 
 
 async def _greet(services: EditorServices, folder: Path) -> None:

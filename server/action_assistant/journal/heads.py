@@ -11,6 +11,7 @@ from typing import Final
 import msgspec
 from sqlalchemy import and_, func, select
 
+from action_assistant.errors import Conflict
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
@@ -37,7 +38,8 @@ async def head_at(
 ) -> LogHead:
     """Return the end of the log of a branch right after the event at `position`, with a digest over
     the last event of each stream at that point. `read_kept` reads the events of streams that have
-    been archived in the meantime. Raise OSError or Refused if an archive cannot be read."""
+    been archived in the meantime. Raise OSError or Refused if an archive cannot be read, Conflict if
+    a stream that went on then was dropped."""
     return LogHead(
         position, digest_of(branch, position, await heads_at(journal, position, read_kept))
     )
@@ -62,10 +64,25 @@ async def heads_at(journal: JournalReader, position: int, read_kept: ReadKept) -
     )
     for row in await journal.query(said.order_by(_event.position)):
         removed = msgspec.json.decode(row.body, type=StreamRemoved)
-        end = removed.end if row.position <= position else _end(read_kept(removed.kept), position)
+        end = removed.end if row.position <= position else _then(removed, position, read_kept)
         if end.seq > heads.get(removed.stream, NOTHING).seq:
             heads[removed.stream] = end
     return heads
+
+
+def _then(removed: StreamRemoved, position: int, read_kept: ReadKept) -> Head:
+    """Return the end of a stream as it was at `position`, before it was taken out. Raise Conflict if
+    it was dropped, with events on both sides of that position."""
+    if removed.kept:
+        return _end(read_kept(removed.kept), position)
+    if removed.last <= position:
+        return removed.end
+    if removed.first > position:
+        return NOTHING
+    raise Conflict(
+        f"{removed.stream}, which went on then, was dropped for its age; only lines from before or "
+        "after it can be compared."
+    )
 
 
 def digest_of(branch: Branch, position: int, heads: dict[str, Head]) -> str:

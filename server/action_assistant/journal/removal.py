@@ -1,4 +1,4 @@
-"""Streams that were taken out of a journal after they were stored elsewhere.
+"""Streams that were taken out of a journal: after they were stored elsewhere, or dropped for their age.
 
 The log says so before the first event goes, with the end of the stream and the chain up to it, so that
 `verify` knows which events are missing on purpose, and what they must be where they are kept. Events
@@ -21,7 +21,9 @@ _SLICE: Final = 1_000  # events deleted in one transaction: others want to write
 
 
 class StreamRemoved(msgspec.Struct, frozen=True):
-    """A stream ends at `seq` with `chain` (hex) and is kept as `kept`, whose SHA-256 is `sha256`."""
+    """A stream ends at `seq` with `chain` (hex) and is kept as `kept`, whose SHA-256 is `sha256`. Both
+    are empty where the stream was dropped and is kept nowhere; then `first` and `last` are the
+    positions of its events in the log."""
 
     kind: ClassVar[str] = "stream.removed.v1"
 
@@ -30,6 +32,8 @@ class StreamRemoved(msgspec.Struct, frozen=True):
     chain: str
     kept: str
     sha256: str
+    first: int = 0
+    last: int = 0
 
     @property
     def end(self) -> Head:
@@ -47,16 +51,18 @@ def taken_out(event: Event) -> tuple[str, Head] | None:
 
 
 def delete_some(connection: Connection, stream: str, by: int) -> bool:
-    """Delete the newest events of a stream, `_SLICE` of them at most, and its snapshots. Return
-    whether any events are left. `by`: the seq of the event that records the removal of the stream.
-    Raise Conflict if there is no such event or it names another stream."""
+    """Delete the newest events of a stream that was taken out, `_SLICE` of them at most, and its
+    snapshots. Return whether any events of it are left. `by`: the seq of the event that records the
+    removal of the stream. Raise Conflict if there is no such event or it names another stream."""
     event = editor_event.c
     said = select(event.body).where(event.stream == STREAM, event.seq == by)
     body = connection.execute(said).scalar()
-    if body is None or msgspec.json.decode(body, type=StreamRemoved).stream != stream:
+    removed = None if body is None else msgspec.json.decode(body, type=StreamRemoved)
+    if removed is None or removed.stream != stream:
         raise Conflict(f"Nothing says where {stream} is kept; it stays.")
-    newest = connection.execute(select(func.max(event.seq)).where(event.stream == stream)).scalar()
+    ours = event.stream == stream, event.seq <= removed.seq  # it may have gone on since
+    newest = connection.execute(select(func.max(event.seq)).where(*ours)).scalar()
     first = (newest or 0) - _SLICE
-    connection.execute(delete(editor_event).where(event.stream == stream, event.seq > first))
+    connection.execute(delete(editor_event).where(*ours, event.seq > first))
     connection.execute(delete(editor_snapshot).where(editor_snapshot.c.stream == stream))
     return first > 0

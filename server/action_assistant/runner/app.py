@@ -40,6 +40,7 @@ from action_assistant.runner.links.ros2.availability import ros2_reach
 from action_assistant.runner.links.simulated import Simulators
 from action_assistant.runner.notices import KINDS, with_notices
 from action_assistant.runner.review.background_loops import index_words
+from action_assistant.runner.review.incident import incident_times
 from action_assistant.runner.review.service import ReviewService
 from action_assistant.runner.review.stored_runs import StoredRuns
 from action_assistant.runner.review.worker_queries import StoragePaths, WorkerQueries
@@ -52,6 +53,7 @@ from action_assistant.runner.workers import RunnerWorkers
 from action_assistant.settings import ARCHIVE, Keep, RunnerSettings
 from action_assistant.web.audit.events import StopPressed
 from action_assistant.web.audit.log import AuditLog
+from action_assistant.web.audit.retention import AuditRetention
 from action_assistant.web.auth.caller import BackgroundTasks
 from action_assistant.web.auth.confirmation_routes import confirmation_routes
 from action_assistant.web.auth.confirmations import Confirmations
@@ -132,7 +134,12 @@ async def open_services(
                     journal, receivers, KINDS, public.page if public is not None else ""
                 )
                 control.idle_stop = partial(_note_idle_stop, services.audit)
-                async with services.audit.writing(journal), services.notifications.sending():
+                old_audit = AuditRetention(journal, settings.audit_days, incident_times)
+                async with (
+                    services.audit.writing(journal),
+                    services.notifications.sending(),
+                    old_audit.sweeping(),
+                ):
                     yield services
                 tasks.cancel_scope.cancel()
     finally:

@@ -104,12 +104,14 @@ export interface EditorApi {
      * AuditPage
      * @description Rows, the newest first. `before`: the cursor of the next page; null once the begin of the log is
      *     reached. A page may be empty and have a cursor, since one answer looks at a part of the log.
-     *     `back_to`: the time of the oldest event that was looked at.
+     *     `back_to`: the time of the oldest event that was looked at; `dropped`: the newest rows that were
+     *     dropped because of their age; null if none were.
      */
     AuditPage: {
         rows: EditorApi["AuditRow"][];
         before: number | null;
         back_to: string | null;
+        dropped: EditorApi["DroppedRows"] | null;
     };
     /**
      * AuditRow
@@ -580,6 +582,18 @@ export interface EditorApi {
         ahead: number | null;
         behind: number | null;
         proposal?: EditorApi["DraftProposal"];
+    };
+    /**
+     * DroppedRows
+     * @description Rows up to `until` that only the audit had were dropped `at` this time, since they were older
+     *     than `days`.
+     */
+    DroppedRows: {
+        /** Format: date-time */
+        until: string;
+        /** Format: date-time */
+        at: string;
+        days: number;
     };
     /**
      * EdgeEval
@@ -1062,6 +1076,17 @@ export interface EditorApi {
         waiting: number;
         busy_s: number;
         failing: string | null;
+    };
+    /**
+     * KeptAudit
+     * @description The time around a run that an owner keeps as an incident: no row of the audit in it is dropped.
+     */
+    KeptAudit: {
+        run: string;
+        /** Format: date-time */
+        since: string;
+        /** Format: date-time */
+        until: string;
     };
     /**
      * KeyChange
@@ -2780,6 +2805,9 @@ export interface EditorPaths {
     };
     "/api/audit": {
         get: EditorOperations["listAudit"];
+    };
+    "/api/audit/kept": {
+        post: EditorOperations["keepAudit"];
     };
     "/api/notifications": {
         get: EditorOperations["listReceivers"];
@@ -4509,6 +4537,17 @@ interface EditorOperations {
                 content: {
                     "application/json": EditorApi["AuditPage"];
                 };
+            };
+        };
+    };
+    keepAudit: {
+        requestBody: {
+            content: {
+                "application/json": EditorApi["KeptAudit"];
+            };
+        };
+        responses: {
+            204: {
             };
         };
     };

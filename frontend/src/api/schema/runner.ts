@@ -218,12 +218,14 @@ export interface RunnerApi {
      * AuditPage
      * @description Rows, the newest first. `before`: the cursor of the next page; null once the begin of the log is
      *     reached. A page may be empty and have a cursor, since one answer looks at a part of the log.
-     *     `back_to`: the time of the oldest event that was looked at.
+     *     `back_to`: the time of the oldest event that was looked at; `dropped`: the newest rows that were
+     *     dropped because of their age; null if none were.
      */
     AuditPage: {
         rows: RunnerApi["AuditRow"][];
         before: number | null;
         back_to: string | null;
+        dropped: RunnerApi["DroppedRows"] | null;
     };
     /**
      * AuditRow
@@ -567,6 +569,18 @@ export interface RunnerApi {
         saw_it_stop: boolean;
         hardware_stop: boolean;
         failure: string;
+    };
+    /**
+     * DroppedRows
+     * @description Rows up to `until` that only the audit had were dropped `at` this time, since they were older
+     *     than `days`.
+     */
+    DroppedRows: {
+        /** Format: date-time */
+        until: string;
+        /** Format: date-time */
+        at: string;
+        days: number;
     };
     /**
      * DurationBounds

@@ -207,6 +207,8 @@ def archived(runner: Path) -> dict[str, str]:
     ):
         if row.kind == StreamRemoved.kind:
             removed = msgspec.json.decode(row.body, type=StreamRemoved)
+            if not removed.kept:
+                continue  # it was dropped for its age
             places[removed.kept] = removed.sha256
         else:
             put = msgspec.json.decode(row.body, type=RawArchived)

@@ -168,6 +168,9 @@ _READERS: Final[Mapping[str, Callable[[str], object]]] = {
     ),
     "ACTION_ASSISTANT_KEEP_RUNS": _days("ACTION_ASSISTANT_KEEP_RUNS"),
     "ACTION_ASSISTANT_KEEP_RAW": _days("ACTION_ASSISTANT_KEEP_RAW"),
+    "ACTION_ASSISTANT_AUDIT_DAYS": lambda value: settings.audit_days(
+        {"ACTION_ASSISTANT_AUDIT_DAYS": value}
+    ),
     "ACTION_ASSISTANT_TOKEN_DAYS": lambda value: settings.token_days(
         {"ACTION_ASSISTANT_TOKEN_DAYS": value}
     ),

@@ -114,7 +114,7 @@ class EditorFacts:
         return msgspec.structs.replace(fact, person=self._person(event.author))
 
     def _fact(self, event: Event) -> Fact | None:
-        if event.stream == audit.STREAM:
+        if audit.is_audit(event.stream):
             return described(event, self._graph_name)
         if event.kind == h.EPOCH:
             text = "The log begins anew here: a new server, or a restored backup"

@@ -11,7 +11,8 @@ from typing import Final
 
 from action_assistant.editor.rooms.batch import SubmittedEdit
 from action_assistant.journal.events import Addition, Draft
-from action_assistant.web.audit.events import STREAM, EditingBegan, draft_of
+from action_assistant.kit.clock import utc_us
+from action_assistant.web.audit.events import EditingBegan, draft_of, stream_at
 from action_assistant.web.auth.caller import Origin, acting_for
 
 _PAUSE_S: Final = 300.0
@@ -37,4 +38,4 @@ class EditSittings:
                 continue
             with acting_for(edit.author, edit.origin):
                 drafts.append(draft_of(EditingBegan(graph, number), edit.author))
-        return [Addition(STREAM, tuple(drafts))] if drafts else _NOTHING
+        return [Addition(stream_at(utc_us()), tuple(drafts))] if drafts else _NOTHING

@@ -236,7 +236,7 @@ def _due(before: int, most: int) -> Select[Any]:
             run.c.ended_at < before,
             review.c.summed,
             or_(review.c.pinned.is_(None), ~review.c.pinned),
-            ~_is_incident(run.c.id),
+            ~is_incident(run.c.id),
         )
         .order_by(run.c.ended_at)
         .limit(most)
@@ -247,10 +247,10 @@ def _kept(run_id: str) -> Select[Any]:
     """Return the query that finds a run (by id) if it is never archived: it is pinned, or kept as
     an incident."""
     pinned = exists().where(review.c.run == run.c.id, review.c.pinned)
-    return select(run.c.id).where(run.c.id == run_id, or_(pinned, _is_incident(run.c.id)))
+    return select(run.c.id).where(run.c.id == run_id, or_(pinned, is_incident(run.c.id)))
 
 
-def _is_incident(run_id: ColumnElement[str]) -> ColumnElement[bool]:
+def is_incident(run_id: ColumnElement[str]) -> ColumnElement[bool]:
     """Return the SQL condition that an owner keeps the run as an incident, by the events about it."""
     stream = literal(annotations.stream_about("")) + run_id
     event = runner_event.c

@@ -134,7 +134,7 @@ class RunnerFacts:
     def describe(self, event: Event) -> Fact | None:
         """Return an event in words; None for events that are no facts about people. Raise
         msgspec.DecodeError for a body that cannot be read."""
-        if event.stream == audit.STREAM:
+        if audit.is_audit(event.stream):
             return described(event)
         body = msgspec.json.decode(event.body, type=_Body) if event.body else _Body()
         author = _author(body)

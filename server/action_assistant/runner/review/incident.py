@@ -12,13 +12,17 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Final
 
 import msgspec
+from sqlalchemy import Connection, select
 
 from action_assistant.errors import TooLarge
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.events import Event
+from action_assistant.kit.clock import utc_us
+from action_assistant.runner.archives.retention import is_incident
 from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.runs.views import time
 from action_assistant.safe_text import one_line
+from action_assistant.schema.runner_tables import run
 from action_assistant.version import VERSION, commit
 from action_assistant.web.audit.rows import AuditRow
 
@@ -115,6 +119,13 @@ def window(requested_at: int, ended_at: int | None, now: int) -> tuple[int, int]
     and audit: that of the run, with a margin. `ended_at`: None for a run that goes on until `now`.
     """
     return requested_at - _AROUND_US, (now if ended_at is None else ended_at) + _AROUND_US
+
+
+def incident_times(connection: Connection) -> list[tuple[int, int]]:
+    """Return the begins and ends (µs UTC) whose audit belongs to the runs that an owner keeps."""
+    chosen = select(run.c.requested_at, run.c.ended_at).where(is_incident(run.c.id))
+    now = utc_us()
+    return [window(row.requested_at, row.ended_at, now) for row in connection.execute(chosen)]
 
 
 def event_lines(events: Sequence[Event]) -> tuple[bytes, Head]:

@@ -1,9 +1,11 @@
 """The events of the stream `audit`: facts about people that no other stream holds.
 
-Each process has one such stream in its own log. All other facts of the audit are events of other
-streams, whose bodies hold the origin of their author (`web/auth/caller.py`).
+Each process has such streams in its own log, one for each month, so that old months can be dropped. All
+other facts of the audit are events of other streams, whose bodies hold the origin of their author
+(`web/auth/caller.py`).
 """
 
+from datetime import UTC, datetime
 from typing import ClassVar, Final, Literal, Protocol
 
 import msgspec
@@ -13,8 +15,25 @@ from action_assistant.web.auth.caller import stamped
 from action_assistant.web.auth.confirmations import ConfirmedBy
 from action_assistant.web.auth.sessions import SignInMeans
 
-#: The stream of the audit in the log of a process.
+#: The stream of the audit in the log of a process, from before there was one for each month.
 STREAM: Final = "audit"
+#: The stream of what was dropped and what must not be. It is never dropped itself.
+KEEPING: Final = "audit-keeping"
+
+
+def stream_at(at: int) -> str:
+    """Return the name of the stream for facts at a time (µs UTC): that of its month."""
+    return f"{STREAM}/{datetime.fromtimestamp(at / 1_000_000, UTC):%Y-%m}"
+
+
+def is_of_month(stream: str) -> bool:
+    """Return whether a stream holds facts of the audit that may be dropped when they are old."""
+    return stream == STREAM or stream.startswith(f"{STREAM}/")
+
+
+def is_audit(stream: str) -> bool:
+    """Return whether a stream holds facts of the audit alone."""
+    return stream == KEEPING or is_of_month(stream)
 
 
 class EditingBegan(msgspec.Struct, frozen=True):
@@ -183,8 +202,36 @@ class Unlisted(msgspec.Struct, frozen=True):
     count: int
 
 
+class AuditDropped(msgspec.Struct, frozen=True):
+    """All facts in one stream of the audit were dropped, since all were older than `days`. `since`,
+    `until`: times of the oldest and the newest one, µs UTC; `seq`, `chain`: the number of the last one
+    and the hash there, in hex, by which an export can be checked; `by`: the number of the event by
+    which the stream was taken out of the log."""
+
+    kind: ClassVar[str] = "audit.dropped.v1"
+
+    stream: str
+    rows: int
+    since: int
+    until: int
+    seq: int
+    chain: str
+    by: int
+    days: float
+
+
+class AuditKept(msgspec.Struct, frozen=True):
+    """The author keeps a run as an incident: no facts between two times (µs UTC) are dropped."""
+
+    kind: ClassVar[str] = "audit.kept.v1"
+
+    run: str
+    since: int
+    until: int
+
+
 class AuditEvent(Protocol):
-    """An event of the stream `audit`."""
+    """An event of the streams of the audit."""
 
     kind: ClassVar[str]
 

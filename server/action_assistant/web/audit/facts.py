@@ -1,4 +1,4 @@
-"""The events of the stream `audit` in words, for the logs of both processes."""
+"""The events of the streams of the audit in words, for the logs of both processes."""
 
 from collections.abc import Callable, Mapping
 from typing import Final
@@ -6,6 +6,7 @@ from typing import Final
 import msgspec
 
 from action_assistant.journal.events import Event
+from action_assistant.kit.moments import moment
 from action_assistant.web.audit import events
 from action_assistant.web.audit.rows import AuditKind, Fact
 from action_assistant.web.auth.keys import PersonRef
@@ -50,12 +51,14 @@ _EVENTS: Final = {
         events.StopPressed,
         events.StrangersRefused,
         events.Unlisted,
+        events.AuditDropped,
+        events.AuditKept,
     )
 }
 
 
 def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | None:
-    """Return an event of the stream `audit` in words; None for a kind of a newer version. Raise
+    """Return an event of the streams of the audit in words; None for a kind of a newer version. Raise
     msgspec.DecodeError for a body that cannot be read."""
     known = _EVENTS.get(event.kind)
     found = None if known is None else msgspec.json.decode(event.body, type=known)
@@ -125,7 +128,24 @@ def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | No
         case events.Unlisted(what=what, count=count):
             kind: AuditKind = "strangers" if what == "strangers_refused" else "other"
             return Fact(kind=kind, text=f"{count} {_UNLISTED[what]}")
+        case events.AuditDropped() as dropped:
+            return Fact(kind="other", text=_dropped(dropped), is_of_program=True)
+        case events.AuditKept(run=run, since=since, until=until):
+            text = f"keeps the audit from {_minute(since)} to {_minute(until)} for an incident"
+            return Fact(kind="starts", text=text, run=run)
     return None
+
+
+def _minute(at: int) -> str:
+    return f"{moment(at):%Y-%m-%d %H:%M} UTC"
+
+
+def _dropped(dropped: events.AuditDropped) -> str:
+    return (
+        f"{dropped.rows} rows of {dropped.stream}, from {_minute(dropped.since)} to "
+        f"{_minute(dropped.until)}, were dropped by the setting ({dropped.days:g} days). Their chain "
+        f"ended at event {dropped.seq} with {dropped.chain}"
+    )
 
 
 def _again(times: int) -> str:

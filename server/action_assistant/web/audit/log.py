@@ -1,4 +1,4 @@
-"""Writes the stream `audit` in the background, and counts refusals so that a flood stays small.
+"""Writes the streams of the audit in the background, and counts refusals so that a flood stays small.
 
 Nobody waits for the audit: a Stop, a sign-in and a refusal go on while the journal cannot be
 written. What is noted meanwhile is stored later, in its order; beyond `_WAITING` events it is only
@@ -35,6 +35,7 @@ from action_assistant.web.audit.events import (
     ViewLinkMade,
     ViewLinkRevoked,
     draft_of,
+    stream_at,
 )
 from action_assistant.web.auth.caller import (
     Origin,
@@ -280,7 +281,7 @@ class AuditLog:
             while self._waiting:
                 batch = [self._waiting[n] for n in range(min(len(self._waiting), most))]
                 try:
-                    await journal.append(STREAM, batch)
+                    await journal.append(stream_at(self._clock_us()), batch)
                 except Unavailable as refused:
                     log.warning("the audit is not stored yet: %s", refused.detail)
                     await asyncio.sleep(_AGAIN_S)
@@ -328,7 +329,7 @@ class AuditLog:
         at = self._clock_us()
         event = editor_event.c
         chosen = select(event.kind, func.count()).where(
-            event.stream == STREAM,
+            event.stream.in_((STREAM, stream_at(at))),
             event.at >= at - at % _DAY_US,
             event.kind.in_((StrangersRefused.kind, StartRefused.kind, StopPressed.kind)),
         )

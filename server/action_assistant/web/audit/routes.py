@@ -1,14 +1,16 @@
-"""The route of the audit, which both processes have for their own log."""
+"""The routes of the audit: both processes answer for their own log."""
 
 from collections.abc import Awaitable, Callable
 from datetime import datetime
-from typing import Annotated
+from typing import Annotated, Any
 
-from litestar import Response, get
+import msgspec
+from litestar import Request, Response, get, post
 from litestar.params import Parameter
 from litestar.types import ControllerRouterHandler
 
 from action_assistant.errors import BadInput
+from action_assistant.web.audit.events import AuditKept
 from action_assistant.web.audit.rows import AuditFilter, AuditPage, kinds_of
 from action_assistant.web.auth.access import Needs
 from action_assistant.web.server.openapi import MOST_NUMBER, answer
@@ -55,6 +57,36 @@ def audit_routes(
         return Response(await page(wanted), media_type="application/json")
 
     return [list_audit]
+
+
+class KeptAudit(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The time around a run that an owner keeps as an incident: no row of the audit in it is dropped."""
+
+    run: Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
+    since: datetime
+    until: datetime
+
+
+def keeping_routes(
+    keep: Callable[[AuditKept, Request[Any, Any, Any]], Awaitable[None]],
+) -> list[ControllerRouterHandler]:
+    """Return the route by which the editor is told of an incident, for owners: the runner, which has
+    it, does not know the editor. `keep` stores it."""
+
+    @post(
+        "/api/audit/kept",
+        summary="Keep the audit of this process from being dropped around a run that is an incident",
+        operation_id="keepAudit",
+        guards=[Needs("share")],
+        status_code=204,
+    )
+    async def keep_audit(data: KeptAudit, request: Request[Any, Any, Any]) -> None:
+        since, until = _us(data.since, "/since"), _us(data.until, "/until")
+        if since is None or until is None or until < since:
+            raise BadInput("The end is before the beginning.", where={"path": "/until"})
+        await keep(AuditKept(data.run, since, until), request)
+
+    return [keep_audit]
 
 
 def _us(moment: datetime | None, path: str) -> int | None:

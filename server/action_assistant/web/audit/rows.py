@@ -1,6 +1,6 @@
 """Pages of the audit: rows that are read from the log of one process, the newest first."""
 
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Annotated, Any, Final, Literal, TypeAlias, get_args
 
@@ -10,6 +10,7 @@ from sqlalchemy import Connection, Select, func, select
 from action_assistant.journal.database import Branch
 from action_assistant.journal.events import Event
 from action_assistant.schema.editor_tables import editor_event
+from action_assistant.web.audit.events import KEEPING, AuditDropped
 from action_assistant.web.auth.caller import Origin, origin_in
 from action_assistant.web.auth.keys import PersonRef
 
@@ -93,14 +94,25 @@ class AuditRow(
     times: int = 1
 
 
+class DroppedRows(msgspec.Struct, frozen=True):
+    """Rows up to `until` that only the audit had were dropped `at` this time, since they were older
+    than `days`."""
+
+    until: datetime
+    at: datetime
+    days: float
+
+
 class AuditPage(msgspec.Struct, frozen=True):
     """Rows, the newest first. `before`: the cursor of the next page; null once the begin of the log is
     reached. A page may be empty and have a cursor, since one answer looks at a part of the log.
-    `back_to`: the time of the oldest event that was looked at."""
+    `back_to`: the time of the oldest event that was looked at; `dropped`: the newest rows that were
+    dropped because of their age; null if none were."""
 
     rows: tuple[AuditRow, ...]
     before: int | None
     back_to: datetime | None
+    dropped: DroppedRows | None = None
 
 
 #: Says an event in words; None for events that are no facts about people.
@@ -117,6 +129,22 @@ def audit_page(
     """Return a page of the audit of one log (`branch`): the rows for which `wanted` asks.
     `describe`: returns an event in words; `never`: kinds of events that are no facts about people,
     most of a log."""
+    dropped = drops(connection)
+    ends = {each.stream: each.seq for _, each in dropped}
+    page = _page(connection, branch, wanted, describe, never, ends)
+    return msgspec.structs.replace(page, dropped=_newest(dropped))
+
+
+def _page(
+    connection: Connection,
+    branch: Branch,
+    wanted: AuditFilter,
+    describe: Describe,
+    never: Collection[str],
+    gone: Mapping[str, int],
+) -> AuditPage:
+    """Return a page. `gone`: streams that were dropped, each with its end then; events up to that may
+    be in the log for some moments more."""
     end: int = connection.execute(select(func.max(_event.position))).scalar() or 0
     cursor = end + 1 if wanted.before is None else min(wanted.before, end + 1)
     last = max(1, cursor - _MOST)
@@ -126,6 +154,8 @@ def audit_page(
         low = max(last, cursor - _SLICE)
         for event in _events(connection, wanted, never, low, cursor):
             cursor = event.position
+            if event.seq <= gone.get(event.stream, 0):
+                continue
             row = _row(branch, event, wanted, describe)
             if row is not None:
                 rows.append(row)
@@ -155,6 +185,22 @@ def _events(
         chosen = chosen.where(_event.at < wanted.until)
     for row in connection.execute(chosen.order_by(_event.position.desc())):
         yield Event(*row)
+
+
+def drops(connection: Connection) -> list[tuple[int, AuditDropped]]:
+    """Return what was dropped, oldest first, each with its time (µs UTC)."""
+    chosen = select(_event.at, _event.body).where(
+        _event.stream == KEEPING, _event.kind == AuditDropped.kind
+    )
+    rows = connection.execute(chosen.order_by(_event.seq)).all()
+    return [(row.at, msgspec.json.decode(row.body, type=AuditDropped)) for row in rows]
+
+
+def _newest(found: Sequence[tuple[int, AuditDropped]]) -> DroppedRows | None:
+    if not found:
+        return None
+    at, dropped = max(found, key=lambda each: each[1].until)
+    return DroppedRows(_utc(dropped.until), _utc(at), dropped.days)
 
 
 def _times(connection: Connection, position: int) -> tuple[int | None, int | None]:
@@ -201,7 +247,7 @@ def _described(event: Event, describe: Describe, origin: Origin | None) -> Fact 
     kind is left out."""
     try:
         fact = describe(event)
-    except (msgspec.DecodeError, TypeError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         return Fact(kind="other", text=f"{event.kind} (it cannot be read)")
     if fact is None and origin is not None:
         return Fact(kind="other", text=event.kind)

@@ -144,7 +144,7 @@ def origin_in(body: bytes) -> Origin | None:
         return None
     try:
         return msgspec.json.decode(body, type=_Stamped).origin
-    except msgspec.DecodeError:  # a body of another form
+    except (ValueError, RecursionError):  # a body of another form
         return None
 
 
