@@ -315,6 +315,61 @@ def test_nothing_that_is_answered_tells_of_a_graph_out_of_sight(
     assert told == []
 
 
+def told_until(product: Product, headers: dict[str, str], last: str) -> str:
+    """Return what the stream of events tells from its beginning until a text comes."""
+    text = ""
+    with (
+        httpx.Client(base_url=product.url, trust_env=False, timeout=30) as http,
+        http.stream("GET", "/api/events?after=0", headers=headers) as events,
+    ):
+        for line in events.iter_lines():
+            text += line
+            if last in line:
+                break
+    return text
+
+
+def test_the_stream_of_events_tells_of_the_audit_to_owners_alone(
+    product: Product, owner: httpx.Client, people: dict[str, Who]
+) -> None:
+    came = httpx.post(
+        f"{product.url}/api/session",
+        json={"token": TOKEN, "name": "Ann"},
+        headers={"origin": product.url},
+        trust_env=False,
+    )
+    assert came.is_success
+    told_until(product, people["owner, named nobody"].headers, "audit.signed_in.v1")
+    marker = owner.post("/api/graphs", json=graph_file("Marker", "Go")).json()["id"]
+    text = told_until(product, people["operator, named nobody"].headers, marker)
+    assert "person.named.v1" in text
+    assert "audit" not in text
+
+
+def test_a_check_counts_no_graph_out_of_sight_among_those_of_one_name(
+    product: Product, owner: httpx.Client, people: dict[str, Who]
+) -> None:
+    made = [
+        owner.post("/api/graphs", json=graph_file(name, step)).json()["id"]
+        for name, step in (("Twin", "Go"), ("Twin", "Wait"), ("Of twins", "Twin"))
+    ]
+    nobody = people["editor, named nobody"].headers
+
+    def codes(headers: dict[str, str]) -> set[str]:
+        url = f"{product.url}/api/graphs/{made[2]}/problems"
+        answer = httpx.get(url, headers=headers, trust_env=False, timeout=30)
+        assert answer.status_code == 200, answer.text
+        return {each["code"] for each in answer.json()["problems"]}
+
+    before = codes(nobody)
+    rule = {"readers": [], "editors": []}
+    owner.put(f"/api/graphs/{made[1]}/rule", json={"rule": rule}).raise_for_status()
+    mine = {"authorization": f"Bearer {TOKEN}"}
+    assert (codes(mine), codes(nobody)) == (before, before - {"subgraph-ambiguous"})
+    for graph in made:
+        owner.delete(f"/api/graphs/{graph}").raise_for_status()
+
+
 def closed_with(socket: ClientConnection, seconds: float = 5) -> int | None:
     """Return the code with which the server closes a socket; 0 if it stays open so long."""
     try:

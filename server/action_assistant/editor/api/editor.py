@@ -14,14 +14,17 @@ from litestar.types import ControllerRouterHandler
 
 from action_assistant import paths
 from action_assistant.editor.log import graph_events as h
+from action_assistant.editor.log.inbox_events import inbox_stream
 from action_assistant.editor.services import EditorState
 from action_assistant.errors import BadInput
 from action_assistant.journal.events import Event
 from action_assistant.umrf.json.text import UmrfGraph
 from action_assistant.version import VERSION, commit
+from action_assistant.web.audit.events import is_audit
 from action_assistant.web.auth.access import Needs, identity_of, person_of
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import PersonRef
+from action_assistant.web.auth.roles import OWNER
 from action_assistant.web.network.addresses import Addresses
 from action_assistant.web.server.openapi import MOST_NUMBER, answer
 
@@ -148,7 +151,7 @@ async def _told(
             sees = await services.rights.sight(identity)
             for event in page:
                 graph = h.graph_of(event.stream)
-                if graph is None or sees(graph):
+                if _concerns(event.stream, identity) and (graph is None or sees(graph)):
                     yield _message(app_state, event)
             done = page[-1].position
         coming = asyncio.ensure_future(anext(events))
@@ -162,12 +165,22 @@ async def _told(
                 coming = asyncio.ensure_future(anext(events))
                 graph = h.graph_of(event.stream)
                 hidden = graph is not None and not await services.rights.may_see(graph, identity)
-                if event.position > done and not hidden:
+                if event.position > done and not hidden and _concerns(event.stream, identity):
                     yield _message(app_state, event)
         except StopAsyncIteration:  # the journal is closed
             return
         finally:
             coming.cancel()
+
+
+def _concerns(stream: str, identity: Identity) -> bool:
+    """Return whether somebody may be told of the events of a stream: the audit, which also says who
+    edits graphs out of their sight, is for owners; an inbox for its person."""
+    if identity.person.role == OWNER:
+        return True
+    is_inbox = stream.startswith(inbox_stream(""))
+    is_own = stream == inbox_stream(identity.person.id)
+    return not is_audit(stream) and (is_own or not is_inbox)
 
 
 def _message(app_state: EditorState, event: Event) -> ServerSentEventMessage:

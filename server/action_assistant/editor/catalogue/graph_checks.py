@@ -353,8 +353,14 @@ class GraphChecks:
                     below.append((name, info.uses))
             level = below
         members = tuple(found[name] for name in sorted(found))
-        several = tuple(each.name for each in members if self.names.is_ambiguous(each.name))
+        several = tuple([each.name for each in members if await self._is_ambiguous(each.name)])
         return NamedInside(members, several, cut, tuple(sorted(hidden)), unseen)
+
+    async def _is_ambiguous(self, name: str) -> bool:
+        """Return whether several graphs that the person may see have this name: of the others
+        nothing tells."""
+        graphs = self.names.called(name)
+        return len(graphs) > 1 and sum([await self.caller_sees(graph) for graph in graphs]) > 1
 
     async def _standing_for(self, name: str) -> tuple[_Member, GraphInfo] | None:
         known = self.names.graph(name)

@@ -84,10 +84,6 @@ class GraphNames:
         graphs = self._graphs
         return [name for name in names if name in graphs]
 
-    def is_ambiguous(self, name: str) -> bool:
-        """Return whether more than one graph has this name."""
-        return len(self._graphs.get(name, ())) > 1
-
     def is_hidden(self, name: str) -> bool:
         """Return whether a graph has this name and an action of the library too; then the action counts."""
         return bool(self._actions[name]) and name in self._graphs
