@@ -18,6 +18,7 @@ import msgspec
 import pytest
 from sqlalchemy import Connection, inspect, text
 
+from action_assistant.cli import main
 from action_assistant.commands.databases.migrate import go_back
 from action_assistant.errors import CannotStart
 from action_assistant.journal import migrate as journal_migrate
@@ -117,6 +118,16 @@ def test_every_revision_comes_to_this_one_and_back_by_its_copy(
     migrate(place.url, place.branch, revision)
     database_of(place.url).migrate(lambda c: (write_events(c), fill(c, LOG)))
     before = place.asked(stored)
+    database = None if place.url.startswith("sqlite") else place.url
+    verify = ["verify", "--data", str(place.data)]
+    assert main(verify if database is None else [*verify, "--database", database]) == 0
+    said = capsys.readouterr().out
+    assert f"{place.branch}: 12 events, all of them sound" in said
+    assert (f"its tables are of schema {revision}," in said) == (
+        revision != revisions_of(place.branch)[-1]
+    )
+    assert (place.asked(recognize), place.asked(stored)) == ({revision}, before)
+    assert not (place.data / FOLDER).exists()
 
     place.opened()
     after = place.asked(stored)
@@ -135,7 +146,6 @@ def test_every_revision_comes_to_this_one_and_back_by_its_copy(
     assert copy.path.stat().st_mode & 0o777 == 0o600
     assert Place(place.data, place.branch, f"sqlite:///{copy.path}").asked(stored) == before
 
-    database = None if place.url.startswith("sqlite") else place.url
     assert go_back(place.data, database, [copy.path]) == 0
     assert f"as it was at schema {revision}, with 12 events" in capsys.readouterr().out
     assert place.asked(recognize) == {revision}

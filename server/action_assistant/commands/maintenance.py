@@ -20,6 +20,7 @@ from action_assistant.journal.copies.before_upgrade import FOLDER
 from action_assistant.journal.database import Branch, cause_of
 from action_assistant.journal.events import Event, Fold
 from action_assistant.journal.journal import Journal
+from action_assistant.journal.migrate import recognize, revisions_of
 from action_assistant.safe_text import told
 from action_assistant.settings import settled
 
@@ -116,6 +117,13 @@ def _verify(options: argparse.Namespace) -> int:
             _say(f"{branch}: {sentence}", makes_line)
 
     async def look(branch: Branch, journal: Journal) -> bool:
+        revision, newest = max(await journal.ask(recognize)), revisions_of(branch)[-1]
+        if revision != newest:
+            _say(
+                f"{branch}: its tables are of schema {revision}, before this version's {newest}; they are "
+                "left as they are",
+                makes_line,
+            )
         events = await journal.position()
         damages = await journal.verify()
         for damage in damages:
@@ -128,7 +136,7 @@ def _verify(options: argparse.Namespace) -> int:
         outcomes = [await _is_as_then(journal, branch, line, events, data) for line in given]
         return all(outcomes)
 
-    code = for_each(data, journals, look)
+    code = for_each(data, journals, look, upgrades=False)
     for line in given:
         for branch in line.heads.keys() - strange.keys():
             print(f"{branch}: the line of {line.time} speaks of it, and it is not there")
@@ -262,13 +270,17 @@ def for_each(
     data: Path,
     journals: Sequence[KnownJournal],
     handler: Callable[[Branch, Journal], Awaitable[bool]],
+    *,
+    upgrades: bool = True,
 ) -> int:
     """Open each journal in turn and call `handler` with it; return the exit code: 0 if each call
-    returned True, else 1. `data`: the data folder. Raise CannotStart if a journal cannot be opened.
-    """
+    returned True, else 1. `data`: the data folder. Without `upgrades` tables stay as they are. Raise
+    CannotStart if a journal cannot be opened."""
 
     async def one(branch: Branch, url: str, fold: Fold) -> bool:
-        journal = await Journal.open(url, branch=branch, fold=fold, copies=data / FOLDER)
+        journal = await Journal.open(
+            url, branch=branch, fold=fold, copies=data / FOLDER, upgrades=upgrades
+        )
         try:
             return await handler(branch, journal)
         except Unavailable as error:

@@ -74,10 +74,12 @@ class Database(Protocol):
     def faults(self) -> tuple[type[Exception], ...]:
         """Return all exception types that the driver raises."""
 
-    def open(self, branch: Branch, before: Before = no_copy) -> WriterSession:
+    def open(
+        self, branch: Branch, before: Before = no_copy, *, upgrades: bool = True
+    ) -> WriterSession:
         """Take the lock of the only writer, bring the tables of the branch to this version, and
-        connect. `before` is called if tables are about to change. Raise CannotStart if the database
-        cannot be used or another process holds the lock."""
+        connect. `before` is called if tables are about to change; without `upgrades` they stay as they
+        are. Raise CannotStart if the database cannot be used or another process holds the lock."""
 
     def look(self, question: Callable[[Connection], object]) -> None:
         """Call `question` with a connection to the existing database; create and change nothing.

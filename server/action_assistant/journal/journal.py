@@ -147,15 +147,18 @@ class Journal(JournalReader):
         fold: Fold,
         copies: Path | None = None,
         at_once: bool = False,
+        upgrades: bool = True,
     ) -> "Journal":
         """Open the journal of a branch, and bring its tables to this version. `url`: sqlite:///PATH
         or postgresql://… `fold`: turns events into statements for the tables. `copies`: the folder
         for a copy before an upgrade; None makes no copy. `at_once`: the event loop may wait for a
-        local disk while that is quick; not for a process that must always answer. Raise CannotStart
-        if the database is another program's, newer, in use, not reached, not writable, or does not
+        local disk while that is quick; not for a process that must always answer. Without `upgrades`
+        the tables stay as they are, and only the log may be read. Raise CannotStart if the database is another program's, newer, in use, not reached, not writable, or does not
         store commits durably."""
         database = database_of(url)
-        return await cls.on(database, branch=branch, fold=fold, copies=copies, at_once=at_once)
+        return await cls.on(
+            database, branch=branch, fold=fold, copies=copies, at_once=at_once, upgrades=upgrades
+        )
 
     @classmethod
     async def on(
@@ -166,11 +169,14 @@ class Journal(JournalReader):
         fold: Fold,
         copies: Path | None = None,
         at_once: bool = False,
+        upgrades: bool = True,
     ) -> "Journal":
         """Open the journal of a branch in a database; the other parameters are those of `open`.
         Raise CannotStart if the database cannot be used or another process holds it."""
         try:
-            session = await asyncio.to_thread(database.open, branch, _before(copies))
+            session = await asyncio.to_thread(
+                database.open, branch, _before(copies), upgrades=upgrades
+            )
         except BaseException:
             await database.close()
             database.disown()

@@ -63,6 +63,20 @@ def upgrade_to(
     return upgrade
 
 
+def kept_as_it_is(branch: Branch) -> Callable[[Connection], str]:
+    """Return a function that returns the revision of a database of a branch, of this version or an
+    earlier one, and changes nothing. It raises CannotStart as that of `upgrade_to` does, and for a
+    database without tables."""
+
+    def look(connection: Connection) -> str:
+        current = recognize(connection)
+        if not current or current - set(revisions_of(branch)):
+            raise CannotStart(f"The database {_name_of(connection)} is not the {branch}'s.")
+        return max(current)
+
+    return look
+
+
 def _upgraded(connection: Connection, branch: Branch, current: set[str], revision: str) -> str:
     """Bring the database of a branch from the revisions `current` to `revision`, and return the
     revision it has then."""

@@ -17,7 +17,7 @@ from sqlalchemy.util import await_only
 from action_assistant.errors import CannotStart
 from action_assistant.journal.database import Before, Branch, cause_of, no_copy
 from action_assistant.journal.events import Event
-from action_assistant.journal.migrate import upgrade_to
+from action_assistant.journal.migrate import kept_as_it_is, upgrade_to
 from action_assistant.schema.editor_tables import editor_event
 
 T = TypeVar("T")
@@ -151,13 +151,15 @@ class Postgres:
             pool_pre_ping=True,
         )
 
-    def open(self, branch: Branch, before: Before = no_copy) -> PostgresSession:
+    def open(
+        self, branch: Branch, before: Before = no_copy, *, upgrades: bool = True
+    ) -> PostgresSession:
         """Lock the database for this process, check that it stores commits durably, bring the
         tables of the branch to this version, and connect. `before` is called if tables are about to
-        change."""
+        change; without `upgrades` they stay as they are."""
         session = self.own(branch)
         try:
-            self.migrate(upgrade_to(branch, before=before))
+            self.migrate(upgrade_to(branch, before=before) if upgrades else kept_as_it_is(branch))
         except BaseException:
             session.close()
             raise

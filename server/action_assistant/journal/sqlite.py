@@ -31,7 +31,7 @@ from action_assistant.journal.chain import Damage, Inspector
 from action_assistant.journal.database import Before, Branch, cause_of, no_copy
 from action_assistant.journal.events import Event
 from action_assistant.journal.lock import own as own
-from action_assistant.journal.migrate import recognize, upgrade_to
+from action_assistant.journal.migrate import kept_as_it_is, recognize, upgrade_to
 from action_assistant.journal.removal import taken_out
 from action_assistant.private_files import opener
 
@@ -225,13 +225,16 @@ class Sqlite:
         self.name: Final = f"The database {path}"
         self.address: Final = f"sqlite:///{self._path.absolute()}"
 
-    def open(self, branch: Branch, before: Before = no_copy) -> SqliteSession:
+    def open(
+        self, branch: Branch, before: Before = no_copy, *, upgrades: bool = True
+    ) -> SqliteSession:
         """Lock the file for this process, since two writers would damage the log; then bring the
         tables of the branch to this version, and connect. `before` is called if tables are about to
-        change. Raise CannotStart if the file cannot be used or another process holds the lock."""
-        self.look(recognize)
+        change; without `upgrades` they stay as they are. Raise CannotStart if the file cannot be used or another process holds the lock."""
+        self.look(recognize if upgrades else kept_as_it_is(branch))
         self._lock = own(self._path)
-        self.migrate(upgrade_to(branch, before=before))
+        if upgrades:
+            self.migrate(upgrade_to(branch, before=before))
         try:
             return self.connect()
         except self.faults as error:
