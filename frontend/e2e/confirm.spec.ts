@@ -33,12 +33,16 @@ async function comeIn(browser: Browser, member: Member, viewport = { width: 1280
   return page;
 }
 
-async function openStart(page: Page, graph: string): Promise<void> {
-  await page.goto(`${url()}/graphs/${graph}`);
-  await saved(page);
+async function chooseDavid(page: Page): Promise<void> {
   await page.getByRole("button", { name: "Choose where to start" }).click();
   await page.getByRole("checkbox", { name: /^David/ }).check();
   await page.getByRole("button", { name: "Confirm that it is you …" }).click();
+}
+
+async function openStart(page: Page, graph: string): Promise<void> {
+  await page.goto(`${url()}/graphs/${graph}`);
+  await saved(page);
+  await chooseDavid(page);
 }
 
 /** A device that keeps passkeys, unlocked by its person. */
@@ -85,6 +89,15 @@ test("a robot that asks again is started after a phone, or a passkey, has confir
   await openStart(tablet, graph);
   const question = phone.getByRole("alertdialog", { name: "Is it you?" });
   const asking = tablet.getByRole("dialog", { name: "Confirm that it is you" });
+
+  // Escape closes what is in front, and nothing behind it; opened again, it is in front again.
+  await asking.getByRole("button", { name: "Close" }).press("Escape");
+  await expect(asking).toBeHidden();
+  await expect(tablet.getByRole("button", { name: "Confirm that it is you …" })).toBeFocused();
+  await expect(tablet.getByRole("checkbox", { name: /^David/ })).toBeChecked();
+  await tablet.keyboard.press("Escape");
+  await expect(tablet.getByRole("dialog")).toHaveCount(0);
+  await chooseDavid(tablet);
   await asking.getByRole("button", { name: "On another device" }).click();
   const number = await asking.locator("b").textContent();
   await expect(question).toContainText(`wants to start on David. Does it show ${number}?`);

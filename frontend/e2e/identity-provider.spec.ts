@@ -48,10 +48,20 @@ test("a person signs in by the provider, and proves again that it is they", asyn
   await expect(page.getByRole("button", { name: /^You are .*mari/ })).toBeVisible();
 
   // The proof: the provider asks although it knows her, and only she counts.
+  const stop = page.getByRole("button", { name: /^Stop everything/ });
   await page.goto(`${product.url}/signed-in?again`);
+  await expect(page.getByRole("heading", { name: "Confirm that it is you" })).toBeVisible();
+  await expect(stop).toBeVisible();
   await page.getByRole("button", { name: "Confirm with Lab login" }).click();
   await logIn(page, "mari", false);
   await expect(page.getByText("It is confirmed that it is you")).toBeVisible();
+  await expect(stop).toBeVisible();
+
+  // Also where a link that is refused is opened, and this browser remembers nobody.
+  await page.evaluate(() => localStorage.clear());
+  await page.goto(`${product.url}/#t=of-another-server`);
+  await page.reload();
+  await expect(stop).toBeVisible();
   await page.goto(`${product.url}/signed-in?again`);
   await page.getByRole("button", { name: "Confirm with Lab login" }).click();
   await page.getByRole("link", { name: "[ Cancel ]" }).click();

@@ -95,6 +95,26 @@ async function inSight(
   expect(troubles).toEqual([]);
 }
 
+/** A dialog that fills a phone leaves room for what is said of Stop. */
+async function noticeOverDialog(page: Page): Promise<void> {
+  await page.setViewportSize(PHONE.viewport);
+  await page.getByRole("button", { name: /^You are / }).tap();
+  await page.getByRole("button", { name: "Share with others …" }).tap();
+  const [dialog, notice] = [page.getByRole("dialog", { name: "Share" }), page.getByRole("alert")];
+  await expect(notice).toContainText("STOP MAY REACH NOBODY");
+  const over = async () => {
+    const [box, said] = [await dialog.boundingBox(), await notice.boundingBox()];
+    if (box === null || said === null) return "not drawn";
+    const [x, y] = [said.x + said.width / 2, said.y + said.height / 2];
+    const inNotice = ([left, top]: number[]) =>
+      document.elementFromPoint(left ?? 0, top ?? 0)?.closest("[role=alert]") !== null;
+    if (!(await page.evaluate(inNotice, [x, y]))) return "the notice is covered";
+    return box.y + box.height > said.y ? "the notice covers the dialog" : "";
+  };
+  await expect.poll(over).toBe("");
+  await dialog.getByRole("button", { name: "Close" }).tap();
+}
+
 test("STOP is inside the screen and under nothing: each page, each width, idle, running, unknown", async ({
   browser,
 }) => {
@@ -121,6 +141,7 @@ test("STOP is inside the screen and under nothing: each page, each width, idle, 
   try {
     await expect(stopOf(page)).toContainText("state unknown");
     await inSight(page, routes, "unknown", OTHER_WIDTHS);
+    await noticeOverDialog(page);
   } finally {
     process.kill(runner, "SIGCONT");
   }

@@ -24,6 +24,7 @@ export function ConfirmDialog() {
       size={420}
       centered
       closeButtonProps={{ "aria-label": "Close" }}
+      zIndex={310}
     >
       {robots !== null && <Means robots={robots} onDone={close} />}
     </Modal>
@@ -68,8 +69,13 @@ function Means({ robots, onDone }: { robots: readonly string[]; onDone: () => vo
   const finish = () => {
     setConfirmed(true);
     void client.invalidateQueries({ queryKey: ["preflight"] });
-    setTimeout(onDone, SHOWN);
   };
+  const close = useStableCallback(onDone);
+  useEffect(() => {
+    if (!confirmed) return;
+    const timer = setTimeout(close, SHOWN);
+    return () => clearTimeout(timer);
+  }, [confirmed, close]);
   const ask = async () => {
     const stop = new AbortController();
     asking.current = stop;

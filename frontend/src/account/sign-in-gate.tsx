@@ -149,6 +149,31 @@ function useLooks({ on, wanting, onFound, putOut }: SessionLooks): void {
   }, [on, wanting, onFound, putOut]);
 }
 
+/** Keeps STOP for whoever has a session, also where they open another link or prove that it is they. */
+function useStopOf(gate: Gate): void {
+  // What is drawn may fail and go; the link stays, so nothing is undone when this does.
+  useLayoutEffect(() => {
+    if (gate.at === "knocking") return;
+    const person = gate.at === "inside" ? gate.person : rememberedPerson();
+    if (person === null) pageLink.leave();
+    else pageLink.enter(identityOf(person), visitOf(gate));
+  }, [gate]);
+  const { at } = gate;
+  useEffect(() => {
+    if (at === "inside" || at === "knocking" || rememberedPerson() !== null) return;
+    let gone = false;
+    const onFound = (person: Person) => {
+      if (gone) return;
+      rememberPerson(person);
+      pageLink.enter(identityOf(person), 0);
+    };
+    currentPerson().then(onFound, () => {}); // without a session there is nobody to keep it for
+    return () => {
+      gone = true;
+    };
+  }, [at]);
+}
+
 export function SignInGate({ children }: { children: ReactNode }) {
   const [gate, setGate] = useState<Gate>({ at: "knocking" });
   useEffect(() => {
@@ -198,11 +223,7 @@ export function SignInGate({ children }: { children: ReactNode }) {
     rememberPerson(gate.person);
     void SignInBar.preload(); // when it is needed, the server may not answer
   }, [gate]);
-  // What is drawn may fail and go; the link stays, so nothing is undone when this does.
-  useLayoutEffect(() => {
-    if (gate.at === "inside") pageLink.enter(identityOf(gate.person), gate.visit);
-    else if (gate.at !== "knocking") pageLink.leave();
-  }, [gate]);
+  useStopOf(gate);
   const hold = useMemo(
     () =>
       gate.at === "inside" ? { person: gate.person, visit: gate.visit, rename: takeName } : null,

@@ -12,6 +12,7 @@ import { NewVersionNotice } from "../offline/page-version";
 import { UnansweredStartNotice } from "../runs/start/unanswered-starts";
 import { RestQuestion } from "../runs/stop/rest-question";
 import { LiveRegion } from "../ui/announcer";
+import { useFrontDialog } from "../ui/front-dialog";
 import { lazyPart, OverlayBoundary, PartBoundary } from "../ui/lazy-part";
 import { theme, variables } from "../ui/theme";
 import type { Crumb } from "../ui/top-bar";
@@ -82,6 +83,7 @@ function Confirmations() {
   const asked = useLive().now.asked.length > 0;
   const [opened, setOpened] = useState(false);
   useEffect(() => setOpened((was) => was || wanted), [wanted]);
+  useFrontDialog(wanted, () => unconfirmed.set(null));
   return (
     <OverlayBoundary>
       {opened && <ConfirmDialog />}

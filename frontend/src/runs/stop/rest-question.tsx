@@ -3,6 +3,7 @@ import { useEffect } from "react";
 import { useLive } from "../../api/page-link";
 import { useMay } from "../../api/people";
 import { needsRestConfirmation } from "../../api/run-stop";
+import { useFrontDialog } from "../../ui/front-dialog";
 import { lazyPart, OverlayBoundary } from "../../ui/lazy-part";
 import { useWatched } from "../../ui/watched";
 import { askedRun, mayAnswer } from "./stop-surroundings";
@@ -25,6 +26,7 @@ export function RestQuestion() {
   useEffect(() => {
     if (over) askedRun.set(null);
   }, [over]);
+  useFrontDialog(!over, () => askedRun.set(null));
   return (
     <OverlayBoundary>
       {!over && (

@@ -1,6 +1,6 @@
 /** Notice with the state of a Stop, in words, until it is proven. */
 
-import { useState } from "react";
+import { useLayoutEffect, useRef, useState } from "react";
 import { engineWords } from "../../api/led-runs";
 import type { LiveState, StopRequest } from "../../api/live-socket";
 import { foreignGraphs, openRuns, stopTargets, unheardRobots } from "../../api/live-socket";
@@ -264,6 +264,23 @@ function Cross() {
   );
 }
 
+/** Tells the page how high the loud notice is, so that dialogs and messages leave room for it. */
+function useNoticeRoom(isLoud: boolean) {
+  const notice = useRef<HTMLDivElement>(null);
+  useRootMark("data-loud-notice", isLoud);
+  useLayoutEffect(() => {
+    if (!isLoud || notice.current === null) return;
+    const { style: root } = document.documentElement;
+    const seen = notice.current;
+    const watch = new ResizeObserver(() =>
+      root.setProperty("--notice-height", `${seen.offsetHeight}px`),
+    );
+    watch.observe(seen);
+    return () => watch.disconnect();
+  }, [isLoud]);
+  return notice;
+}
+
 export function StopNotice() {
   const { now } = useLive();
   const canAnswer = useWatched(mayAnswer);
@@ -281,7 +298,8 @@ export function StopNotice() {
     othersNotice(now) ??
     unreachableNotice(now, at);
   const aside = useAside(notice, last?.id ?? "");
-  useRootMark("data-loud-notice", notice?.tone === "loud" && !aside.is);
+  const element = useNoticeRoom(notice?.tone === "loud" && !aside.is);
+  useRootMark("data-notice-aside", aside.is && notice !== null);
   if (notice === null) return null;
   if (aside.is) {
     return (
@@ -309,6 +327,7 @@ export function StopNotice() {
     : { label: "Hide", run: () => setDismissed(last?.id ?? "") };
   return (
     <div
+      ref={element}
       className={style.notice}
       data-tone={notice.tone}
       role={notice.tone === "loud" ? "alert" : "status"}
