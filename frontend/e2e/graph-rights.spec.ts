@@ -37,6 +37,12 @@ test("a graph is hidden from a person, then shown to look at, by the keyboard", 
   const seeing = dialog.getByRole("radiogroup", { name: "Who may see it" });
   await seeing.getByRole("radio", { name: "Everybody" }).press("ArrowRight");
   await expect(dialog.getByText("Only owners may see it.")).toBeVisible();
+  // What the runner did not hear of can be saved again as it is.
+  await owner.page.route(`${product.runnerUrl}/api/graph-rules`, (route) => route.abort());
+  await dialog.getByRole("button", { name: "Save" }).press("Enter");
+  await expect(dialog.getByRole("alert")).toContainText("Done at the editor.");
+  await expect(dialog.getByText("Only owners may see it.")).toBeVisible();
+  await owner.page.unroute(`${product.runnerUrl}/api/graph-rules`);
   await dialog.getByRole("button", { name: "Save" }).press("Enter");
   await expect(dialog).toBeHidden();
   await expect(page.getByText("Saved")).toBeHidden();

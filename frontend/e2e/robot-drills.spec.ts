@@ -56,7 +56,17 @@ test("a released version starts for a drill while somebody watches, and the dril
   await page.getByRole("radiogroup", { name: "What of the history" }).getByText("Versions").click();
   await button(page, "v1").first().click();
   await button(page, "Release v1").click();
-  await expect(page.getByRole("list", { name: "Versions" })).toContainText("Released by Ada");
+  const versions = page.getByRole("list", { name: "Versions" });
+  await expect(versions).toContainText("Released by Ada");
+
+  // A withdrawal of which the runner did not hear is offered again, whatever the editor shows by then.
+  await page.route("**/api/releases/*", (route) => route.abort());
+  await button(page, "Withdraw the release of v1").click();
+  await expect(versions).not.toContainText("Released by Ada");
+  await page.unroute("**/api/releases/*");
+  await button(page, "Withdraw the release of v1 again").click();
+  await button(page, "Release v1").click();
+  await expect(versions).toContainText("Released by Ada");
   await picture(page, "history");
   await page.goto(`${product.url}/graphs/${graph}`);
   await saved(page);
@@ -68,6 +78,12 @@ test("a released version starts for a drill while somebody watches, and the dril
   await expect(button(page, /Start v\d: Say that you watch David/)).toBeDisabled();
   await page.getByRole("checkbox", { name: /^I watch David/ }).check();
   await expect(button(page, /A check prevents the start/)).toBeDisabled();
+
+  // The word is about the robot that was chosen when it was given: chosen again, it is asked anew.
+  await page.getByRole("checkbox", { name: /^David/ }).uncheck();
+  await page.getByRole("checkbox", { name: /^David/ }).check();
+  await expect(page.getByRole("checkbox", { name: /^I watch David/ })).not.toBeChecked();
+  await page.getByRole("checkbox", { name: /^I watch David/ }).check();
   await page.getByRole("checkbox", { name: /^This start is for a Stop drill/ }).check();
   await expect(looks).toContainText("You watch David");
   const start = button(page, /^Start v\d on David/);

@@ -1,7 +1,7 @@
 /** Receivers of messages by webhook and mail, as both processes send to them: for owners. */
 import { Button, Text } from "@mantine/core";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { runnerAt } from "../api/client";
+import { renewing, runnerAt } from "../api/client";
 import { errorText } from "../api/http";
 import type { EditorApi } from "../api/schema/editor";
 import { serverNow } from "../clock/server-clock";
@@ -58,7 +58,7 @@ function Receiver({ receiver, at, process }: ReceiverProps) {
   const test = useMutation({
     mutationFn: () =>
       runnerAt(at).post("/api/notifications/{name}/test", { path: { name }, timeoutMs: 60_000 }),
-    onSettled: () => client.invalidateQueries({ queryKey: keyOf(at) }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: keyOf(at) })),
   });
   const outcome = test.data && (test.data.error ? "It did not arrive." : "It has arrived.");
   return (

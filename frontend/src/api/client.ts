@@ -100,3 +100,14 @@ export const editor = clientOf<EditorPaths>("");
 export function runnerAt(address: string | undefined): Client<RunnerPaths> {
   return clientOf(address ?? "");
 }
+
+/**
+ * Return what a mutation does when it is settled: it renews what is shown, and waits for that if it succeeded.
+ * After an error it can be tried again at once: a server that does not answer would hold it for minutes.
+ */
+export function renewing(renew: () => Promise<unknown>) {
+  return (_: unknown, error: Error | null): Promise<unknown> | undefined => {
+    const renewed = renew();
+    return error === null ? renewed : undefined;
+  };
+}

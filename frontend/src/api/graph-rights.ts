@@ -1,6 +1,6 @@
 /** Rules that say who may see and who may edit a graph, or the graphs in a folder. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { editor, runnerAt } from "./client";
+import { editor, renewing, runnerAt } from "./client";
 import { refreshGraphs } from "./graphs";
 import { errorText } from "./http";
 import type { EditorApi } from "./schema/editor";
@@ -56,7 +56,8 @@ export function usePutRule(ruled: Ruled, runner: string | undefined, onDone: () 
       await tellRunnerRules(runner);
     },
     onSuccess: onDone,
-    onSettled: () =>
+    onSettled: renewing(() =>
       Promise.all([client.invalidateQueries({ queryKey: ["rule"] }), refreshGraphs(client)]),
+    ),
   });
 }

@@ -176,8 +176,12 @@ export async function setReleased(
   const path = { version_id: id };
   const at = runner === undefined ? undefined : runnerAt(runner);
   if (!isReleased) {
-    await editor.delete("/api/versions/{version_id}/release", { path });
-    await at?.delete("/api/releases/{version}", { path: { version: id } });
+    // Each withdraws it by itself, whatever the other says.
+    const outcomes = await Promise.allSettled([
+      editor.delete("/api/versions/{version_id}/release", { path }),
+      at?.delete("/api/releases/{version}", { path: { version: id } }),
+    ]);
+    for (const outcome of outcomes) if (outcome.status === "rejected") throw outcome.reason;
     return;
   }
   const { released } = await editor.put("/api/versions/{version_id}/release", { path });

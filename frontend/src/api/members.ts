@@ -1,6 +1,6 @@
 /** Persons with personal links, their groups, and the devices on which people are signed in. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { editor, runnerAt } from "./client";
+import { editor, renewing, runnerAt } from "./client";
 import { errorText } from "./http";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
@@ -60,10 +60,11 @@ function usePeopleMutation<T, R>(mutationFn: (value: T) => Promise<R>) {
   const client = useQueryClient();
   return useMutation({
     mutationFn,
-    onSettled: () =>
+    onSettled: renewing(() =>
       Promise.all(
         [MEMBERS, SESSIONS, DEVICES].map((queryKey) => client.invalidateQueries({ queryKey })),
       ),
+    ),
   });
 }
 

@@ -1,6 +1,6 @@
 /** Passkeys: registered on this device, and shown again to confirm that it is the same person. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { editor, runnerAt } from "./client";
+import { editor, renewing, runnerAt } from "./client";
 import type { EditorApi } from "./schema/editor";
 
 export type Passkey = EditorApi["PasskeyShown"];
@@ -31,7 +31,7 @@ function usePasskeyMutation<T, R>(mutationFn: (value: T) => Promise<R>) {
   const client = useQueryClient();
   return useMutation({
     mutationFn,
-    onSettled: () => client.invalidateQueries({ queryKey: PASSKEYS }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: PASSKEYS })),
   });
 }
 

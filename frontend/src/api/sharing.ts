@@ -1,6 +1,6 @@
 /** Links that let people in, as owners see them. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { editor, runnerAt } from "./client";
+import { editor, renewing, runnerAt } from "./client";
 import { errorText } from "./http";
 import { serverPath } from "./page-url";
 import type { EditorApi } from "./schema/editor";
@@ -30,7 +30,7 @@ export function useInvite() {
   const client = useQueryClient();
   return useMutation({
     mutationFn: (body: EditorApi["Inviting"]) => editor.post("/api/invitations", { body }),
-    onSettled: () => client.invalidateQueries({ queryKey: KEY }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: KEY })),
   });
 }
 
@@ -54,7 +54,7 @@ export function useRevoke(runner: string | undefined) {
       if (failed === 0) throw outcome.reason;
       throw new Error(`${NOT_AT_THE_RUNNER} ${errorText(outcome.reason)}`);
     },
-    onSettled: () => client.invalidateQueries({ queryKey: KEY }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: KEY })),
   });
 }
 

@@ -1,6 +1,6 @@
 /** Links that show one graph or run to people without a name, as owners see them. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { editor, runnerAt } from "./client";
+import { editor, renewing, runnerAt } from "./client";
 import type { EditorApi } from "./schema/editor";
 
 export type ViewLink = EditorApi["ViewLink"];
@@ -33,7 +33,7 @@ export function useMakeViewLink(runner: string | undefined, thing: ViewedThing) 
   return useMutation({
     mutationFn: (more: { label: string; days: number }) =>
       processOf(thing, runner).post("/api/view-links", { body: { thing: thing.id, ...more } }),
-    onSettled: () => client.invalidateQueries({ queryKey: [KEY] }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: [KEY] })),
   });
 }
 
@@ -42,7 +42,7 @@ export function useRevokeViewLink(runner: string | undefined, thing: ViewedThing
   return useMutation({
     mutationFn: (link: string) =>
       processOf(thing, runner).post("/api/view-links/{link}/revoke", { path: { link } }),
-    onSettled: () => client.invalidateQueries({ queryKey: [KEY] }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: [KEY] })),
   });
 }
 

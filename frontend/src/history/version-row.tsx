@@ -10,7 +10,9 @@ import {
   IconRosetteDiscountCheck,
 } from "@tabler/icons-react";
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
+import { useState } from "react";
 import { Link } from "wouter";
+import { renewing } from "../api/client";
 import {
   authorName,
   fetchVersion,
@@ -141,21 +143,34 @@ function Ways(props: Props) {
   );
 }
 
+/** Return what the button of a release does. `again`: the last try failed. */
+function releaseWords(number: string, releases: boolean, again: boolean): string {
+  if (releases) return again ? `Release ${number} again` : `Release ${number}`;
+  return `Withdraw the release of ${number}${again ? " again" : ""}`;
+}
+
 /** Lets an owner release a version: robots whose owners demand that start no other. */
 function ReleaseButton({ version, number }: { version: Version; number: string }) {
   const { runner } = useLive();
   const client = useQueryClient();
   const isOwner = useMay("share");
   const { graph, released } = version;
+  // What has failed may be done at the editor alone: it is offered again, whatever the editor shows now.
+  const [failed, setFailed] = useState<boolean | null>(null);
+  const releases = failed ?? released === undefined;
   const change = useMutation({
-    mutationFn: () => setReleased(runner, version, released === undefined),
-    onError: (error) =>
+    mutationFn: () => setReleased(runner, version, releases),
+    onSuccess: () => setFailed(null),
+    onError: (error) => {
+      setFailed(releases);
       notifications.show({
         color: "red",
-        title: `${number} may not be ${released ? "withdrawn" : "released"} everywhere: try again`,
+        autoClose: false,
+        title: `${number} may not be ${releases ? "released" : "withdrawn"} everywhere: try again`,
         message: errorText(error),
-      }),
-    onSettled: () => client.invalidateQueries({ queryKey: queryKeys.versions(graph) }),
+      });
+    },
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: queryKeys.versions(graph) })),
   });
   if (!isOwner) return null;
   return (
@@ -166,7 +181,7 @@ function ReleaseButton({ version, number }: { version: Version; number: string }
       leftSection={<IconRosetteDiscountCheck size={14} aria-hidden />}
       onClick={() => change.mutate()}
     >
-      {released ? `Withdraw the release of ${number}` : `Release ${number}`}
+      {releaseWords(number, releases, failed !== null)}
     </Button>
   );
 }

@@ -1,7 +1,8 @@
 /** Dialogs of folders: give one a name, choose one to move something into, and remove one. */
 import { Button, Group, Modal, Radio, Text, TextInput } from "@mantine/core";
 import { type UseMutationResult, useMutation, useQueryClient } from "@tanstack/react-query";
-import { type ReactNode, useState } from "react";
+import { type ReactNode, useRef, useState } from "react";
+import { renewing } from "../api/client";
 import {
   type Folder,
   folderPath,
@@ -40,7 +41,7 @@ function useChange(change: () => Promise<unknown>, onDone: () => void) {
   return useMutation({
     mutationFn: change,
     onSuccess: onDone,
-    onSettled: () => refreshGraphs(client),
+    onSettled: renewing(() => refreshGraphs(client)),
   });
 }
 
@@ -137,10 +138,16 @@ function MoveChoice({ from, not, move, onClose }: MoveProps) {
   const change = useChange(async () => {
     const chosen = into === NONE ? null : into;
     const made = fresh.trim() === "" ? null : await makeFolder(fresh.trim(), chosen);
+    if (made !== null) {
+      // It is there now: another try moves into it, and makes no second one.
+      setInto(made.id);
+      setFresh("");
+    }
     await move(made?.id ?? chosen);
     await tellRules();
   }, onClose);
-  const ready = fresh.trim() !== "" || into !== (from ?? NONE);
+  // What failed may be done at the editor alone: it can be tried again as it is.
+  const ready = change.isError || fresh.trim() !== "" || into !== (from ?? NONE);
   return (
     <ChangeForm change={change} word="Move" ready={ready} onClose={onClose}>
       <Radio.Group
@@ -194,8 +201,13 @@ interface RemoveProps {
 
 function Remove({ folder, folders, onRemoved, onClose }: RemoveProps) {
   const tellRules = useTellRules();
+  const isRemoved = useRef(false);
   const change = useChange(
-    () => removeFolder(folder.id).then(tellRules),
+    async () => {
+      if (!isRemoved.current) await removeFolder(folder.id);
+      isRemoved.current = true; // another try only tells the runner
+      await tellRules();
+    },
     () => {
       onClose();
       onRemoved();

@@ -127,11 +127,13 @@ function Form({ ruled, isInside, view, onClose }: Omit<Props, "name"> & { view: 
   const wanted = inherits || (isOpen && !isInside) ? null : rule;
   const changed = JSON.stringify(wanted) !== JSON.stringify(view.own);
   usePendingText(changed ? JSON.stringify(wanted) : "", null);
+  // What failed may be stored at the editor alone: it can be saved again as it is.
+  const canSave = changed || put.isError;
   return (
     <form
       onSubmit={(event) => {
         event.preventDefault();
-        if (changed && !put.isPending) put.mutate(wanted);
+        if (canSave && !put.isPending) put.mutate(wanted);
       }}
     >
       <Stack gap="md">
@@ -186,7 +188,7 @@ function Form({ ruled, isInside, view, onClose }: Omit<Props, "name"> & { view: 
         )}
         <Group justify="flex-end">
           <Button onClick={onClose}>Cancel</Button>
-          <Button type="submit" variant="filled" disabled={!changed} loading={put.isPending}>
+          <Button type="submit" variant="filled" disabled={!canSave} loading={put.isPending}>
             Save
           </Button>
         </Group>

@@ -1,6 +1,6 @@
 /** Tokens of programs, and programs that wait to be signed in, as both processes know them. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
-import { editor, runnerAt } from "../api/client";
+import { editor, renewing, runnerAt } from "../api/client";
 import { errorText, Refusal } from "../api/http";
 import type { EditorApi } from "../api/schema/editor";
 import type { Role } from "../api/session";
@@ -101,7 +101,7 @@ export function useMakeToken() {
   const client = useQueryClient();
   return useMutation({
     mutationFn: (body: EditorApi["MakeToken"]) => editor.post("/api/tokens", { body }),
-    onSettled: () => client.invalidateQueries({ queryKey: KEY }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: KEY })),
   });
 }
 
@@ -121,7 +121,7 @@ export function useRevokeToken(runner: string | undefined) {
       if (failed(ofEditor)) throw ofEditor.reason;
       if (failed(ofRunner)) throw new Error(`${NOT_AT_THE_RUNNER} ${errorText(ofRunner.reason)}`);
     },
-    onSettled: () => client.invalidateQueries({ queryKey: KEY }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: KEY })),
   });
 }
 

@@ -113,6 +113,7 @@ export function RightsForm({ robot, onClose }: { robot: Robot; onClose: () => vo
   const [error, setError] = useState<unknown>(null);
   const [busy, setBusy] = useState(false);
   const save = async () => {
+    setError(null);
     setBusy(true);
     try {
       const operators = all ? ("all" as const) : [...chosen];
@@ -230,6 +231,7 @@ export function LockForm({ robot, onClose }: { robot: Robot; onClose: () => void
   const [error, setError] = useState<unknown>(null);
   const [busy, setBusy] = useState(false);
   const lock = async () => {
+    setError(null);
     setBusy(true);
     try {
       await lockRobot(runner ?? "", robot.name, reason.trim());
