@@ -142,6 +142,7 @@ function SendDialog({ run, asking, obstacle, onClose }: DialogProps) {
       );
       onClose();
     },
+    onSettled: watch.forget,
   });
   const other = run.version !== asking.version;
   const why = other

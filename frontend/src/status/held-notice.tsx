@@ -88,6 +88,7 @@ function StartButtons({ run, since }: { run: Run; since: string }) {
         : letStep(runner ?? "", run.id, since, action, watch.watching),
     onSuccess: (fresh) => live?.learn(fresh),
     onError: (error) => notifications.show(failure(error, run)),
+    onSettled: watch.forget,
   });
   const obstacle = press.isPending ? "Asking …" : watch.obstacle;
   const disabled = obstacle !== null || now.link !== "live";

@@ -13,15 +13,20 @@ export interface Watch {
   /** Why nothing may be set going yet; null when all is said. */
   readonly obstacle: string | null;
   readonly toggle: (robot: string) => void;
+  /** Forgets what was said: it counts for one start, resume or change. */
+  readonly forget: () => void;
 }
 
-/** Remember which of these robots a person says to watch, until the asking part is closed. */
+/** Remember which of these robots a person says to watch, until that is used or the asking part is closed. */
 export function useWatching(robots: readonly string[]): Watch {
   const { now } = useLive();
   const [said, setSaid] = useState<readonly string[]>([]);
   const asked = now.engines
     .filter(({ name, watched }) => watched && robots.includes(name))
     .map(({ name }) => name);
+  // Of a robot that was left out meanwhile it is asked anew.
+  const current = said.filter((robot) => asked.includes(robot));
+  if (current.length < said.length) setSaid(current);
   const missing = asked.find((robot) => !said.includes(robot));
   return {
     asked,
@@ -31,6 +36,7 @@ export function useWatching(robots: readonly string[]): Watch {
     obstacle: missing === undefined ? null : `Say that you watch ${isolated(missing)}`,
     toggle: (robot) =>
       setSaid(said.includes(robot) ? said.filter((each) => each !== robot) : [...said, robot]),
+    forget: () => setSaid([]),
   };
 }
 

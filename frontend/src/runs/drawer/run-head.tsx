@@ -214,6 +214,7 @@ function PauseButton({ run }: { run: Run }) {
     mutationFn: () =>
       paused ? resumeRun(runner ?? "", run.id, watch.watching) : pauseRun(runner ?? "", run.id),
     onError: (error) => notifications.show(failure(error, paused)),
+    onSettled: watch.forget,
   });
   const goes = run.state === "running" || run.state === "paused";
   if (!may || engine?.pauses !== true || !goes || run.desired === "stopped") return null;

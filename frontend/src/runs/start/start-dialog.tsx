@@ -4,6 +4,7 @@ import { IconPlayerPlayFilled, IconRefresh, IconSend, IconUserCheck } from "@tab
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
+import { renewing } from "../../api/client";
 import { identifiedText } from "../../api/courses";
 import { errorText, unconfirmed } from "../../api/http";
 import { fetchInside } from "../../api/inside";
@@ -323,6 +324,7 @@ export function StartDialog(props: Props) {
         : (way.missing ?? watch.obstacle ?? obstacleOf(engines, looks, reason));
   const choose = (engine: string) => {
     setReason("");
+    setDrills(false);
     setEngines(toggled(whole, engine));
   };
   const begin = () => {
@@ -344,7 +346,12 @@ export function StartDialog(props: Props) {
       behaviours,
       ...said,
     };
-    start.mutate({ ...what, ...override }, { onSuccess: done });
+    // Whoever starts says each time that they watch, and that it is for a drill.
+    const onSettled = () => {
+      watch.forget();
+      setDrills(false);
+    };
+    start.mutate({ ...what, ...override }, { onSuccess: done, onSettled });
   };
   const where = engines.map((engine) => (engine === SIMULATOR ? "the simulator" : engine));
   const how = led ? ", step by step," : "";
@@ -362,6 +369,7 @@ export function StartDialog(props: Props) {
           several={way.several}
           onLed={(wanted) => {
             setReason("");
+            setDrills(false);
             way.want(wanted);
           }}
         />
@@ -424,7 +432,7 @@ export function StartDialog(props: Props) {
           label="This start is for a Stop drill: I press Stop while it moves"
         />
       )}
-      <SecondPerson graph={graph} label={label} looks={looks} />
+      <SecondPerson key={asked.join("/")} graph={graph} label={label} looks={looks} />
       <ConfirmFirst looks={looks} />
       {codes.length > 0 && !looks?.some(({ never }) => never) && (
         <Textarea
@@ -558,7 +566,7 @@ export function SecondPerson({ graph, label, looks }: SecondPersonProps) {
   });
   const say = useMutation({
     mutationFn: () => approve(runner, { digest, graph, version: label, note: "" }),
-    onSettled: () => client.invalidateQueries({ queryKey: key }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey: key })),
   });
   const robots = (looks ?? [])
     .filter(({ items }) => items.some(({ code }) => code === "approved"))
