@@ -12,7 +12,9 @@ const place = document.getElementById("stop");
 if (place === null) throw new Error("index.html has no #stop");
 if (isViewPage) {
   // Whoever looks by a link is no person, and stops nothing: the page says where Stop is (decision 125).
-  place.remove();
+  // Only a page that broke is said there.
+  for (const name of ["role", "aria-label"]) place.removeAttribute(name);
+  mountStop(place);
 } else {
   mountStop(place);
   // Who was here last is here still, as far as anybody knows: the page says otherwise once it has asked.

@@ -23,7 +23,8 @@ export function viewKeyIn(fragment: string): ViewKey | null {
  * while it is heard.
  */
 export type Shared<T> =
-  | { readonly at: "loading" }
+  /** `why`: the reason why the server gave nothing so far; "" while it was asked once. */
+  | { readonly at: "loading"; readonly why: string }
   | { readonly at: "refused"; readonly why: string }
   | { readonly at: "shown"; readonly thing: T; readonly lost: number | null };
 
@@ -38,6 +39,7 @@ export interface SharedRun {
 
 const AGAIN = [500, 1_000, 2_000, 5_000]; // ms until the next try
 const FOR_EVER = 2_000_000_000; // ms
+const LOOK = 5_000; // ms between two questions whether the link of a run that is over has ended
 const SILENCE = { run: 4_000, graph: 25_000 }; // ms without a word after which a stream counts as lost
 
 /** Takes the thing as it is now, calls `show` with each newer state, and returns when no more can come. */
@@ -48,11 +50,10 @@ type Follow<T> = (
   end: AbortSignal,
 ) => Promise<void>;
 
-/** Yields the data of the events of a stream. Throws when it says nothing for so long. */
+/** Yields the data of the events of a stream. Throws when it does not begin, or says nothing, for so long. */
 async function* eventsOf(url: string, viewKey: string, silence: number, end: AbortSignal) {
   const quiet = new AbortController();
   const signal = AbortSignal.any([end, quiet.signal]);
-  const answer = await fetchAnswer(url, { viewKey, signal, timeoutMs: FOR_EVER });
   let timer = setTimeout(() => quiet.abort(), silence);
   const heard = () => {
     clearTimeout(timer);
@@ -60,6 +61,8 @@ async function* eventsOf(url: string, viewKey: string, silence: number, end: Abo
   };
   let rest = "";
   try {
+    const answer = await fetchAnswer(url, { viewKey, signal, timeoutMs: FOR_EVER });
+    heard();
     const text = answer.body?.pipeThrough(new TextDecoderStream()).getReader();
     for (;;) {
       const next = await text?.read();
@@ -88,8 +91,13 @@ const followRun: Follow<SharedRun> = async (viewKey, again, show, signal) => {
   const whole = await runnerAt(runner).get("/api/view/run", { query: { again }, viewKey, signal });
   let shown: SharedRun = { ...whole, seen: null };
   show(shown);
-  if (whole.run.ended_at !== null && whole.run.recorded) return end(signal);
   const url = `${runner}/api/view/run/events`;
+  while (whole.run.ended_at !== null && whole.run.recorded) {
+    // Of what is over the end of the link is the only news: the stream, which ends at once, refuses it then.
+    await pause(LOOK, signal);
+    signal.throwIfAborted();
+    for await (const _ of eventsOf(url, viewKey, SILENCE.run, signal));
+  }
   for await (const text of eventsOf(url, viewKey, SILENCE.run, signal)) {
     const said: RunnerApi["SharedStateMessage"] | RunnerApi["SharedBeat"] = JSON.parse(text);
     shown = said.type === "run" ? { ...shown, run: said.run } : { ...shown, seen: said.seen };
@@ -97,23 +105,33 @@ const followRun: Follow<SharedRun> = async (viewKey, again, show, signal) => {
   }
 };
 
-/** Waits for the end of the page: what is over does not change. */
-function end(signal: AbortSignal): Promise<void> {
-  return new Promise((resolve) => signal.addEventListener("abort", () => resolve()));
+/** Waits for so long, or until the page ends. */
+function pause(ms: number, end: AbortSignal): Promise<void> {
+  return new Promise((done) => {
+    const timer = setTimeout(done, ms);
+    const stop = () => {
+      clearTimeout(timer);
+      done();
+    };
+    end.addEventListener("abort", stop, { once: true });
+  });
 }
 
 function useShared<T>(key: string, follow: Follow<T>): Shared<T> {
-  const [shared, setShared] = useState<Shared<T>>({ at: "loading" });
+  const [shared, setShared] = useState<Shared<T>>({ at: "loading", why: "" });
   useEffect(() => {
     const stop = new AbortController();
     const { signal } = stop;
     const go = async () => {
       let again = false;
       let heard = tick();
-      const lose = () =>
-        setShared((before) =>
-          before.at === "shown" && before.lost === null ? { ...before, lost: heard } : before,
-        );
+      const lose = (error: unknown) =>
+        setShared((before) => {
+          if (before.at === "loading") return { at: "loading", why: errorText(error) };
+          return before.at === "shown" && before.lost === null
+            ? { ...before, lost: heard }
+            : before;
+        });
       for (let tries = 0; !signal.aborted; ) {
         try {
           const show = (thing: T) => {
@@ -129,12 +147,12 @@ function useShared<T>(key: string, follow: Follow<T>): Shared<T> {
             setShared({ at: "refused", why: errorText(error) });
             return;
           }
-          lose();
+          lose(error);
         }
         if (signal.aborted) return;
         const wait = AGAIN[Math.min(tries, AGAIN.length - 1)] ?? 0;
         tries += 1;
-        await new Promise((done) => setTimeout(done, wait));
+        await pause(wait, signal);
       }
     };
     void go();

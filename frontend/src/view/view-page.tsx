@@ -58,10 +58,14 @@ function Refused({ why }: { why: string }) {
   );
 }
 
-function Waiting() {
+/** `why`: the reason why nothing has come yet; "" while nothing speaks against it. */
+function Waiting({ why }: { why: string }) {
   return (
     <main className={style.page} aria-busy="true">
-      <Loader m="auto" aria-label="Loading" />
+      <div className={style.waiting} role="status">
+        <Loader aria-label="Loading" />
+        {why !== "" && <p className="m-0">{isolated(why)} Trying again.</p>}
+      </div>
     </main>
   );
 }
@@ -127,7 +131,7 @@ interface SeenProps<T> {
 }
 
 function Seen<T>({ shared, children }: SeenProps<T>) {
-  if (shared.at === "loading") return <Waiting />;
+  if (shared.at === "loading") return <Waiting why={shared.why} />;
   if (shared.at === "refused") return <Refused why={shared.why} />;
   return children(shared.thing, shared.lost);
 }
@@ -205,8 +209,8 @@ function ActionFacts({ action, onClose }: { action: Action; onClose: () => void 
         <CloseButton aria-label="All actions" onClick={onClose} />
       </div>
       <p className="m-0 ink3 text-12">
-        {action.type}
-        {action.actor !== "" && ` · ${action.actor}`}
+        <bdi>{action.type}</bdi>
+        {action.actor !== "" && ` · ${isolated(action.actor)}`}
       </p>
       {action.description !== "" && <p className="m-0 text-13">{action.description}</p>}
       <Values title="Parameters" of={action.inputs} />

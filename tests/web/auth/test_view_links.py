@@ -237,6 +237,30 @@ def test_a_link_shows_its_thing(shown: Shown) -> None:
         }
 
 
+def test_a_stream_of_a_run_goes_on_until_the_run_is_over(shown: Shown) -> None:
+    product = shown.product
+    with product.editor() as editor:
+        graph = editor.post("/api/graphs", json=graph_of("Followed", "Wait")).json()["id"]
+    run = started(product, graph, f"{CANARY} starter")
+    url = f"{product.runner_url}/api/view/run/events"
+    headers = bearer(key_of(link(product, "runner", run)))
+    beats, states = 0, []
+    with (
+        product.runner() as runner,
+        httpx.Client(trust_env=False, timeout=20) as client,
+        client.stream("get", url, headers=headers) as follows,
+    ):
+        for line in follows.iter_lines():
+            if not line.startswith("data: "):
+                continue
+            said = json.loads(line.removeprefix("data: "))
+            if said["type"] == "run":
+                states.append(said["run"]["state"])
+            elif (beats := beats + 1) == 2:  # the next state comes long after this one was encoded
+                assert runner.post(f"/api/runs/{run}/stop").is_success
+    assert len(states) > 1
+
+
 def test_persons_and_programs_do_not_use_the_routes_of_links(shown: Shown) -> None:
     product = shown.product
     session = KEYS.sealed(KEYS.new_session("Ada"))
