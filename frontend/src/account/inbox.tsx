@@ -1,7 +1,8 @@
 /** The comments in which others have mentioned the signed-in person. */
 import { Button, Stack, Text } from "@mantine/core";
-import { useState } from "react";
+import { useRef, useState } from "react";
 import { Link } from "wouter";
+import { errorText } from "../api/http";
 import { type Mention, mentionPath, useInbox, useReadMentions } from "../api/mentions";
 import { serverNow } from "../clock/server-clock";
 import { ago, instant } from "../ui/times";
@@ -38,20 +39,58 @@ function Row({ mention, onGo }: RowProps) {
   );
 }
 
+interface FailureProps {
+  what: string;
+  error: unknown;
+  isBusy: boolean;
+  onAgain: () => void;
+}
+
+function Failure({ what, error, isBusy, onAgain }: FailureProps) {
+  return (
+    <div>
+      <Text size="sm" className="ink-error" role="alert">
+        {what} {errorText(error)}
+      </Text>
+      <Button size="compact-sm" variant="subtle" loading={isBusy} onClick={onAgain}>
+        Try again
+      </Button>
+    </div>
+  );
+}
+
 /** Shows the mentions; nothing while there are none. `onClose`: closes the menu around it. */
 export function InboxList({ onClose }: { onClose: () => void }) {
-  const { data } = useInbox();
+  const { data, error, isFetching, refetch } = useInbox();
   const read = useReadMentions();
   const [isAll, setAll] = useState(false);
+  const heading = useRef<HTMLParagraphElement>(null);
   const mentions = data?.mentions ?? [];
-  if (mentions.length === 0) return null;
+  if (mentions.length === 0 && error === null) return null;
   const unread = mentions.filter(({ is_read }) => !is_read);
   const shown = isAll ? mentions : unread.slice(0, SHOWN);
+  const count = data?.unread ?? 0;
   return (
     <section aria-label="Mentions of you">
-      <Text size="sm" mb={4}>
-        {unread.length > 0 ? `Mentions of you: ${unread.length} unread` : "Mentions of you"}
+      <Text ref={heading} size="sm" mb={4} tabIndex={-1} role="status">
+        {count > 0 ? `Mentions of you: ${count} unread` : "Mentions of you"}
       </Text>
+      {error !== null && (
+        <Failure
+          what="Your mentions cannot be read."
+          error={error}
+          isBusy={isFetching}
+          onAgain={() => void refetch()}
+        />
+      )}
+      {read.isError && (
+        <Failure
+          what="They are not marked as read."
+          error={read.error}
+          isBusy={read.isPending}
+          onAgain={() => read.mutate(read.variables)}
+        />
+      )}
       <Stack gap={6}>
         {shown.length > 0 && (
           <ul className={style.list}>
@@ -77,7 +116,10 @@ export function InboxList({ onClose }: { onClose: () => void }) {
             <Button
               size="compact-sm"
               variant="subtle"
-              onClick={() => read.mutate(unread.map(({ key }) => key))}
+              onClick={() => {
+                heading.current?.focus(); // the button goes
+                read.mutate(unread.map(({ key }) => key));
+              }}
             >
               Mark as read
             </Button>

@@ -12,6 +12,8 @@ export interface Notice {
   readonly text: string;
   /** The place on the page. */
   readonly path: string;
+  /** The mention that it tells of. */
+  readonly mention?: string;
 }
 
 const FAILED: Readonly<Record<string, string>> = {
@@ -37,16 +39,16 @@ export function noticesOf({ runs, engines }: Live, inbox: Inbox | undefined): No
     const path = `/runs/${run.id}`;
     const end = FAILED[run.state] ?? (run.result === "on_error" ? "an error" : "");
     if (run.ended_at !== null && end !== "") {
-      const text = `R${words} has failed: ${end}. ${run.detail}`.trim();
+      const text = `R${words} has failed: ${end}. ${isolated(run.detail)}`.trim();
       found.push({ key: `run.ended:${run.id}`, text, path });
     }
     const alarm = run.alarms.find(({ code }) => code === "stop_unconfirmed");
     if (alarm !== undefined && run.ended_at === null) {
-      const text = `A Stop is unconfirmed: r${words} may still move. ${alarm.text}`;
+      const text = `A Stop is unconfirmed: r${words} may still move. ${isolated(alarm.text)}`;
       found.push({ key: `run.stop_unconfirmed:${run.id}`, text, path });
     }
     if (run.held && run.held.by === null && run.ended_at === null) {
-      const text = `R${words} waits for a person, who lets it go on or stops it. ${run.held.why}`;
+      const text = `R${words} waits for a person, who lets it go on or stops it. ${isolated(run.held.why)}`;
       found.push({ key: `run.held:${run.id}:${run.held.since}`, text, path });
     }
     for (const robot of run.ended_at === null ? robots : []) {
@@ -62,7 +64,8 @@ export function noticesOf({ runs, engines }: Live, inbox: Inbox | undefined): No
     const { author, graph_name } = mention;
     const place = `in a comment on ${isolated(graph_name)}`;
     const text = `${isolated(author.name || "Somebody")} has mentioned you ${place}.`;
-    found.push({ key: `mention:${mention.key}`, text, path: mentionPath(mention) });
+    const path = mentionPath(mention);
+    found.push({ key: `mention:${mention.key}`, text, path, mention: mention.key });
   }
   return found;
 }

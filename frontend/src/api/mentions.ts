@@ -1,20 +1,23 @@
 /** The inbox of the signed-in person, and the people whom a comment can mention. */
 import { useMutation, useQuery, useQueryClient } from "@tanstack/react-query";
 import { useMemo } from "react";
-import { editor } from "./client";
-import { useKnownPeople } from "./people";
+import { editor, renewing } from "./client";
+import { useKnownPeople, usePerson } from "./people";
 import type { EditorApi } from "./schema/editor";
+import type { Person } from "./session";
 
 export type Inbox = EditorApi["Inbox"];
 export type Mention = EditorApi["Mention"];
 
-const MENTIONS = ["mentions"] as const;
+/** The key of a person's own mentions: who signs in after somebody else sees none of theirs. */
+const mentionsOf = ({ id }: Person) => ["mentions", id] as const;
 const LOOK = 20_000; // ms; also while the page is not looked at, for notifications
 const NO_IDS: readonly string[] = [];
 
 export function useInbox() {
+  const { person } = usePerson();
   return useQuery({
-    queryKey: MENTIONS,
+    queryKey: mentionsOf(person),
     queryFn: ({ signal }) => editor.get("/api/mentions", { signal }),
     refetchInterval: LOOK,
     refetchIntervalInBackground: true,
@@ -25,18 +28,23 @@ export function useInbox() {
 /** Marks mentions as read, on the page at once. */
 export function useReadMentions() {
   const client = useQueryClient();
+  const queryKey = mentionsOf(usePerson().person);
   return useMutation({
     mutationFn: (keys: readonly string[]) => editor.post("/api/mentions/read", { body: { keys } }),
-    onMutate: (keys) => {
-      client.setQueryData<Inbox>(MENTIONS, (inbox) => {
+    onMutate: async (keys) => {
+      // An answer that was asked for before would bring them back as unread.
+      await client.cancelQueries({ queryKey });
+      client.setQueryData<Inbox>(queryKey, (inbox) => {
         if (inbox === undefined) return inbox;
         const mentions = inbox.mentions.map((each) =>
           keys.includes(each.key) ? { ...each, is_read: true } : each,
         );
-        return { mentions, unread: mentions.filter(({ is_read }) => !is_read).length };
+        const now = mentions.filter(({ is_read }) => !is_read).length;
+        const before = inbox.mentions.filter(({ is_read }) => !is_read).length;
+        return { mentions, unread: Math.max(0, inbox.unread - before + now) };
       });
     },
-    onError: () => client.invalidateQueries({ queryKey: MENTIONS }),
+    onSettled: renewing(() => client.invalidateQueries({ queryKey })),
   });
 }
 
