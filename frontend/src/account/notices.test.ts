@@ -53,6 +53,13 @@ test("each fact is a sentence, the same as in a mail", () => {
   ]);
 });
 
+test("whatever direction names and reasons of others have ends with them", () => {
+  const failed = run({ state: "error", ended_at: at, graph_name: "\u202eA", detail: "\u202eB" });
+  expect(textsOf(failed)).toEqual([
+    "Run 12 of \u2068\u202eA\u2069 on David has failed: an error. \u2068\u202eB\u2069",
+  ]);
+});
+
 test("an unread mention leads to its comment", () => {
   const mention = {
     key: "t/1",
@@ -73,6 +80,7 @@ test("an unread mention leads to its comment", () => {
       key: "mention:t/1",
       text: "Mari has mentioned you in a comment on Fetch.",
       path: "/graphs/g1?comment=t%2F1",
+      mention: "t/1",
     },
   ]);
 });

@@ -1,8 +1,8 @@
 /** The page of a link: one graph or one run, to be looked at. It has no menus, no session and no STOP. */
 import { CloseButton, Loader } from "@mantine/core";
 import { IconEye, IconLinkOff, IconPlugConnectedX } from "@tabler/icons-react";
-import { ReactFlowProvider } from "@xyflow/react";
-import { memo, type ReactNode, useEffect, useMemo, useState } from "react";
+import { ReactFlowProvider, useReactFlow, useStore } from "@xyflow/react";
+import { memo, type ReactNode, useEffect, useMemo, useRef, useState } from "react";
 import type { Run } from "../api/run-stop";
 import { runPlace } from "../api/runs";
 import { fromUmrf } from "../canvas/from-umrf";
@@ -108,12 +108,28 @@ function Frame({ title, status, lost, note, children }: FrameProps) {
 
 /** The page is drawn with time, the canvas only with what changes on it. */
 const Canvas = memo(function Canvas(props: Parameters<typeof GraphView>[0]) {
+  const [isMoved, setMoved] = useState(false);
   return (
     <ReactFlowProvider>
-      <GraphView {...props} />
+      <GraphView {...props} onPanned={() => setMoved(true)}>
+        {!isMoved && <FitAgain />}
+      </GraphView>
     </ReactFlowProvider>
   );
 });
+
+/** Fits the graph again when a phone is turned, or the frame around the page becomes larger or smaller. */
+function FitAgain() {
+  const { fitView } = useReactFlow();
+  const size = useStore(({ width, height }) => `${width} ${height}`);
+  const fitted = useRef(size);
+  useEffect(() => {
+    if (fitted.current === size) return;
+    fitted.current = size;
+    void fitView({ maxZoom: 1, padding: 0.12 });
+  }, [size, fitView]);
+  return null;
+}
 
 function GraphOfLink({ text }: { text: string }) {
   const shared = useSharedGraph(text);
