@@ -29,6 +29,7 @@ import { useMay, usePerson } from "../api/people";
 import { ROLE_WORDS, rememberedName, signOut } from "../api/session";
 import { useOpening } from "../ui/late-opening";
 import { Segments } from "../ui/segments";
+import style from "./account-panel.module.css";
 import { InboxList } from "./inbox";
 import { NotificationSwitch } from "./notifier";
 
@@ -216,7 +217,7 @@ export function AccountPopover({ button, onShare, onLeave }: AccountPopoverProps
       width={264}
     >
       <Popover.Target>{cloneElement(button, { onClick: () => setOpen(!open) })}</Popover.Target>
-      <Popover.Dropdown>
+      <Popover.Dropdown className={style.panel ?? ""}>
         <AccountPanel onShare={onShare} onLeave={onLeave} onClose={() => setOpen(false)} />
       </Popover.Dropdown>
     </Popover>

@@ -26,7 +26,9 @@ function useProvider() {
 
 /** The button that leads to the provider; nothing where none is set. `why`: what came of the last visit. */
 export function ProviderButton({ why, again = false }: { why: string; again?: boolean }) {
-  const { name } = useProvider();
+  const offer = useProvider();
+  const { name } = offer;
+  const isKnown = offer !== NONE;
   const [problem, setProblem] = useState(why);
   const [busy, setBusy] = useState(false);
   useEffect(() => {
@@ -48,6 +50,11 @@ export function ProviderButton({ why, again = false }: { why: string; again?: bo
       {problem !== "" && (
         <Text className="ink-error" mt="md" role="alert">
           {problem}
+        </Text>
+      )}
+      {isKnown && name == null && again && (
+        <Text mt="md">
+          No provider is set here. Close this tab, and confirm on another device or with a passkey.
         </Text>
       )}
       {name != null && (

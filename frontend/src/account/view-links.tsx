@@ -90,9 +90,9 @@ export function ViewLinks({ thing, origin }: Props) {
           other {thing.kind}s. They can change, start and stop nothing.
           {thing.kind === "graph" && " Comments are not shown."}
         </Text>
-        <Group wrap="nowrap" align="end" gap="sm">
+        <Group align="end" gap="sm">
           <TextInput
-            flex={1}
+            flex="1 1 8rem"
             label="For what"
             placeholder="The wiki, a visitor …"
             maxLength={60}
