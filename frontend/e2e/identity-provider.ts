@@ -22,7 +22,7 @@ export class IdentityProvider {
     return `http://localhost:${this.port}`;
   }
 
-  /** What the product has to be told of it. */
+  /** The settings of a product whose people sign in here. */
   get settings(): Record<string, string> {
     return {
       ACTION_ASSISTANT_OIDC_ISSUER: this.issuer,

@@ -7,7 +7,7 @@ import { type Inbox, mentionPath } from "../api/mentions";
 import { isolated } from "../words/isolated";
 
 export interface Notice {
-  /** The same for the same fact. */
+  /** Equal keys tell of one fact. */
   readonly key: string;
   readonly text: string;
   /** The place on the page. */

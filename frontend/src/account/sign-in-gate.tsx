@@ -46,7 +46,7 @@ type Gate =
   /** `offline`: no server has said who this is; it is who was here last. */
   | { at: "inside"; person: Person; visit: number; offline?: true };
 
-/** Whether the address is that of `provider-return.tsx`, with something for it. */
+/** Return whether the address is that of `provider-return.tsx`, with something for it. */
 const isReturned = () =>
   location.pathname === `${basePath}/signed-in` && /[?&](state|again)\b/.test(location.search);
 

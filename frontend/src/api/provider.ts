@@ -7,7 +7,7 @@ import { personIn } from "./session";
 /** The place to which the provider sends the browser back. */
 const RETURN_PATH = `${basePath}/signed-in`;
 
-/** What stands in the address after a visit to the provider; `again`: a person wants to prove that it is
+/** The contents of the address after a visit to the provider; `again`: a person wants to prove that it is
  * they, and has not been there yet. */
 export type ProviderReturn =
   | { readonly kind: "answer"; readonly answer: EditorApi["ProviderAnswer"] }

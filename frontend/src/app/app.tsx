@@ -77,7 +77,7 @@ const ConfirmQuestion = lazyPart(() =>
 
 const Notifier = lazyPart(() => import("../account/notifier").then((part) => part.Notifier));
 
-/** What this page has to confirm, and what another device asks it to. */
+/** Asks for confirmations of this page, and shows those that another device asks it for. */
 function Confirmations() {
   const wanted = useWatched(unconfirmed) !== null;
   const asked = useLive().now.asked.length > 0;

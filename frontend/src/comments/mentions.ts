@@ -14,7 +14,7 @@ export interface MentionQuery {
 
 const QUERY = /(?:^|[\s([{"'])@([^@\n]{0,40})$/u;
 const PART_OF_A_NAME = /[\p{L}\p{N}_-]/u;
-/** As the server takes them at most. */
+/** The server takes so many at most. */
 const MOST = 20;
 const SHOWN = 8;
 

@@ -108,7 +108,7 @@ function Choice({ question, all, who, nameOf, onChange }: ChoiceProps) {
 interface Props {
   ruled: Ruled;
   name: string;
-  /** Whether a folder is around it, whose rule may count. */
+  /** Set if a folder is around it, whose rule may count. */
   isInside: boolean;
   onClose: () => void;
 }

@@ -1,4 +1,4 @@
-/** Who watches the robots whose owners want to know it: one tick for each, before anything sets them going. */
+/** Asks who watches the robots whose owners want to know it: one tick for each, before anything sets them going. */
 import { Checkbox } from "@mantine/core";
 import { useState } from "react";
 import { useLive } from "../api/page-link";
@@ -8,7 +8,7 @@ import style from "./watching.module.css";
 export interface Watch {
   /** Robots of which somebody has to say that they watch them. */
   readonly asked: readonly string[];
-  /** What the person has said, as the runner wants it. */
+  /** The words of the person, in the form that the runner takes. */
   readonly watching: Readonly<Record<string, true>>;
   /** Why nothing may be set going yet; null when all is said. */
   readonly obstacle: string | null;

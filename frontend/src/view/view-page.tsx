@@ -74,7 +74,7 @@ interface FrameProps {
   title: string;
   status?: ReactNode;
   lost: number | null;
-  /** What this page does not do, and where it is done. */
+  /** Says where the things are done that this page does not do. */
   note: string;
   children: ReactNode;
 }
