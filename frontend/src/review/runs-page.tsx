@@ -66,7 +66,7 @@ interface RunRowProps {
   onChoose: (chosen: boolean) => void;
 }
 
-/** What people, and the runner after its end, have noted of a run. */
+/** Shows what people, and the runner after its end, have noted of a run. */
 function Marks({ run }: { run: ListedRun }) {
   return (
     <>
