@@ -80,7 +80,7 @@ def test_a_named_program_that_is_none_is_one_clear_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(interpreter.VARIABLE, str(tmp_path / "nothing"))
-    answer = Product(tmp_path).cli("serve", "--data", str(tmp_path), "--no-open")
+    answer = Product(tmp_path).process_of("serve", "--data", str(tmp_path), "--no-open")
     assert answer.returncode == 2
     assert answer.stderr.splitlines() == [
         f"action-assistant: {interpreter.VARIABLE} is {str(tmp_path / 'nothing')!r}, which is no "

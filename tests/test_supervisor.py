@@ -139,7 +139,7 @@ def test_a_taken_port_is_one_clear_sentence(tmp_path: Path) -> None:
         port = taken.getsockname()[1]
         product = Product(tmp_path)
         for command in ("serve", "editor", "runner"):
-            answer = product.cli(command, "--port", str(port), "--data", str(tmp_path))
+            answer = product.process_of(command, "--port", str(port), "--data", str(tmp_path))
             assert answer.returncode == 2
             assert answer.stderr.splitlines() == [
                 f"action-assistant: Port {port} is taken on 127.0.0.1; choose another with --port."
@@ -148,7 +148,9 @@ def test_a_taken_port_is_one_clear_sentence(tmp_path: Path) -> None:
 
 def test_a_folder_that_cannot_be_written_is_one_clear_sentence(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
-    answer = Product(tmp_path).cli("serve", "--data", str(tmp_path / "file" / "data"), "--no-open")
+    answer = Product(tmp_path).process_of(
+        "serve", "--data", str(tmp_path / "file" / "data"), "--no-open"
+    )
     assert answer.returncode == 2
     assert answer.stderr.startswith("action-assistant: Cannot write to the data folder")
     assert len(answer.stderr.splitlines()) == 1
@@ -156,13 +158,13 @@ def test_a_folder_that_cannot_be_written_is_one_clear_sentence(tmp_path: Path) -
 
 def test_a_misspelt_setting_is_not_ignored(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ACTION_ASSISTANT_TOKN", "x")
-    answer = Product(tmp_path).cli("serve", "--data", str(tmp_path))
+    answer = Product(tmp_path).process_of("serve", "--data", str(tmp_path))
     assert answer.returncode == 2
     assert "Unknown setting ACTION_ASSISTANT_TOKN" in answer.stderr
 
 
 def test_the_network_is_not_let_in_by_accident(tmp_path: Path) -> None:
-    answer = Product(tmp_path).cli("serve", "--data", str(tmp_path), "--host", "0.0.0.0")
+    answer = Product(tmp_path).process_of("serve", "--data", str(tmp_path), "--host", "0.0.0.0")
     assert answer.returncode == 2
     assert "ACTION_ASSISTANT_HOSTS" in answer.stderr
 

@@ -33,6 +33,7 @@ from action_assistant.journal.migrate import last_writer, recognize, revisions_o
 from action_assistant.journal.sqlite import inspected
 from action_assistant.version import VERSION, described
 from record_first import answers
+from support.command_line import ran, seconds_of
 from support.product import COMMAND, Product, running
 from support.rows import contents, fill, write_events
 from support.used_server import differences
@@ -76,12 +77,6 @@ class Place(NamedTuple):
                 await journal.close()
 
         asyncio.run(look())
-
-
-def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=60
-    )
 
 
 #: The first and the last two revisions of each journal run in CI, the others only in long tests.
@@ -179,9 +174,9 @@ def test_data_of_the_first_version_come_to_this_one_and_back(tmp_path: Path) -> 
         assert list(differences(then, said_by(product))) == []
     copies = [copy.path for copy in copies_in(data / FOLDER)]
     assert sorted(path.name.split("-")[0] for path in copies) == sorted(OLD)
-    listed = command("migrate", "--back", "--data", data)
+    listed = ran("migrate", "--back", "--data", data)
     assert [str(path) in listed.stdout for path in copies] == [True, True]
-    back = command("migrate", "--back", *copies, "--data", data)
+    back = ran("migrate", "--back", *copies, "--data", data)
     assert back.returncode == 0, back.stderr
     for branch, rows in before.items():
         place = Place(data, branch, f"sqlite:///{data / f'{branch}.db'}")  # type: ignore[arg-type]
@@ -209,7 +204,7 @@ def test_the_first_version_itself_goes_on_where_it_was(
     with running(data) as product, product.editor() as editor:
         graph = editor.post("/api/graphs", json={"name": "of today"}).json()["id"]
     copies = [copy.path for copy in copies_in(data / FOLDER)]
-    assert command("migrate", "--back", *copies, "--data", data).returncode == 0
+    assert ran("migrate", "--back", *copies, "--data", data).returncode == 0
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "then" / "server"))
     with running(data) as product, product.editor() as editor:
         assert list(differences(then, said_by(product))) == []
@@ -225,7 +220,7 @@ def test_a_newer_database_says_who_made_it_and_what_can_be_done(tmp_path: Path) 
         "INSERT INTO written_by VALUES (9e18, '9.1.0', '1a2b3c4d5e6f', 'editor_9999')",
     )
     database_of(url).migrate(lambda c: [c.execute(text(each)) for each in newer])
-    refused = command("editor", "--data", tmp_path, "--port", "1")
+    refused = ran("editor", "--data", tmp_path, "--port", "1")
     assert refused.returncode == 2
     told = refused.stderr.replace("\n", " ")
     assert "newer version of this program, 9.1.0 (commit 1a2b3c4d) (schema editor_9999)" in told
@@ -284,7 +279,7 @@ def test_tables_do_not_change_under_a_version_that_runs(tmp_path: Path) -> None:
     place = old(tmp_path)
     lock = own(tmp_path / "editor.db")
     try:
-        refused = command("migrate", "--data", tmp_path)
+        refused = ran("migrate", "--data", tmp_path)
     finally:
         os.close(lock)
     assert (refused.returncode, "in use by another process" in refused.stderr) == (2, True)
@@ -300,7 +295,7 @@ def test_without_room_for_a_copy_nothing_changes(
         place.opened()
     assert place.asked(recognize) == {"editor_0005"}
     assert list((tmp_path / FOLDER).iterdir()) == []
-    done = command("migrate", "--data", tmp_path, "--without-copy")
+    done = ran("migrate", "--data", tmp_path, "--without-copy")
     assert done.returncode == 0, done.stderr
     assert place.asked(recognize) == {revisions_of("editor")[-1]}
 
@@ -348,11 +343,9 @@ KILLS: Final = int(os.environ.get("TEST_MIGRATION_KILLS", "3"))
 def test_killed_at_any_moment_of_a_migration_nothing_is_lost(tmp_path: Path) -> None:
     whole = old(tmp_path / "whole")
     rows = whole.asked(stored)
-    begun = time.monotonic()
     data = tmp_path / "timed"
     shutil.copytree(whole.data, data)
-    assert command("migrate", "--data", data).returncode == 0
-    takes = time.monotonic() - begun
+    takes = seconds_of("migrate", "--data", data)
     seen = set()
     for number in range(KILLS):
         data = tmp_path / f"killed{number}"

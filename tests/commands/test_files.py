@@ -1,7 +1,6 @@
 """check, convert and simulate, as a person or a script runs them."""
 
 import json
-import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -11,16 +10,9 @@ from action_assistant import paths as places
 from action_assistant.cli import main
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
-from support.product import COMMAND
+from support.command_line import ran
 
 EXAMPLES = sorted(places.examples().glob("*.json"))
-
-
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """A command in a process of its own."""
-    return subprocess.run(
-        [*COMMAND, *arguments], capture_output=True, text=True, check=False, timeout=60
-    )
 
 
 @pytest.fixture
@@ -57,14 +49,14 @@ TWO: dict[str, Any] = {
 
 
 def test_a_good_file_has_no_errors_and_exit_code_0(example: Path) -> None:
-    answer = run("check", str(example))
+    answer = ran("check", str(example))
     assert answer.returncode == 0
     assert "0 errors" in answer.stdout
 
 
 def test_a_ghost_is_an_error_with_its_place(tmp_path: Path) -> None:
     graph = {**TWO, "graph_entry": [{"name": "Missing"}]}
-    answer = run("check", "--json", written(tmp_path, graph))
+    answer = ran("check", "--json", written(tmp_path, graph))
     assert answer.returncode == 1
     (verdict,) = json.loads(answer.stdout)
     assert verdict["dialect"] == "D3"
@@ -88,19 +80,19 @@ def test_a_ghost_is_an_error_with_its_place(tmp_path: Path) -> None:
 )
 def test_a_file_that_is_no_umrf_is_a_problem_too(tmp_path: Path, text: str, words: str) -> None:
     path = written(tmp_path, text)
-    checked = run("check", "--json", path)
+    checked = ran("check", "--json", path)
     assert checked.returncode == 1
     (verdict,) = json.loads(checked.stdout)
     (problem,) = verdict["problems"]
     assert problem["severity"] == "error"
-    converted = run("convert", path)
+    converted = ran("convert", path)
     assert converted.returncode == 1
     assert converted.stdout == ""
     assert words in problem["message"] or words in converted.stderr
 
 
 def test_a_file_that_is_not_there_is_wrong_use(tmp_path: Path) -> None:
-    answer = run("check", str(tmp_path / "none.json"))
+    answer = ran("check", str(tmp_path / "none.json"))
     assert answer.returncode == 2
     assert len(answer.stderr.splitlines()) == 1
 
@@ -117,7 +109,7 @@ def test_converting_keeps_the_meaning(
 
 
 def test_simulate_prints_a_trace_for_programs(tmp_path: Path) -> None:
-    answer = run("simulate", "--trace", written(tmp_path, TWO))
+    answer = ran("simulate", "--trace", written(tmp_path, TWO))
     assert answer.returncode == 0
     events = [json.loads(line) for line in answer.stdout.splitlines()]
     assert events[0]["kind"] == "graph_state"
@@ -126,8 +118,8 @@ def test_simulate_prints_a_trace_for_programs(tmp_path: Path) -> None:
     assert nodes == [("A_0", "INITIALIZED"), ("A_0", "RUNNING"), ("A_0", "FINISHED")]
 
 
-@pytest.mark.parametrize(("result", "ran"), [("on_true", "C_0"), ("on_false", "B_0")])
-def test_exactly_one_of_two_branches_runs(tmp_path: Path, result: str, ran: str) -> None:
+@pytest.mark.parametrize(("result", "plays"), [("on_true", "C_0"), ("on_false", "B_0")])
+def test_exactly_one_of_two_branches_runs(tmp_path: Path, result: str, plays: str) -> None:
     def branch(name: str, outcome: str) -> dict[str, object]:
         rest = [f"{o} -> ignore" for o in ("on_true", "on_false", "on_error") if o != outcome]
         parent = {"name": "A", "conditions": [f"{outcome} -> run", *rest]}
@@ -145,14 +137,14 @@ def test_exactly_one_of_two_branches_runs(tmp_path: Path, result: str, ran: str)
     }
     script = tmp_path / "script.json"
     script.write_text(json.dumps({"behaviours": {"A": [{"result": result}]}}))
-    answer = run("simulate", "--trace", "--script", str(script), written(tmp_path, graph))
+    answer = ran("simulate", "--trace", "--script", str(script), written(tmp_path, graph))
     events = [json.loads(line) for line in answer.stdout.splitlines()]
     running = [e["node"] for e in events if e["kind"] == "node_state" and e["state"] == "RUNNING"]
-    assert running == ["A_0", ran]
+    assert running == ["A_0", plays]
 
 
 def test_a_stop_at_a_time_stops(tmp_path: Path) -> None:
-    answer = run("simulate", "--trace", "--at", "300:stop", written(tmp_path, TWO))
+    answer = ran("simulate", "--trace", "--at", "300:stop", written(tmp_path, TWO))
     events = [json.loads(line) for line in answer.stdout.splitlines()]
     graph = [event["state"] for event in events if event["kind"] == "graph_state"]
     assert graph[-1] == "STOPPED"
@@ -169,7 +161,7 @@ def test_a_stop_at_a_time_stops(tmp_path: Path) -> None:
 def test_a_graph_that_the_engines_parser_refuses_is_not_simulated(
     tmp_path: Path, change: dict[str, object]
 ) -> None:
-    answer = run("simulate", "--trace", written(tmp_path, {**TWO, **change}))
+    answer = ran("simulate", "--trace", written(tmp_path, {**TWO, **change}))
     assert answer.returncode == 1
     assert answer.stdout == ""
     assert "the engine refuses it" in answer.stderr
@@ -178,9 +170,9 @@ def test_a_graph_that_the_engines_parser_refuses_is_not_simulated(
 def test_a_run_state_in_the_file_is_an_error_and_kills_the_simulated_engine(tmp_path: Path) -> None:
     first, second = TWO["actions"]
     path = written(tmp_path, {**TWO, "actions": [{**first, "state": "FINISHED"}, second]})
-    (verdict,) = json.loads(run("check", "--json", path).stdout)
+    (verdict,) = json.loads(ran("check", "--json", path).stdout)
     assert "H1" in {problem["code"] for problem in verdict["problems"]}
-    answer = run("simulate", "--trace", path)
+    answer = ran("simulate", "--trace", path)
     assert answer.returncode == 0
     last = json.loads(answer.stdout.splitlines()[-1])
     assert (last["kind"], last["code"]) == ("hazard", "H1")
@@ -200,10 +192,10 @@ def test_a_problem_of_nearly_every_graph_is_one_note_at_the_end(
     chain[3]["type"] = "other"
     ends = {"graph_entry": [{"name": "A"}], "graph_exit": [{"name": "D"}]}
     path = written(tmp_path, {"graph_name": "g", "actions": chain} | ends)
-    first, *lines = run("check", path).stdout.splitlines()
+    first, *lines = ran("check", path).stdout.splitlines()
     assert first.endswith("0 errors, 1 warnings")
     assert [line.split()[:2] for line in lines] == [["warning", "type-unknown:"], ["note", "H3:"]]
-    (told,) = json.loads(run("check", "--json", path).stdout)
+    (told,) = json.loads(ran("check", "--json", path).stdout)
     assert [(p["code"], p["severity"]) for p in told["problems"]][-1] == ("H3", "warning")
 
 
@@ -218,7 +210,7 @@ def test_simulate_takes_the_actions_of_a_folder_as_check_does(tmp_path: Path) ->
     names = [each["name"] for each in TWO["actions"]]
     for name in names:
         action_file(folder, name)
-    answer = run("simulate", "--trace", "--actions", str(folder), path)
+    answer = ran("simulate", "--trace", "--actions", str(folder), path)
     assert answer.returncode == 0
     assert json.loads(answer.stdout.splitlines()[-1])["state"] == "FINISHED"
     assert "refused" not in answer.stdout
@@ -232,7 +224,7 @@ def test_a_graph_with_an_action_that_the_folder_lacks_is_refused_and_says_which(
     folder.mkdir()
     if other:
         action_file(folder, TWO["actions"][0]["name"], **other)
-    answer = run("simulate", "--trace", "--actions", str(folder), path)
+    answer = ran("simulate", "--trace", "--actions", str(folder), path)
     events = [json.loads(line) for line in answer.stdout.splitlines()]
     assert [each["code"] for each in events if each["kind"] == "hazard"] == ["refused"]
     assert TWO["actions"][0]["name"] in answer.stderr
@@ -242,7 +234,7 @@ def test_a_graph_with_an_action_that_the_folder_lacks_is_refused_and_says_which(
 
 def test_simulate_tells_a_person_what_the_engine_would_do_wrong(tmp_path: Path) -> None:
     graph = {**TWO, "actions": [TWO["actions"][0], {"name": "B", "type": "sync"}]}
-    answer = run("simulate", written(tmp_path, graph))
+    answer = ran("simulate", written(tmp_path, graph))
     assert answer.returncode == 0
     assert "hazard H2: The child in “A_0 => B_0” does not list it" in answer.stdout
 
@@ -257,7 +249,7 @@ def test_a_simulation_that_is_cut_off_says_so(tmp_path: Path, trace: list[str]) 
         {**second, "parents": [{"name": "A"}], "children": [{"name": "A"}]},
     ]
     loop = {**TWO, "actions": actions, "graph_entry": [{"name": "A"}], "graph_exit": []}
-    answer = run("simulate", *trace, written(tmp_path, loop))
+    answer = ran("simulate", *trace, written(tmp_path, loop))
     assert answer.returncode == 1
     assert "The simulation ends here, after 100,000 events" in answer.stderr
     last = answer.stdout.splitlines()[-1]
@@ -284,10 +276,10 @@ def test_a_sub_graph_is_judged_as_it_is_inside_the_graph_that_uses_it(tmp_path: 
         path = tmp_path / f"{name}.graph.json"
         path.write_text(json.dumps(value))
         paths.append(str(path))
-    together = run("check", "--json", *paths)
+    together = ran("check", "--json", *paths)
     assert together.returncode == 0
     assert [verdict["problems"] for verdict in json.loads(together.stdout)] == [[], []]
-    alone = run("check", "--json", paths[0])
+    alone = ran("check", "--json", paths[0])
     assert alone.returncode == 0
     (problem,) = json.loads(alone.stdout)[0]["problems"]
     assert (problem["code"], problem["severity"]) == ("H7", "warning")
@@ -296,7 +288,7 @@ def test_a_sub_graph_is_judged_as_it_is_inside_the_graph_that_uses_it(tmp_path: 
 
 def test_the_file_of_an_action_is_checked_as_such(tmp_path: Path) -> None:
     path = written(tmp_path, {"name": "Go", "type": "sync", "input_parameters": {"x": 5}})
-    answer = run("check", "--json", path)
+    answer = ran("check", "--json", path)
     assert answer.returncode == 1
     (verdict,) = json.loads(answer.stdout)
     assert verdict["dialect"] == "D3-action"
@@ -310,23 +302,23 @@ def test_the_file_of_an_action_is_checked_as_such(tmp_path: Path) -> None:
 def test_check_says_line_and_column_in_the_file_also_of_an_old_one(tmp_path: Path) -> None:
     action = '{"name": "Go", "id": 3,\n  "effect": "synchronous", "package_name": "go"}'
     path = written(tmp_path, '\ufeff{"graph_name": "g",\r\n "umrf_actions": [\n  ' + action + "]}")
-    (verdict,) = json.loads(run("check", "--json", path).stdout)
+    (verdict,) = json.loads(ran("check", "--json", path).stdout)
     places = {p["code"]: p["where"] for p in verdict["problems"]}
     assert places["dialect-old"] == {"path": "/umrf_actions", "line": 2, "column": 2}
     notes = {note["message"]: note["where"] for note in verdict["notes"]}
     effect = notes["The effect “synchronous” became the type sync."]
     assert effect == {"path": "/umrf_actions/0/effect", "line": 4, "column": 3}
-    told = run("check", path).stdout
+    told = ran("check", path).stdout
     assert "error dialect-old" in told
     assert "(line 2, column 2: /umrf_actions)" in told
     assert "(line 4, column 3: /umrf_actions/0/effect)" in told
-    assert f"{path}:4:3: The effect" in run("convert", path).stderr
+    assert f"{path}:4:3: The effect" in ran("convert", path).stderr
 
 
 def test_a_file_that_is_no_json_is_refused_with_line_and_column_also_for_programs(
     tmp_path: Path,
 ) -> None:
-    (verdict,) = json.loads(run("check", "--json", written(tmp_path, '{"a":\n  oops}')).stdout)
+    (verdict,) = json.loads(ran("check", "--json", written(tmp_path, '{"a":\n  oops}')).stdout)
     (problem,) = verdict["problems"]
     assert (problem["where"]["line"], problem["where"]["column"]) == (2, 3)
 
@@ -344,14 +336,14 @@ def test_a_file_that_is_no_json_is_refused_with_line_and_column_also_for_program
 )
 def test_a_file_that_only_has_a_name_and_a_type_is_no_umrf(tmp_path: Path, value: object) -> None:
     path = written(tmp_path, value)
-    (verdict,) = json.loads(run("check", "--json", path).stdout)
+    (verdict,) = json.loads(ran("check", "--json", path).stdout)
     assert [problem["code"] for problem in verdict["problems"]] == ["not-umrf"]
-    assert run("convert", path).returncode == 1
+    assert ran("convert", path).returncode == 1
 
 
 def test_a_list_of_actions_is_told_as_one(tmp_path: Path) -> None:
     action = {"name": "Go", "effect": "synchronous", "children": [{"name": "Stop", "id": 0}]}
-    answer = run("convert", written(tmp_path, [action, {**action, "name": "Stop"}]))
+    answer = ran("convert", written(tmp_path, [action, {**action, "name": "Stop"}]))
     assert answer.returncode == 1
     assert "a list with 2 single actions" in answer.stderr
 
@@ -365,8 +357,8 @@ def test_examples_become_values_when_asked(tmp_path: Path) -> None:
         "input_parameters": {"a": {"b": leaf}},
     }
     path = written(tmp_path, {"graph_name": "g", "umrf_actions": [action]})
-    assert "pvf_value" not in run("convert", path).stdout
-    answer = run("convert", "--examples", path)
+    assert "pvf_value" not in ran("convert", path).stdout
+    answer = ran("convert", "--examples", path)
     assert json.loads(answer.stdout)["actions"][0]["input_parameters"]["a"]["b"]["pvf_value"] == 2
     assert "“a::b”" in answer.stderr
 
@@ -386,20 +378,20 @@ def test_check_knows_the_actions_and_sub_graphs_of_folders(tmp_path: Path) -> No
     (known / "broken.umrf.json").write_text("{")
 
     def codes(*options: str) -> set[str]:
-        answer = run("check", "--json", file, *options)
+        answer = ran("check", "--json", file, *options)
         return {p["code"] for p in json.loads(answer.stdout)[0]["problems"]} - {"H3"}
 
     assert codes() == set()
     assert codes("--actions", str(known)) == {"signature", "unknown-action"}
     assert codes("--graphs", str(known)) == {"H8"}
     assert codes("--graphs", str(known), "--actions", str(known)) == {"signature", "H8"}
-    assert "left out" in run("check", file, "--actions", str(known)).stderr
+    assert "left out" in ran("check", file, "--actions", str(known)).stderr
 
 
 def test_a_script_that_makes_no_sense_is_wrong_use(tmp_path: Path) -> None:
     script = tmp_path / "script.json"
     script.write_text('{"behaviours": {"A": [{"after_s": "soon"}]}}')
-    answer = run("simulate", "--script", str(script), written(tmp_path, TWO))
+    answer = ran("simulate", "--script", str(script), written(tmp_path, TWO))
     assert answer.returncode == 2
     assert "script" in answer.stderr
 
@@ -421,4 +413,4 @@ def test_every_command_has_help_with_an_example(
 
 def test_wrong_use_is_exit_code_2() -> None:
     for arguments in ([], ["nonsense"], ["serve", "--port", "0"], ["simulate", "x", "--at", "y"]):
-        assert run(*arguments).returncode == 2
+        assert ran(*arguments).returncode == 2

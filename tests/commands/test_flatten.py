@@ -6,16 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from action_assistant.umrf.files import codec
-from support.product import COMMAND
+from support.command_line import ran
 
 RUN = ["on_true -> run", "on_false -> run", "on_error -> run"]
 
 
 def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [*COMMAND, "flatten", *map(str, arguments)],
-        capture_output=True, text=True, check=False, timeout=60,
-    )  # fmt: skip
+    return ran("flatten", *map(str, arguments))
 
 
 def chain(name: str, *actions: str, ends: list[str] = RUN) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from action_assistant.web.auth.keys import Keys
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.auth.tokens import TokenFiles
 from commands.test_client import listening
+from support.command_line import ran
 from support.product import COMMAND, TOKEN, Product, running
 
 KEYS = Keys(TOKEN)
@@ -50,14 +51,7 @@ class Elsewhere:
         }
 
     def run(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(
-            [*COMMAND, *words],
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            timeout=60,
-            check=False,
-        )
+        return ran(*words, environ=self.environment)
 
     def begin(self, *words: str) -> "subprocess.Popen[str]":
         """A login that waits for a person."""
@@ -249,8 +243,7 @@ def test_the_owner_makes_lists_and_revokes_tokens(product: Product, tmp_path: Pa
     for url in (f"{product.url}/api/graphs", f"{product.runner_url}/api/runs"):
         assert httpx.get(url, headers=headers, trust_env=False).status_code == 200
     given = {**product.environment, "ACTION_ASSISTANT_TOKEN": text}
-    listing = [*COMMAND, "graphs"]
-    assert subprocess.run(listing, env=given, capture_output=True, check=False).returncode == 0
+    assert ran("graphs", environ=given).returncode == 0
     assert product.cli("tokens", "revoke", text.split("_")[1]).returncode == 0
     for url in (f"{product.url}/api/graphs", f"{product.runner_url}/api/runs"):
         assert httpx.get(url, headers=headers, trust_env=False).status_code == 401

@@ -14,6 +14,8 @@ from pathlib import Path
 import httpx
 import psutil
 
+from support.command_line import ran
+
 TOKEN = "test-token-" + "0123456789abcdef" * 2
 COMMAND = (sys.executable, "-m", "action_assistant")
 #: The installed program, as people and services start it.
@@ -142,7 +144,14 @@ class Product:
         return code
 
     def cli(self, *arguments: str) -> subprocess.CompletedProcess[str]:
-        """Run a command against this server."""
+        """Run a command against this server: inside this process, unless another program or
+        working folder was given."""
+        if self._program == COMMAND and self._folder is None:
+            return ran(*arguments, environ=self.environment)
+        return self.process_of(*arguments)
+
+    def process_of(self, *arguments: str) -> subprocess.CompletedProcess[str]:
+        """Run a command against this server in a process of its own."""
         return subprocess.run(
             [*self._program, *arguments],
             env=self.environment,

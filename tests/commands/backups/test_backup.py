@@ -4,7 +4,6 @@ import asyncio
 import json
 import shutil
 import sqlite3
-import subprocess
 import zipfile
 from collections.abc import Callable
 from contextlib import closing
@@ -18,13 +17,8 @@ from action_assistant.editor.log import graph_events as h
 from action_assistant.errors import CannotStart
 from action_assistant.journal.journal import Journal
 from action_assistant.settings import EditorSettings
-from editor.process import COMMAND, Editor
-
-
-def run(*arguments: str | Path) -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=60
-    )
+from editor.process import Editor
+from support.command_line import ran
 
 
 @pytest.fixture
@@ -52,18 +46,18 @@ def test_a_backup_of_a_running_server_restores_all_its_graphs(
     editor: Editor, tmp_path: Path
 ) -> None:
     file = tmp_path / "monday.zip"
-    made = run("backup", file, "--data", editor.data)
+    made = ran("backup", file, "--data", editor.data)
     assert made.returncode == 0, made.stderr
     assert file.stat().st_mode & 0o777 == 0o600
     with editor.client() as http:
         http.post("/api/graphs", json={"name": "after"})
     assert "after" in names(editor)
-    refused = run("restore", file, "--data", editor.data)
+    refused = ran("restore", file, "--data", editor.data)
     assert (refused.returncode, "End action-assistant first" in refused.stderr) == (2, True)
     editor.kill()  # what its last words were must not enter the restored file
     assert (editor.data / "editor.db-wal").stat().st_size > 0
 
-    restored = run("restore", file, "--data", editor.data)
+    restored = ran("restore", file, "--data", editor.data)
     assert restored.returncode == 0, restored.stderr
     editor.start()
     assert "before" in names(editor)
@@ -75,7 +69,7 @@ def test_a_backup_of_a_running_server_restores_all_its_graphs(
     with closing(sqlite3.connect(aside / "editor.db")) as database:
         kept = {name for (name,) in database.execute("SELECT name FROM graph")}
     assert {"before", "after"} <= kept
-    assert run("verify", "--data", editor.data).returncode == 0
+    assert ran("verify", "--data", editor.data).returncode == 0
 
 
 def here(*arguments: str | Path) -> int:

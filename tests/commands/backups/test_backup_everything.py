@@ -19,7 +19,8 @@ from action_assistant.journal.journal import Journal
 from action_assistant.runner.projection import fold as runner_fold
 from action_assistant.web.network.certificate import Certificate
 from journal.servers import Server
-from support.product import COMMAND, Product, running
+from support.command_line import ran
+from support.product import Product, running
 from support.used_server import Guest, answers, differences, live
 
 
@@ -51,14 +52,8 @@ def kept(data: Path, *flags: str) -> Iterator[Keyed]:
 
 
 def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=100,
-        env={key: text for key, text in os.environ.items() if "ACTION_ASSISTANT" not in key},
-    )
+    kept = {key: text for key, text in os.environ.items() if "ACTION_ASSISTANT" not in key}
+    return ran(*arguments, environ=kept)
 
 
 async def events(url: str, data: Path) -> tuple[list[Event], list[Event]]:

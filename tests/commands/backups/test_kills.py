@@ -14,6 +14,7 @@ import pytest
 from action_assistant import settings
 from action_assistant.journal.databases import database_of, migrate
 from action_assistant.journal.sqlite import inspected
+from support.command_line import ran, seconds_of
 from support.product import COMMAND
 from support.rows import write_events
 
@@ -32,12 +33,6 @@ def data(tmp_path: Path) -> Path:
         database_of(url).migrate(lambda c: write_events(c, each=EVENTS // 3))
     (folder / "token").write_text("of this folder".ljust(43, "-"))
     return folder
-
-
-def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=110
-    )
 
 
 def killed(after: float, *arguments: "str | Path") -> None:
@@ -63,9 +58,8 @@ def sound(folder: Path) -> dict[str, int]:
 @pytest.mark.timeout(0)
 def test_a_killed_backup_leaves_no_file_and_harms_nothing(data: Path, tmp_path: Path) -> None:
     into, chance = tmp_path / "b", random.Random(5)
-    begun = time.monotonic()
-    assert command("backup", "--into", into, "--keep", "all", "--data", data).returncode == 0
-    takes, before = time.monotonic() - begun, sound(data)
+    takes = seconds_of("backup", "--into", into, "--keep", "all", "--data", data)
+    before = sound(data)
     for _ in range(KILLS):
         known = set(into.glob("*.zip"))
         killed(
@@ -80,9 +74,9 @@ def test_a_killed_backup_leaves_no_file_and_harms_nothing(data: Path, tmp_path: 
         )
         assert sound(data) == before
         for path in set(into.glob("*.zip")) - known:  # it was there before it was killed
-            assert command("restore", "--rehearse", path, "--data", data).returncode == 0
+            assert ran("restore", "--rehearse", path, "--data", data).returncode == 0
         time.sleep(1.0)  # names have seconds
-    assert command("backup", "--into", into, "--keep", "all", "--data", data).returncode == 0
+    assert ran("backup", "--into", into, "--keep", "all", "--data", data).returncode == 0
     assert not list(into.glob(".backup-*"))
 
 
@@ -91,12 +85,10 @@ def test_a_killed_restore_leaves_all_as_it_was_or_whole_or_marked(
     data: Path, tmp_path: Path
 ) -> None:
     file, chance = tmp_path / "x.zip", random.Random(6)
-    assert command("backup", file, "--data", data).returncode == 0
+    assert ran("backup", file, "--data", data).returncode == 0
     whole = sound(data)
     whole["editor"] += 1  # that another epoch begins
-    begun = time.monotonic()
-    assert command("restore", file, "--data", tmp_path / "timed").returncode == 0
-    takes, outcomes = time.monotonic() - begun, set()
+    takes, outcomes = seconds_of("restore", file, "--data", tmp_path / "timed"), set()
     for number in range(KILLS):
         place = tmp_path / f"place{number}"
         old = {}
@@ -110,7 +102,7 @@ def test_a_killed_restore_leaves_all_as_it_was_or_whole_or_marked(
         now = sound(place)
         outcomes.add("marked" if marked else "whole" if now == whole else "as before")
         assert marked or now in (old, whole)
-        again = command("restore", file, "--data", place)
+        again = ran("restore", file, "--data", place)
         assert again.returncode == 0, again.stderr
         assert sound(place) == whole
         assert not list(place.glob(".restore-*"))

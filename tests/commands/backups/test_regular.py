@@ -11,14 +11,9 @@ import pytest
 
 from action_assistant.journal.copies.backup_state import BackupState, backup_state
 from action_assistant.journal.databases import database_of, migrate
+from support.command_line import ran
 from support.product import COMMAND, running
 from support.rows import write_events
-
-
-def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=60
-    )
 
 
 @pytest.fixture
@@ -58,7 +53,7 @@ def test_a_new_backup_goes_into_the_folder_and_older_ones_are_removed(
     old.write_text("of long ago")
     strange = into / "holiday.zip"
     strange.write_text("not ours")
-    made = command("backup", "--into", into, "--keep", "1d", "--data", data)
+    made = ran("backup", "--into", into, "--keep", "1d", "--data", data)
     assert made.returncode == 0, made.stderr
     (new,) = [path for path in backups(into) if path != strange]
     assert new != old
@@ -82,7 +77,7 @@ def test_an_incomplete_backup_removes_no_older_one(data: Path, tmp_path: Path) -
     old.write_text("of long ago")
     link = "INSERT INTO invitation VALUES ('i', 'viewer', 'team', 1, 'ann', NULL, NULL)"
     database_of(f"sqlite:///{data / 'editor.db'}").migrate(lambda c: c.exec_driver_sql(link))
-    made = command("backup", "--into", into, "--keep", "1d", "--data", data)
+    made = ran("backup", "--into", into, "--keep", "1d", "--data", data)
     assert made.returncode == 1
     assert "missing: the token" in made.stdout
     assert old.exists()
@@ -101,7 +96,7 @@ def test_a_command_takes_it_elsewhere_and_its_failure_is_told(
 ) -> None:
     there = tmp_path / "there"
     there.mkdir()
-    made = command(
+    made = ran(
         "backup", "--into", tmp_path / "b", "--after", after.format(there=there), "--data", data
     )
     assert made.returncode == code
@@ -119,7 +114,7 @@ def test_a_command_takes_it_elsewhere_and_its_failure_is_told(
 
 def test_a_backup_that_fails_is_written_down(data: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
-    made = command("backup", "--into", tmp_path / "file" / "b", "--data", data)
+    made = ran("backup", "--into", tmp_path / "file" / "b", "--data", data)
     assert made.returncode == 2
     failed = state_of(data).failed
     assert failed is not None
@@ -130,7 +125,7 @@ def test_backups_of_another_server_in_the_same_folder_stay(data: Path, tmp_path:
     into, of_both = tmp_path / "b", []
     for token in ("one", "two", "one", "two"):
         (data / "token").write_text(token.ljust(43, "-"))
-        made = command("backup", "--into", into, "--keep", "1d", "--data", data)
+        made = ran("backup", "--into", into, "--keep", "1d", "--data", data)
         assert made.returncode == 0, made.stderr
         of_both.append(state_of(data).last)
     assert [str(each) for each in backups(into)] == [each.file for each in of_both[2:] if each]
@@ -152,7 +147,7 @@ def test_two_at_once_are_refused(data: Path, tmp_path: Path) -> None:
     )
     try:
         until(lambda: backups(into))
-        second = command("backup", "--into", into, "--data", data)
+        second = ran("backup", "--into", into, "--data", data)
         assert second.returncode == 2
         assert "just being made" in second.stderr
     finally:
@@ -178,13 +173,13 @@ def test_the_server_makes_them_by_itself(tmp_path: Path) -> None:
         assert not state_of(data).is_late(time.time())
     assert not keeper.is_running()
     assert [path.name for path in into.iterdir() if path.name.startswith(".backup-")] == []
-    rehearsed = command("restore", "--rehearse", backups(into)[-1], "--data", data)
+    rehearsed = ran("restore", "--rehearse", backups(into)[-1], "--data", data)
     assert rehearsed.returncode == 0, rehearsed.stdout
 
 
 def test_a_backup_is_not_repeated_before_its_time(data: Path, tmp_path: Path) -> None:
     into = tmp_path / "b"
-    assert command("backup", "--into", into, "--data", data).returncode == 0
+    assert ran("backup", "--into", into, "--data", data).returncode == 0
     staying = subprocess.Popen(
         [*COMMAND, "backup", "--into", str(into), "--every", "1h", "--data", str(data)]
     )
@@ -212,5 +207,5 @@ def test_a_backup_is_not_repeated_before_its_time(data: Path, tmp_path: Path) ->
 def test_wrong_or_contradicting_options_are_refused(
     data: Path, words: list[str], told: str
 ) -> None:
-    refused = command("backup", *words, "--data", data)
+    refused = ran("backup", *words, "--data", data)
     assert (refused.returncode, told in refused.stderr) == (2, True)

@@ -12,13 +12,8 @@ from typing import Any
 import pytest
 
 from action_assistant.journal.copies.backup_state import BackupState, backup_state
+from support.command_line import ran
 from support.product import COMMAND, running
-
-
-def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=60
-    )
 
 
 @pytest.fixture(scope="module")
@@ -28,7 +23,7 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with running(folder / "data") as product, product.editor() as editor:
         graph = editor.get("/api/graphs").json()[0]["id"]
         editor.post(f"/api/graphs/{graph}/versions", json={}).raise_for_status()
-    assert command("backup", folder / "x.zip", "--data", folder / "data").returncode == 0
+    assert ran("backup", folder / "x.zip", "--data", folder / "data").returncode == 0
     return folder / "x.zip"
 
 
@@ -54,7 +49,7 @@ def changed(file: Path, target: Path, *commands: str) -> Path:
 
 
 def test_a_sound_one_is_proven_and_nothing_is_left(file: Path, tmp_path: Path) -> None:
-    done = command("restore", "--rehearse", file, "--data", tmp_path)
+    done = ran("restore", "--rehearse", file, "--data", tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr
     assert "5 graphs, 1 versions" in done.stdout
     state = backup_state(tmp_path)
@@ -79,7 +74,7 @@ def test_an_unsound_backup_is_named_and_recorded(
     file: Path, tmp_path: Path, command_: str, told: str
 ) -> None:
     bad = changed(file, tmp_path / "bad.zip", command_)
-    done = command("restore", "--rehearse", bad, "--data", tmp_path)
+    done = ran("restore", "--rehearse", bad, "--data", tmp_path)
     assert done.returncode == 1
     assert told in done.stdout
     assert "is NOT sound" in done.stdout
@@ -94,8 +89,8 @@ def test_an_unsound_backup_is_named_and_recorded(
 def test_a_file_that_was_cut_is_not_sound(file: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.zip"
     cut.write_bytes(file.read_bytes()[:-100])
-    assert command("restore", "--rehearse", cut, "--data", tmp_path).returncode == 1
-    gone = command("restore", "--rehearse", tmp_path / "gone.zip", "--data", tmp_path)
+    assert ran("restore", "--rehearse", cut, "--data", tmp_path).returncode == 1
+    gone = ran("restore", "--rehearse", tmp_path / "gone.zip", "--data", tmp_path)
     assert (gone.returncode, "There is no file" in gone.stderr) == (2, True)
 
 

@@ -14,14 +14,9 @@ from action_assistant.commands.backups.data_folder import sweep, workshop
 from action_assistant.errors import CannotStart
 from action_assistant.journal.databases import database_of, migrate
 from action_assistant.system import posix
+from support.command_line import ran
 from support.product import COMMAND
 from support.rows import write_events
-
-
-def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=60
-    )
 
 
 def held_up(seen: Callable[[], Any], *arguments: "str | Path") -> "subprocess.Popen[str]":
@@ -63,7 +58,7 @@ def test_a_regular_backup_leaves_alone_one_that_is_just_being_made_there(
     by_hand = held_up(
         lambda: list(into.glob(".backup-*/editor.db")), "backup", into / "m.zip", "--data", data
     )
-    assert command("backup", "--into", into, "--data", data).returncode == 0
+    assert ran("backup", "--into", into, "--data", data).returncode == 0
     code, told = goes_on(by_hand)
     assert code == 0, told
     assert not list(into.glob(".backup-*"))
@@ -71,10 +66,10 @@ def test_a_regular_backup_leaves_alone_one_that_is_just_being_made_there(
 
 def test_two_rehearsals_see_all_that_is_in_the_backup(data: Path, tmp_path: Path) -> None:
     file = tmp_path / "m.zip"
-    assert command("backup", file, "--data", data).returncode == 0
+    assert ran("backup", file, "--data", data).returncode == 0
     rehearse = "restore", "--rehearse", file, "--data", data
     first = held_up(lambda: list(data.glob(".rehearsal-*/editor.db")), *rehearse)
-    other = command(*rehearse)
+    other = ran(*rehearse)
     assert "editor: 4500 events" in other.stdout
     code, told = goes_on(first)
     assert (code, "editor: 4500 events" in told) == (0, True), told

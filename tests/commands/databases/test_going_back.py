@@ -23,6 +23,7 @@ from action_assistant.journal.events import Draft, nothing
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.sqlite import inspected
 from journal.servers import Server
+from support.command_line import ran
 from support.product import COMMAND
 from support.rows import contents, fill, write_events
 
@@ -146,13 +147,7 @@ def check(there: Upgraded, before: dict[str, Any], after: dict[str, Any]) -> str
     now = there.now()
     assert now in (before, after)
     options = ["--database", there.url] if there.url else []
-    again = subprocess.run(
-        [*COMMAND, "migrate", "--back", there.copy, "--data", there.data, *options],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    again = ran("migrate", "--back", there.copy, "--data", there.data, *options)
     assert again.returncode == 0, again.stderr
     assert there.now() == after
     assert not list(there.data.glob(".*.part*"))
@@ -204,13 +199,7 @@ def test_killed_anywhere_a_server_has_what_was_or_what_shall_be(
 def refused(there: Upgraded, *more: "str | Path") -> str:
     """Return the message of `migrate --back`, which has to change nothing."""
     before = set(there.data.glob("*[!ml]"))  # without -shm and -wal of what was only read
-    done = subprocess.run(
-        [*COMMAND, "migrate", "--back", there.copy, "--data", there.data, *more],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    done = ran("migrate", "--back", there.copy, "--data", there.data, *more)
     assert done.returncode == 2, done.stdout + done.stderr
     assert set(there.data.glob("*[!ml]")) == before
     return done.stderr.replace("\n", " ")

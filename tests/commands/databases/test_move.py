@@ -22,6 +22,7 @@ from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.schema.editor_tables import editor_event
 from journal.servers import Server
+from support.command_line import ran, seconds_of
 from support.product import COMMAND, Product, running
 
 WRITERS: Final = int(os.environ.get("TEST_WRITERS", "4"))
@@ -29,14 +30,8 @@ KILLS: Final = int(os.environ.get("TEST_MOVE_KILLS", "2"))
 SECONDS: Final = float(os.environ.get("TEST_WRITING_S", "1.5"))
 
 
-def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=110
-    )
-
-
 def move(data: Path, to: str) -> "subprocess.CompletedProcess[str]":
-    return command("move", "--to", to, "--data", data)
+    return ran("move", "--to", to, "--data", data)
 
 
 def events(url: str) -> list[tuple[Any, ...]]:
@@ -120,7 +115,7 @@ def test_there_and_back_nothing_is_lost_of_what_many_wrote(
     (aside,) = data.glob("before-move-*/editor.db")
     assert events(f"sqlite:///{aside}") == before
 
-    refused = command("editor", "--data", data, "--port", "1")
+    refused = ran("editor", "--data", data, "--port", "1")
     assert (refused.returncode, "Start with --database" in refused.stderr) == (2, True)
     all_ |= wrote(data, "--database", url)
     before = truth(data)
@@ -134,7 +129,7 @@ def test_there_and_back_nothing_is_lost_of_what_many_wrote(
     # The other database holds an earlier state of the same log: it may be replaced.
     again = move(data, url)
     assert again.returncode == 0, again.stderr
-    assert command("verify", "--data", data).returncode == 0
+    assert ran("verify", "--data", data).returncode == 0
 
 
 @pytest.mark.long
@@ -178,7 +173,7 @@ def test_tables_that_are_not_what_the_events_say_stop_it(tmp_path: Path, postgre
     assert refused.returncode == 2
     assert "person: 1 rows and 0" in refused.stderr
     assert database_location.remembered(data) is None
-    assert command("rebuild", "--data", data).returncode == 0
+    assert ran("rebuild", "--data", data).returncode == 0
     moved = move(data, url)
     assert moved.returncode == 0, moved.stderr
     assert move(data, url).stdout.strip().endswith("are there already.")
@@ -214,9 +209,7 @@ def test_killed_at_any_moment_one_of_both_is_the_truth(tmp_path: Path, postgres:
     data, url = made(tmp_path / "data"), postgres.new_database()
     before = truth(data)
     chance = random.Random(7)
-    begun = time.monotonic()
-    assert move(data, url).returncode == 0
-    takes, switched = time.monotonic() - begun, 0
+    takes, switched = seconds_of("move", "--to", url, "--data", data), 0
     assert move(data, "sqlite").returncode == 0
     for _ in range(KILLS):
         to = url if database_location.remembered(data) is None else "sqlite"
@@ -236,4 +229,4 @@ def test_killed_at_any_moment_one_of_both_is_the_truth(tmp_path: Path, postgres:
         assert truth(data) == before
         assert not list(data.glob(".move-*"))
     assert KILLS < 10 or 0 < switched < KILLS
-    assert command("verify", "--data", data).returncode == 0
+    assert ran("verify", "--data", data).returncode == 0

@@ -14,14 +14,9 @@ from action_assistant.journal.databases import ask_once, database_of
 from journal.servers import Server
 from runner.archives.test_retention import led
 from runner.review.old_runs import opened, retention
+from support.command_line import ran
 from support.product import COMMAND, TOKEN, running
 from support.used_server import live
-
-
-def command(*arguments: "str | Path") -> "subprocess.CompletedProcess[str]":
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False, timeout=60
-    )
 
 
 def rows(url: str, question: str) -> list[tuple[Any, ...]]:
@@ -47,7 +42,7 @@ def data(tmp_path: Path) -> Path:
 def test_every_event_is_there_once_however_often_it_is_copied(data: Path, postgres: Server) -> None:
     url = postgres.new_database()
     for _ in range(2):
-        done = command("runs", "copy", "--to", url, "--data", data)
+        done = ran("runs", "copy", "--to", url, "--data", data)
         assert done.returncode == 0, done.stderr
     own = f"sqlite:///{data / 'runner.db'}"
     log = rows(own, "SELECT stream, seq, kind, body, position, chain FROM event ORDER BY position")
@@ -81,7 +76,7 @@ def test_a_note_with_a_nul_keeps_no_run_from_being_copied(data: Path, postgres: 
         run = runner.get("/api/runs").json()[0]["id"]
         marks = {"note": "a\0b", "labels": ["c\0d"]}
         runner.patch(f"/api/runs/{run}/marks", json=marks).raise_for_status()
-    done = command("runs", "copy", "--to", url, "--data", data)
+    done = ran("runs", "copy", "--to", url, "--data", data)
     assert done.returncode == 0, done.stderr
     noted = f"SELECT note FROM action_assistant_runs.review WHERE run = '{run}'"
     assert rows(url, noted) == [("a\ufffdb",)]
@@ -90,10 +85,10 @@ def test_a_note_with_a_nul_keeps_no_run_from_being_copied(data: Path, postgres: 
 @pytest.mark.long
 def test_another_log_is_not_mixed_in(data: Path, tmp_path: Path, postgres: Server) -> None:
     url = postgres.new_database()
-    assert command("runs", "copy", "--to", url, "--data", data).returncode == 0
+    assert ran("runs", "copy", "--to", url, "--data", data).returncode == 0
     change = text("UPDATE action_assistant_runs.event SET chain = '\\x00' WHERE chain IS NOT NULL")
     database_of(url).migrate(lambda c: c.execute(change))
-    refused = command("runs", "copy", "--to", url, "--data", data)
+    refused = ran("runs", "copy", "--to", url, "--data", data)
     assert refused.returncode == 2
     assert "is a copy of another log" in refused.stderr
 
@@ -129,7 +124,7 @@ def test_a_target_that_runs_cannot_be_copied_to_is_refused_with_the_reason(data:
         ("sqlite:///x.db", "is a Postgres database"),
         ("postgresql://aa@127.0.0.1:1/x", "cannot be used"),
     ):
-        refused = command("runs", "copy", "--to", to, "--data", data)
+        refused = ran("runs", "copy", "--to", to, "--data", data)
         assert (refused.returncode, told in refused.stderr) == (2, True), refused.stderr
 
 
@@ -145,7 +140,7 @@ def test_an_archived_conducted_run_is_copied_with_its_pieces(
 
     data, known = asyncio.run(archived())
     url = postgres.new_database()
-    done = command("runs", "copy", "--to", url, "--data", data)
+    done = ran("runs", "copy", "--to", url, "--data", data)
     assert done.returncode == 0, done.stderr
     counted = rows(url, "SELECT run, count(*) FROM action_assistant_runs.run_event GROUP BY run")
     assert dict(counted) == known

@@ -12,7 +12,8 @@ import pytest
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
-from support.product import COMMAND, TOKEN, Product, free_ports, running
+from support.command_line import ran
+from support.product import TOKEN, Product, free_ports, running
 from support.proxy import NGINX, nginx
 
 pytestmark = pytest.mark.skipif(not NGINX, reason="nginx is not installed")
@@ -40,14 +41,7 @@ class Proxied:
         """A command against the public address."""
         environment = {**self.product.environment, "SSL_CERT_FILE": str(self._chain)}
         environment.pop("ACTION_ASSISTANT_URL")
-        return subprocess.run(
-            [*COMMAND, *words],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
+        return ran(*words, environ=environment)
 
     def ask(self, path: str, method: str = "GET", **more: Any) -> httpx.Response:
         """A request below the public address."""
