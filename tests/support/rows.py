@@ -1,13 +1,16 @@
 """Rows for tables of any revision, and what tables hold."""
 
 import json
-from typing import Any
+from typing import Any, Final
 
-from sqlalchemy import JSON, Column, Connection, MetaData, insert, select
+from sqlalchemy import JSON, Column, Connection, MetaData, Table, delete, insert, select
 
 from action_assistant.journal.chain import NOTHING, Head, link
 from action_assistant.journal.events import Event
 from action_assistant.schema.editor_tables import editor_event, editor_head
+
+#: What the program says of itself.
+_OWN: Final = frozenset({"alembic_version", "written_by"})
 
 
 def fill(
@@ -16,12 +19,25 @@ def fill(
     """Put two rows into each table as it is at this revision, `but` some; what they are."""
     metadata = MetaData()
     metadata.reflect(connection)
-    own = {"alembic_version", "written_by"} | but  # what the program says of itself
-    tables = [table for table in metadata.sorted_tables if table.name not in own]
+    tables = [table for table in metadata.sorted_tables if table.name not in _OWN | but]
     for table in tables:
         for n in (1, 2):
             connection.execute(insert(table).values({c.name: value(c, n) for c in table.columns}))
-    return contents(connection, [table.name for table in tables])
+    return _contents(connection, tables)
+
+
+def filled_anew(connection: Connection) -> tuple[dict[str, list[dict[str, Any]]], ...]:
+    """Return the rows of all tables, and those that were put there in their place."""
+    metadata = MetaData()
+    metadata.reflect(connection)
+    tables = [table for table in metadata.sorted_tables if table.name not in _OWN]
+    before = _contents(connection, tables)
+    for table in reversed(tables):
+        connection.execute(delete(table))
+    for table in tables:
+        rows = [{c.name: value(c, n) for c in table.columns} for n in (1, 2)]
+        connection.execute(insert(table), rows)
+    return before, _contents(connection, tables)
 
 
 def value(column: Column[Any], n: int) -> Any:
@@ -35,12 +51,15 @@ def contents(connection: Connection, names: list[str]) -> dict[str, list[dict[st
     """The rows of some tables."""
     metadata = MetaData()
     metadata.reflect(connection, only=names)
+    return _contents(connection, [metadata.tables[name] for name in names])
+
+
+def _contents(connection: Connection, tables: list[Table]) -> dict[str, list[dict[str, Any]]]:
     return {
-        name: sorted(
-            (dict(row) for row in connection.execute(select(metadata.tables[name])).mappings()),
-            key=repr,
+        table.name: sorted(
+            (dict(row) for row in connection.execute(select(table)).mappings()), key=repr
         )
-        for name in names
+        for table in tables
     }
 
 
