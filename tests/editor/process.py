@@ -45,7 +45,7 @@ class Editor:
                 stderr=log,
                 stdout=log,
             )
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 120
         while True:
             with contextlib.suppress(httpx.TransportError):
                 if httpx.get(f"{self.url}/readyz", trust_env=False).status_code == 200:

@@ -51,7 +51,7 @@ class RunnerProcess:
                 stdout=log,
                 stderr=log,
             )
-        deadline = time.monotonic() + 40
+        deadline = time.monotonic() + 120
         while not self._ready():
             if time.monotonic() > deadline or self._process.poll() is not None:
                 raise AssertionError(f"not ready:\n{self._log.read_text()[-4000:]}")

@@ -41,7 +41,7 @@ def started(
             stderr=log,
         )
     try:
-        deadline = time.monotonic() + 40
+        deadline = time.monotonic() + 120
         while True:
             try:
                 url = f"{scheme}://127.0.0.1:{port}/readyz"

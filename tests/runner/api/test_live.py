@@ -157,8 +157,8 @@ async def test_a_page_that_does_not_read_is_owed_one_state_of_each_run() -> None
         box = Outbox(hub, lambda: True, Identity(Person(ANN.id, ANN.name)))
         hub.boxes.add(box)
         run = (await control.start(order(carousel(), script=BUSY), ANN)).run
-        await anyio.sleep(30)
-        assert control.open[run.id].revision > 1_000
+        await anyio.sleep(10)
+        assert control.open[run.id].revision > 300
         sent: list[dict[str, Any]] = []
 
         async def send(text: str) -> None:
@@ -168,7 +168,7 @@ async def test_a_page_that_does_not_read_is_owed_one_state_of_each_run() -> None
             await box.deliver(send)
         states = [each for each in sent if each["type"] == "run"]
         assert len(states) == 1
-        assert states[0]["run"]["actions"]["Work_0"]["older"] > 100
+        assert states[0]["run"]["actions"]["Work_0"]["older"] > 30
 
 
 @virtual
@@ -197,9 +197,9 @@ async def test_the_answer_to_a_stop_goes_before_everything_that_waits() -> None:
         hub = Hub(control, clock_us)
         box = Outbox(hub, lambda: True, Identity(Person(ANN.id, ANN.name)))
         hub.boxes.add(box)
-        for i in range(20):
+        for i in range(5):
             await control.start(order(carousel(f"busy{i}"), script=BUSY), ANN)
-        await anyio.sleep(5)
+        await anyio.sleep(1)
         box.post(await hub.follow('{"type":"stop","run":"all","stop_id":"s"}', ANN))
         first: list[str] = []
 
