@@ -17,7 +17,7 @@ unit e2e ros-test soak soak-ros pictures screens browsers bench: export ROS_AUTO
 PYTHON ?= python3
 BIN := .venv/bin
 # How many processes share the Python tests, of which many wait; each test file stays with one.
-PROCESSES ?= 4
+PROCESSES ?= 3
 ROS := .venv-ros/bin
 # Tests see nothing of a sourced ROS 2 either; `make run` does.
 BARE := env -u AMENT_PREFIX_PATH -u COLCON_PREFIX_PATH -u LD_LIBRARY_PATH
@@ -96,7 +96,7 @@ figures: .venv/.done ## sizes and language of the code, today and at an earlier 
 .PHONY: test
 test: setup ros ## every check and every test, also in a real browser
 	@# Most of these wait for processes and robots: together they take little longer than the longest.
-	@$(MAKE) --no-print-directory --jobs=4 --output-sync=target check unit ros-test
+	@$(MAKE) --no-print-directory --jobs=5 --output-sync=target check unit ros-test
 	@$(MAKE) --no-print-directory e2e
 
 .PHONY: unit
@@ -114,10 +114,16 @@ unit-page: setup ## the tests of the pure parts of the page
 	@echo "» vitest"
 	@$(NPM) run --silent test
 
+# They mostly wait for robots, so two processes share the files, by their first letters.
+ROS_HALVES := ros-test-a-l ros-test-m-z
+
 .PHONY: ros-test
-ros-test: ros ## tests over real rclpy, on loopback
-	@echo "» pytest over rclpy"
-	@$(BARE) $(ROS)/python -m pytest -q tests/ros $(PYTEST)
+ros-test: $(ROS_HALVES) ## tests over real rclpy, on loopback
+
+$(ROS_HALVES): ros-test-%: ros
+	@echo "» pytest over rclpy, $*"
+	@# 5: with PYTEST="-k …" this half may have no test.
+	@$(BARE) $(ROS)/python -m pytest -q tests/ros/test_[$*]*.py $(PYTEST) || test "$$?$(if $(PYTEST),,!)" = 5
 
 .PHONY: contract
 contract: ros ## what a link promises, with a real engine: NAME=David [DOMAIN=0] [RMW=…] [ACTION=…]; it moves

@@ -89,9 +89,9 @@ def test_an_engine_on_another_domain_than_its_robot_is_registered_on_is_named(
     ("setting", "value", "code"),
     [
         ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp", "middleware-broken"),
-        ("ROS_DOMAIN_ID", "lab", "domain-wrong"),
+        pytest.param("ROS_DOMAIN_ID", "lab", "domain-wrong", marks=pytest.mark.long),
         ("ROS_DOMAIN_ID", "120", "domain-high"),
-        ("ROS_VERSION", "1", "ros1-sourced"),
+        pytest.param("ROS_VERSION", "1", "ros1-sourced", marks=pytest.mark.long),
     ],
 )
 def test_a_setting_that_cannot_be_is_named(

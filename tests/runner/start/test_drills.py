@@ -1,6 +1,5 @@
 """Stop drills, released versions, and the rules of owners that nothing starts against."""
 
-import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -39,8 +38,8 @@ from runner.harness import (
 from runner.registered_robots import group
 from runner.start.test_rights_registry import ANN, BEN, OLGA, author, david, lab
 from runner.start.test_start_rules import item
+from support.doses import examples
 
-EXAMPLES: Final = int(os.environ.get("TEST_EXAMPLES", "30"))
 DAY_US: Final = 86_400_000_000
 NOW: Final = 1_900_000_000_000_000
 WEEKLY: Final = Rules(drill_days=7)
@@ -488,7 +487,7 @@ async def begin(case: Case) -> tuple[int, int, str]:
         return len(robot.starts), len(robot.stops), why
 
 
-@settings(max_examples=EXAMPLES, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(CASES)
 def test_nothing_starts_against_a_rule_and_everything_else_does(case: Case) -> None:
     starts, stops, why = run_in_virtual_time(lambda: begin(case))
