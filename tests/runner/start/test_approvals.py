@@ -193,7 +193,10 @@ def test_a_browser_is_known_again_by_both_processes_after_somebody_has_signed_ou
     tmp_path: Path,
 ) -> None:
     graph = json.loads(bytes(order(sequence()).umrf))
-    with running(tmp_path / "data") as product, httpx.Client(trust_env=False, timeout=60) as browser:
+    with (
+        running(tmp_path / "data") as product,
+        httpx.Client(trust_env=False, timeout=60) as browser,
+    ):
         browser.headers["origin"] = product.url
         program = {"authorization": f"Bearer {TOKEN}"}
         robot = {"name": "David", "domain": 180, "profile": {"second_person": True}}

@@ -1,5 +1,6 @@
 """Stop drills, released versions, and the rules of owners that nothing starts against."""
 
+import os
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
