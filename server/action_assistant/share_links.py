@@ -1,4 +1,4 @@
-"""What `serve --share` prints: a link and a QR code for each role."""
+"""The text that `serve --share` prints: a link and a QR code for each role."""
 
 import io
 import ipaddress

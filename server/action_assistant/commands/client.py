@@ -1,4 +1,4 @@
-"""How commands talk to a running server: with the token, over HTTP or TLS."""
+"""The client by which commands talk to a running server: with the token, over HTTP or TLS."""
 
 import argparse
 import contextlib

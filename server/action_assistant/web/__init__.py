@@ -1,1 +1,1 @@
-"""What both HTTP applications share: who may call, and how refusals look."""
+"""Parts that both HTTP applications share: access control, and the form of refusals."""

@@ -1,4 +1,4 @@
-"""What a data folder holds, as `backup` and `restore` see it: journals, keys, archives, and the rest."""
+"""The contents of a data folder, as `backup` and `restore` see it: journals, keys, archives, and the rest."""
 
 import asyncio
 import os

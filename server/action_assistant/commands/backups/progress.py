@@ -1,4 +1,4 @@
-"""How far something has come that takes a while, said on stderr."""
+"""The progress of long work, printed to stderr."""
 
 import sys
 import time

@@ -1,4 +1,4 @@
-"""Which installation is looked at."""
+"""The installation that is examined."""
 
 from pathlib import Path
 

@@ -1,1 +1,1 @@
-"""Who may call: keys, sessions, roles, revocations."""
+"""Access control: keys, sessions, roles, revocations."""

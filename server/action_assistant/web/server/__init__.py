@@ -1,1 +1,1 @@
-"""How a process listens, what stands before it, and the application it serves."""
+"""The sockets of a process, the proxy before it, and the application that it serves."""
