@@ -75,6 +75,9 @@ def test_what_is_made_of_graphs_is_for_those_who_may_see_all_of_them(
         assert all(may_see(rule, identity) for rule in every)
     if may_edit(made, identity):
         assert all(may_edit(rule, identity) for rule in every)
+    if not identity.groups:  # of groups nobody knows here who else is in them
+        assert may_see(made, identity) == all(may_see(rule, identity) for rule in every)
+        assert may_edit(made, identity) == all(may_edit(rule, identity) for rule in every)
     if all(rule == OPEN for rule in every):
         assert made == OPEN
 
