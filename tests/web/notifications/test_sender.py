@@ -268,6 +268,33 @@ async def test_no_message_that_cannot_be_read_or_sent_ends_the_process_or_keeps_
     await journal.close()
 
 
+async def test_a_message_on_which_this_program_fails_switches_no_receiver_off(
+    tmp_path: Path,
+) -> None:
+    journal, took = await _open(tmp_path), Counter[str]()
+
+    def deliver(receiver: Receiver, message: Message, page: str) -> None:
+        del receiver, page
+        if message.id == "run/x:1:a":
+            raise ZeroDivisionError
+        took[message.id] += 1
+
+    sender = Notifications(
+        *(journal, RECEIVERS[:1], ["run.ended"], ""),
+        clock_us=Clock(),
+        deliver=deliver,
+        look_s=0,
+        gap_s=0,
+    )
+    await journal.append("run/x", [EVENT])
+    async with sender.sending():
+        await _until(lambda: _is_over(journal))
+        await journal.append("run/x", [EVENT])
+        await _until(lambda: _true(took["run/x:2:a"]))
+    assert [(each.off, each.failed) for each in await sender.states()] == [("", 1)]
+    await journal.close()
+
+
 async def test_another_address_of_a_receiver_is_tried_again(tmp_path: Path) -> None:
     journal = await _open(tmp_path)
     old = Notifications(journal, [webhook("https://a.example/", "a")], ["run.ended"], "")

@@ -37,6 +37,10 @@ _GIVEN_UP: Final = "Its last try has failed, too; nothing is sent any more."
 Deliver = Callable[[Receiver, Message, str], None]
 
 
+class _OwnFault(NotDelivered):
+    """A message that this program could not send by a fault of its own: its receiver stays on."""
+
+
 class Notifications:
     """The receivers of one process, and the messages to them. `kinds`: those that this process
     sends; `page`: the public URL of the page, "" if there is none."""
@@ -148,7 +152,8 @@ class Notifications:
             return
         log.warning("%s was not sent to %s: %s", id_, receiver.name, failure)
         why, is_final = str(failure), failure.is_final
-        if not await self._until_stored(self.outbox.failed, due, why, now, is_final=is_final):
+        goes_on = await self._until_stored(self.outbox.failed, due, why, now, is_final=is_final)
+        if not goes_on and not isinstance(failure, _OwnFault):
             await self._switch_off(receiver, why if is_final else f"{why} {_GIVEN_UP}", now)
 
     async def _switch_off(self, receiver: Receiver, why: str, now: int) -> None:
@@ -182,7 +187,7 @@ class Notifications:
                 outcome = error
             except Exception:
                 log.exception("a message could not be sent")
-                outcome = NotDelivered("This program has failed; its log says why.")
+                outcome = _OwnFault("This program has failed; its log says why.")
             with suppress(RuntimeError):  # the loop was closed meanwhile
                 loop.call_soon_threadsafe(settle, outcome)
 
