@@ -13,7 +13,7 @@ import httpx
 import pytest
 
 from action_assistant.errors import NotFound, Unavailable
-from action_assistant.web.auth import sessions
+from action_assistant.web.auth import session_files, sessions
 from action_assistant.web.auth.identity import Credential, Standing
 from action_assistant.web.auth.keys import Keys, PersonRef, Session
 from action_assistant.web.auth.released_versions import Release, ReleasedVersions
@@ -407,6 +407,18 @@ def test_signing_a_person_out_ends_idle_sessions_too(tmp_path: Path) -> None:
     assert files.every() == []
     assert files.end_all_of("mari").ids == [idle.id]
     assert revoked.ended(idle)  # whatever limits an owner gives later
+
+
+def test_guests_that_fill_the_list_of_sessions_hide_no_person_that_an_owner_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(session_files, "_MOST", 2)
+    files, keys = SessionFiles(tmp_path, Revocations(tmp_path)), Keys("k" * 43)
+    for number in range(3):
+        files.note(keys.new_session(f"guest {number}", role="viewer", invitation="link"))
+    files.note(keys.new_session("Mari", person_id="mari", personal=True))
+    assert {each.person.name for each in files.every()} == {"guest 0", "guest 1", "Mari"}
+    assert len(files.end_all_of("mari").ids) == 1
 
 
 def test_one_release_that_cannot_be_withdrawn_or_stored_keeps_no_other_one(tmp_path: Path) -> None:

@@ -86,10 +86,12 @@ class SessionFiles:
         self._is_over = is_over
 
     def note(self, session: Session, browser: str = "", address: str = "") -> None:
-        """Store a session for the list of open sessions. A full disk or list is no error."""
+        """Store a session for the list of open sessions. A full disk is no error; neither is a list that
+        is full of guests, who may sign in again and again: persons that an owner named stand in it."""
         sealed: dict[str, Any] = msgspec.structs.asdict(session)
         noted = NotedSession(**sealed, browser=browser, address=address)
-        if self._noted.get(session.id) == noted or len(self._noted) >= _MOST:
+        is_full = len(self._noted) >= _MOST and not session.personal
+        if self._noted.get(session.id) == noted or is_full:
             return
         path = self._path(session.id)
         try:
