@@ -69,6 +69,7 @@ EXCEPT: Final = {
     "runner post /api/runs/{run}/at_rest": "in tests/runner/execution/test_truth.py",
     "runner post /api/runs/{run}/go_on": "in tests/runner/execution/test_led_presses.py",
     "runner post /api/runs/{run}/step": "in tests/runner/execution/test_led_steps.py",
+    "runner put /api/runs/{run}/breakpoints": "in tests/runner/execution/test_led_breakpoints.py",
     "runner post /api/runs/{run}/wait": "in tests/runner/execution/test_led_steps.py",
     "runner post /api/runs/{run}/outcome": "in tests/runner/execution/test_led_presses.py",
 }

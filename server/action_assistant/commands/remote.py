@@ -68,6 +68,15 @@ def _add_run(run: argparse.ArgumentParser) -> None:
         "default: %(default)s",
     )
     run.add_argument(
+        "--break",
+        dest="breaks",
+        type=_break,
+        action="append",
+        default=[],
+        metavar="NAME[:VISIT]",
+        help="with --robots: wait before this action, at each visit or at this one; again for each",
+    )
+    run.add_argument(
         "--accept",
         nargs=2,
         metavar=("CODE,…", "REASON"),
@@ -87,6 +96,17 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     run.add_argument("--label", default="", help="of the version")
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
     run.set_defaults(handler=_run)
+
+
+def _break(text: str) -> dict[str, Any]:
+    """Return the breakpoint before an action; `text`: its full name, perhaps with a visit. Raise
+    ArgumentTypeError for a visit that is no number from 1."""
+    name, colon, visit = text.rpartition(":")
+    if not colon:
+        return {"action": text}
+    if not visit.isdecimal() or int(visit) < 1:
+        raise argparse.ArgumentTypeError(f"{visit!r} is no visit: 1, 2, …")
+    return {"action": name, "visit": int(visit)}
 
 
 def _robots(text: str) -> dict[str, str]:
@@ -212,6 +232,8 @@ def _run(options: argparse.Namespace) -> int:
             order |= {name: version[name] for name in ("subgraphs", "tree_digest")}
         if options.robots is not None:
             order |= {"engine": "conducted", "robots": options.robots, "lost": options.lost}
+        if options.breaks:
+            order["breakpoints"] = options.breaks
         if options.watching:
             order["watching"] = dict.fromkeys(options.watching, True)
         if options.drill:

@@ -37,11 +37,13 @@ from action_assistant.runner.runs.events import (
 from action_assistant.runner.runs.run import ENDED
 from action_assistant.runner.runs.views import time
 from action_assistant.runner.start.admission import (
+    BreakpointsRequest,
     GoOnRequest,
     StartRequest,
     StepRequest,
     WaitRequest,
 )
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.facts import PINNED
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.kept_values import keeper
@@ -228,6 +230,12 @@ class Story:
         opened = control.open.get(self.run)
         if opened is None:
             return
+        if chance.random() < 0.3:
+            node, visit = chance.choice(sorted(opened.run.actions)), chance.randint(0, 2)
+            marks = (Breakpoint(action=node, visit=visit),) if chance.random() < 0.8 else ()
+            with suppress(Refused):
+                asked = BreakpointsRequest(marks, opened.run.breakpoints)
+                await control.set_breakpoints(self.run, asked, BEN)
         if opened.run.held is None:
             if chance.random() < 0.6:
                 with suppress(Refused):
@@ -235,11 +243,11 @@ class Story:
                     assert opened.run.held is not None or opened.run.end is not None
             return
         goal = {"until": chance.choice(sorted(opened.run.actions))} if chance.random() < 0.3 else {}
-        asked = StepRequest(time(opened.run.held.at), **goal)
+        pressed = StepRequest(time(opened.run.held.at), **goal)
 
         async def press(author: Author) -> None:
             with suppress(Refused):
-                await control.step(self.run, asked, author)
+                await control.step(self.run, pressed, author)
 
         async with anyio.create_task_group() as presses:
             for author in (ANN, BEN)[: chance.randint(1, 2)]:

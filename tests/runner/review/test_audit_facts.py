@@ -14,6 +14,7 @@ from action_assistant.runner.robots import rights
 from action_assistant.runner.robots.robot_events import stream_of_robot
 from action_assistant.runner.runs.events import (
     Author,
+    BreakpointsSet,
     HandedOver,
     Held,
     Released,
@@ -61,6 +62,11 @@ LOCK = rights.Lock(PersonRef("ada", "Ada"), 1, "its brake is loose")
             RUN,
             Held(at=1, why="Ada made it wait: Look.", by=ADA, how="wait", reason="Look."),
             "made the run r1 wait: Look.",
+        ),
+        (
+            RUN,
+            BreakpointsSet(at=1, author=ADA, breakpoints=()),
+            "set the breakpoints of the run r1",
         ),
         (
             RUN,

@@ -38,7 +38,7 @@ Kind = Literal[
 #: Routes for people alone, whatever the scopes of a program.
 PERSON_ONLY: Final = re.compile(
     r"(get|post) /api/tokens$|/api/logins/(look|confirm|refuse)|/api/devices|post /api/approvals"
-    r"|post /api/robots/.*/drills|/api/runs/[^/]+/(at_rest|go_on|step|outcome)|/api/tokens/.*/revoke$"
+    r"|post /api/robots/.*/drills|/api/runs/[^/]+/(at_rest|go_on|step|outcome|breakpoints)|/api/tokens/.*/revoke$"
     r"|/api/confirmations|/api/passkeys|/api/mentions|/api/approvals/asked"
 )
 #: Scopes that no token gets, and the one that is asked anyway.

@@ -45,6 +45,7 @@ FOR_PEOPLE = {
     ("post", "/api/runs/{run}/at_rest"),
     ("post", "/api/runs/{run}/go_on"),
     ("post", "/api/runs/{run}/step"),
+    ("put", "/api/runs/{run}/breakpoints"),
     ("post", "/api/runs/{run}/outcome"),
     ("post", "/api/robots/{name}/drills"),
 }

@@ -369,6 +369,37 @@ export interface RunnerApi {
         problem: string;
     };
     /**
+     * Breakpoint
+     * @description Lets a led run wait before the action with the full name `action` begins; after it has ended, if
+     *     it has `outcomes`; or when it has ended and the arrow to the action `to` ("exit": the end of the
+     *     graph) lets that go on. `visit`: only at this visit of `action`, from 1; 0 for each. `value`: only
+     *     if an input meets this, or, after its end, an output.
+     */
+    Breakpoint: {
+        action: string;
+        /** @default  */
+        to?: string;
+        /** @default 0 */
+        visit?: number;
+        /** @default [] */
+        outcomes?: ("error" | "false" | "true")[];
+        /** @default null */
+        value?: RunnerApi["ValueTest"] | null;
+    };
+    /**
+     * BreakpointsRequest
+     * @description Sets the breakpoints of a led run. `was`: those that the person saw; if there are others now, it
+     *     is refused. `watching`: as in `StartRequest`, if one of them is taken away.
+     */
+    BreakpointsRequest: {
+        breakpoints: RunnerApi["Breakpoint"][];
+        was: RunnerApi["Breakpoint"][];
+        /** @default {} */
+        watching?: {
+            [key: string]: boolean;
+        };
+    };
+    /**
      * Candidate
      * @description An engine that discovery shows. `actor`: its name, "" until its feedback was received, since
      *     an engine without a running graph does not send its name; a person has to know it then.
@@ -733,6 +764,8 @@ export interface RunnerApi {
         drill?: boolean;
         /** @default null */
         sight?: RunnerApi["Sight"] | null;
+        /** @default [] */
+        breakpoints?: RunnerApi["Breakpoint"][];
     };
     /**
      * GroupShown
@@ -974,6 +1007,7 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         held: RunnerApi["HeldShown"] | null;
+        breakpoints?: RunnerApi["Breakpoint"][];
         lead?: RunnerApi["Author"];
         batons?: string[];
         watching?: string[];
@@ -1890,6 +1924,7 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         held: RunnerApi["HeldShown"] | null;
+        breakpoints?: RunnerApi["Breakpoint"][];
         lead?: RunnerApi["Author"];
         batons?: string[];
         watching?: string[];
@@ -1907,7 +1942,7 @@ export interface RunnerApi {
      * @description A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
      *     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
      *     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
-     *     further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
+     *     further; `breakpoints`: where it waits; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
      *     held at the start; `watching`: those that they said to watch. `hidden`: the
      *     reader may not see its graph, so that little else is given.
      */
@@ -1945,6 +1980,7 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         held: RunnerApi["HeldShown"] | null;
+        breakpoints?: RunnerApi["Breakpoint"][];
         lead?: RunnerApi["Author"];
         batons?: string[];
         watching?: string[];
@@ -1990,6 +2026,7 @@ export interface RunnerApi {
             [key: string]: string;
         } | null;
         held: RunnerApi["HeldShown"] | null;
+        breakpoints?: RunnerApi["Breakpoint"][];
         lead?: RunnerApi["Author"];
         batons?: string[];
         watching?: string[];
@@ -2249,6 +2286,8 @@ export interface RunnerApi {
         drill?: boolean;
         /** @default null */
         sight?: RunnerApi["Sight"] | null;
+        /** @default [] */
+        breakpoints?: RunnerApi["Breakpoint"][];
     };
     /**
      * StartShown
@@ -2447,6 +2486,16 @@ export interface RunnerApi {
         of?: string;
     };
     /**
+     * ValueTest
+     * @description A condition on a value by its flat name (`pose::x`). No value is unequal to all.
+     */
+    ValueTest: {
+        name: string;
+        /** @enum {string} */
+        test: "!=" | "<" | "<=" | "==" | ">" | ">=";
+        value: boolean | number | string;
+    };
+    /**
      * ViewLink
      * @description A link as owners see it. `path` follows the address of the page, and holds the secret.
      *     `opened`: how often somebody opened it, `opened_at` the last time.
@@ -2594,6 +2643,9 @@ export interface RunnerPaths {
     };
     "/api/runs/{run}/wait": {
         post: RunnerOperations["waitRun"];
+    };
+    "/api/runs/{run}/breakpoints": {
+        put: RunnerOperations["setBreakpoints"];
     };
     "/api/runs/{run}/outcome": {
         post: RunnerOperations["giveOutcome"];
@@ -3038,6 +3090,25 @@ interface RunnerOperations {
         requestBody?: {
             content: {
                 "application/json": RunnerApi["WaitRequest"];
+            };
+        };
+        responses: {
+            202: {
+                content: {
+                    "application/json": RunnerApi["RunShown"];
+                };
+            };
+        };
+    };
+    setBreakpoints: {
+        parameters: {
+            path: {
+                run: string;
+            };
+        };
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["BreakpointsRequest"];
             };
         };
         responses: {

@@ -23,7 +23,7 @@ from action_assistant.runner.analysis.course_checks import (
     propose,
 )
 from action_assistant.runner.analysis.expected_runs import Expect, Expectation
-from action_assistant.runner.api import review, rights, robots
+from action_assistant.runner.api import led_runs, review, rights, robots
 from action_assistant.runner.api.caller import COUNTED, GRAPH_BODY, author_of, body_of, start_of
 from action_assistant.runner.api.live import (
     PageMessage,
@@ -51,12 +51,8 @@ from action_assistant.runner.runs.events import Author
 from action_assistant.runner.runs.run import Run, State
 from action_assistant.runner.runs.sight import run_graphs
 from action_assistant.runner.start.admission import (
-    GoOnRequest,
     ResumeRequest,
     StartRequest,
-    StepRequest,
-    WaitRequest,
-    WordRequest,
     decoded,
     read_request,
 )
@@ -103,6 +99,7 @@ def routes(services: RunnerServices) -> list[ControllerRouterHandler]:
     every = [
         *_starts(services),
         *_commands(services),
+        *led_runs.routes(services),
         *_queries(services),
         *robots.routes(services),
         *rights.routes(services),
@@ -250,62 +247,7 @@ def _commands(services: RunnerServices) -> list[ControllerRouterHandler]:
         asked = decoded(await request.body(), RestRequest)
         return views.run_view(await services.control.confirm_rest(run, asked, author_of(request)))
 
-    @post(
-        "/api/runs/{run:str}/go_on",
-        operation_id="goOn",
-        status_code=202,
-        summary="Let a held run go on: its robots may begin to move",
-        opt=reads(GoOnRequest),
-        guards=[StartNeeds(services, "go_on", "operate", of_people=True)],
-    )
-    async def go_on(run: str, request: _Asking) -> views.RunShown:
-        asked = decoded(await request.body(), GoOnRequest)
-        with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
-            me = identity_of(request)
-            return views.run_view(await services.control.go_on(run, asked, author_of(request), me))
-
-    @post(
-        "/api/runs/{run:str}/step",
-        operation_id="stepRun",
-        status_code=202,
-        summary="Let one action of a held run begin, then hold it again: a robot may begin to move",
-        opt=reads(StepRequest),
-        guards=[StartNeeds(services, "go_on", "operate", of_people=True)],
-    )
-    async def step(run: str, request: _Asking) -> views.RunShown:
-        asked = decoded(await request.body(), StepRequest)
-        with noted(services, request, StartRefused(what="go_on", why="", run=run[:100])):
-            me = identity_of(request)
-            return views.run_view(await services.control.step(run, asked, author_of(request), me))
-
-    @post(
-        "/api/runs/{run:str}/wait",
-        operation_id="waitRun",
-        status_code=202,
-        summary="Let a led run begin nothing further; what is under way goes on",
-        opt=reads(WaitRequest | None),
-        guards=[Needs("operate")],
-    )
-    async def wait(run: str, request: _Asking) -> views.RunShown:
-        asked = decoded(await request.body() or b"{}", WaitRequest)
-        return views.run_view(await services.control.wait(run, asked, author_of(request)))
-
-    @post(
-        "/api/runs/{run:str}/outcome",
-        operation_id="giveOutcome",
-        status_code=200,
-        summary="Give the outcome of an action in a led run, where nothing shows it",
-        opt=reads(WordRequest),
-        guards=[PersonOnly(), Needs("operate")],
-    )
-    async def outcome(run: str, request: _Asking) -> views.RunShown:
-        asked = decoded(await request.body(), WordRequest)
-        me = identity_of(request)
-        return views.run_view(
-            await services.control.give_outcome(run, asked, author_of(request), me)
-        )
-
-    return [stop_all, stop, pause, resume, modify, at_rest, go_on, step, wait, outcome]
+    return [stop_all, stop, pause, resume, modify, at_rest]
 
 
 def _queries(services: RunnerServices) -> list[ControllerRouterHandler]:

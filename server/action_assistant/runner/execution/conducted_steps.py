@@ -28,6 +28,7 @@ from action_assistant.runner.runs.events import (
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runs.visits import ActionRun
 from action_assistant.runner.start.piece_texts import PieceText
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.facts import SIMULATED
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.led_subgraphs import StatesInside, outcome_of_subgraph
@@ -91,7 +92,8 @@ class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
     """A led run that an earlier process left unfinished. `order`: its start; `course`: the outcomes
     so far; `sent`: the highest number of a piece; `pieces`: by the number of each call without an
     outcome, the piece and the seq of its last event; `again`: pieces that moved again after their
-    outcome, each with that seq; `states`: of the actions that robots carry out; `unproven`: the last
+    outcome, each with that seq; `calls`: all calls so far, with the full names of their actions; `breakpoints`:
+    those that count; `states`: of the actions that robots carry out; `unproven`: the last
     piece that ended without a proof of rest by an answer, None if there is none."""
 
     order: Order
@@ -101,6 +103,8 @@ class LeftOpen(msgspec.Struct, frozen=True, kw_only=True):
     again: tuple[tuple[Run, int], ...]
     states: dict[str, str]
     unproven: Run | None
+    calls: dict[int, str] = {}
+    breakpoints: tuple[Breakpoint, ...] = ()
 
 
 class Step:

@@ -145,6 +145,8 @@ class Conductor:
         self._clock_us = clock_us
         self.gate: Final = LedGate(first, lead, robots, look, clock_us, self._tell)
         self._left = left
+        if left is not None:
+            self.gate.take_up(left)
         self._leading: Leading | None = None
         self._steps: dict[int, Step] = {}
         self._turns = {name: anyio.Lock() for name in self._led.robots.values()}
@@ -490,6 +492,7 @@ class Conductor:
         """Raise NotSent if a piece that is about to leave may not begin. The call does not wait."""
         if self.gate.is_open and (why := self.gate.why_not_allowed(step.engine)):
             self.gate.hold_run(why)
+        self.gate.halt_before(step)
         if not self.gate.lets(step) or step.is_stopped:
             step.was_held_back = True
             raise NotSent("the run was held or stopped before it left")
@@ -607,6 +610,7 @@ class Conductor:
         if lacking := self._values.lacking(ended):
             self._alarm("led_unset", f"{step.node} on {step.engine} {lacking}")
         returned = returned_of(ended)
+        self.gate.halt_after(step, outcome, returned.outputs)
         self._course.append((self._now_ms(), returned))
         with suppress(NotSent, NoAnswer):  # another engine is told by its course
             await self._engine.returned(returned)

@@ -44,6 +44,7 @@ from action_assistant.runner.runs.run import Run
 from action_assistant.runner.runtime import Runtime
 from action_assistant.runner.start.idempotency import IdempotentStarts
 from action_assistant.runner.start.piece_texts import PieceText, piece_texts
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.semantics import Returned
 from action_assistant.web.auth.identity import Identity
 
@@ -182,6 +183,12 @@ class Conductors:
         may begin no piece."""
         await self._conductor(run).go_on(press)
 
+    def set_breakpoints(
+        self, run: str, author: Author, breakpoints: tuple[Breakpoint, ...]
+    ) -> None:
+        """Let a run wait at these breakpoints from now on. Raise Conflict if nothing leads it."""
+        self._conductor(run).gate.set_breakpoints(author, breakpoints)
+
     async def wait(self, run: str, author: Author, reason: str, request_id: str) -> None:
         """Let nothing further begin in a run, in the step of this call, then wait until that is
         stored. `reason`: may be "". Raise Conflict if nothing leads the run, OutcomeUnknown if it is not
@@ -258,6 +265,7 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
     noted: set[str] = set()
     newest: dict[int, str] = {}  # the last noted piece of each call without an outcome
     over: set[int] = set()  # the calls with an outcome
+    calls: dict[int, str] = {}
     after = 0
     while events := await history.events(first.run, after, _PAGE):
         after = events[-1].seq
@@ -265,12 +273,14 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
             match decode(stored.kind, stored.body):
                 case Published(at=at):
                     began = at
-                case PieceBegan(call=call, piece=piece):
+                case PieceBegan(call=call, piece=piece, node=node):
+                    calls[call] = node
                     noted.add(piece)
                     newest[call] = piece
                 case PieceEnded(at=at, call=call, how=how, piece=piece) as ended:
                     if how == "word":
                         unproven = (await history.left(piece))[0] or unproven
+                    calls[call] = ended.node
                     newest.pop(call, None)
                     over.add(call)
                     ends.append((at, returned_of(ended)))
@@ -299,6 +309,8 @@ async def _left_open(history: RunHistory, first: Requested, now: Run) -> LeftOpe
         again=tuple(again),
         states={name: each.state for name, each in now.actions.items() if each.robot},
         unproven=unproven,
+        calls=calls,
+        breakpoints=now.breakpoints,
     )
 
 

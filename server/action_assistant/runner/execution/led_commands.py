@@ -12,7 +12,7 @@ from action_assistant.runner.execution.conducted_steps import UNLIMITED, GoOn, S
 from action_assistant.runner.execution.conductors import Conductors
 from action_assistant.runner.execution.run_loop import OpenRun
 from action_assistant.runner.robots.rights import Claim
-from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.events import Author, Requested
 from action_assistant.runner.runs.run import (
     Press,
     Run,
@@ -24,10 +24,12 @@ from action_assistant.runner.runs.run import (
 from action_assistant.runner.runs.sight import RunSight, run_graphs
 from action_assistant.runner.runs.views import microseconds, time
 from action_assistant.runner.start.admission import (
+    BreakpointsRequest,
     GoOnRequest,
     StepRequest,
     WaitRequest,
     WordRequest,
+    pinned_for_text,
     watched_in,
 )
 from action_assistant.runner.start.rights_registry import RightsRegistry
@@ -35,6 +37,7 @@ from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.caller import origin_of
 from action_assistant.web.auth.identity import Identity
 from action_assistant.web.auth.keys import Person
+from action_assistant.web.workers.lanes import RunInWorker
 
 #: The outcomes that a person can give.
 _OUTCOMES: Final[Mapping[str, Precondition]] = {
@@ -46,7 +49,7 @@ _OUTCOMES: Final[Mapping[str, Precondition]] = {
 
 class LedCommands:
     """Carries out commands of people on led runs. `movable` finds an open run, or raises; `find` finds
-    any run. In its methods, `author` is the person in whose name the command is recorded."""
+    any run, `requested` its first event; `in_worker` calls a function in a worker. In its methods, `author` is the person in whose name the command is recorded."""
 
     def __init__(
         self,
@@ -56,12 +59,16 @@ class LedCommands:
         *,
         movable: Callable[[str], Awaitable[OpenRun]],
         find: Callable[[str], Awaitable[Run]],
+        requested: Callable[[str], Awaitable[Requested]],
+        in_worker: RunInWorker,
     ) -> None:
         self._conductors = conductors
         self._rights = rights
         self._sight = sight
         self._movable = movable
         self._find = find
+        self._requested = requested
+        self._in_worker = in_worker
 
     def require_rights(
         self, run: Run, author: Author, identity: Identity | None, claim: Claim | None = None
@@ -113,6 +120,31 @@ class LedCommands:
                 raise Conflict("The run is being stopped.")
             await self._conductors.wait(run, author, asked.reason, asked.request_id)
             return opened.run
+
+    async def set_breakpoints(
+        self, run: str, asked: BreakpointsRequest, author: Author, identity: Identity | None = None
+    ) -> Run:
+        """Let a led run wait at these breakpoints from now on, and return the run. To take one away is
+        a start. Raise NotFound if there is no such run, Conflict if it is over, not led, or has other
+        breakpoints than the author saw, BadInput for a place where no run can wait; Forbidden or
+        Conflict if one is taken away and the author may not start on each robot of the run."""
+        opened = no_piece(await self._movable(run))
+        if opened.run.led is None or opened.run.simulated:
+            raise Conflict("Its engine has the whole graph: only a run that is led can wait.")
+        first = await self._requested(run)
+        wanted = await self._in_worker(pinned_for_text, first.umrf, asked.breakpoints)
+        opened = no_piece(await self._movable(run))
+        now = opened.run
+        if now.breakpoints == wanted:
+            return now
+        if now.breakpoints != asked.was:
+            text = "Somebody has set other breakpoints meanwhile. Look at them first."
+            raise Conflict(text, where={"path": "/was"})
+        if set(now.breakpoints) - set(wanted):
+            watching = watched_in(asked.watching, now.robots)
+            self.require_rights(now, author, identity, claim_of(now, watching))
+        self._conductors.set_breakpoints(run, author, wanted)
+        return opened.run
 
     async def _go_on_once(
         self,

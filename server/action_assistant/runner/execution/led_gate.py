@@ -5,8 +5,8 @@ There is one gate. A person's *Wait*, the end of a step, a breakpoint, and each 
 hold it, and only *go on* or a step opens it. A step opens it for one call.
 """
 
-from collections.abc import Awaitable, Callable, Iterable
-from typing import Final
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from typing import Any, Final
 
 from msgspec.structs import replace
 
@@ -15,6 +15,7 @@ from action_assistant.kit.clock import ClockUs
 from action_assistant.runner.execution.conducted_steps import (
     Gate,
     GoOn,
+    LeftOpen,
     Step,
     StepLimit,
     Tell,
@@ -24,6 +25,7 @@ from action_assistant.runner.robots.registry import Robots
 from action_assistant.runner.robots.rights import Claim
 from action_assistant.runner.runs.events import (
     Author,
+    BreakpointsSet,
     HandedOver,
     Held,
     HeldHow,
@@ -31,7 +33,13 @@ from action_assistant.runner.runs.events import (
     Released,
     Requested,
 )
+from action_assistant.umrf.breakpoints import Breakpoint
+from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.semantics import Call
 from action_assistant.web.auth.identity import Identity
+
+#: Reasons that replace another one: whoever lets the run go on has seen the most serious.
+_RANK: Final[Mapping[HeldHow, int]] = {"wait": 0, "step": 0, "breakpoint": 1, "trouble": 2}
 
 
 class LedGate(Gate):
@@ -66,13 +74,18 @@ class LedGate(Gate):
         self._let: Step | None = None  # the only step that may pass, since a person let it
         self._let_by: Author | None = None
         self._until = ""  # the action before which the run is held again
+        #: Where the run waits, as its start or a person has set it.
+        self.breakpoints = first.breakpoints
+        self._calls: dict[str, set[int]] = {}  # that have begun so far, by full name of the action
+        self._reached: set[tuple[str, int]] = set()  # breakpoints before calls that were reached
+        self._due: list[str] = []  # breakpoints that were reached during trouble
 
     def hold_run(
         self, why: str, by: Author | None = None, *, how: HeldHow = "trouble", node: str = ""
     ) -> None:
-        """Hold the run and record that, unless it is stopped, or held already for a reason of this
-        kind. A fault is recorded also where a person made the run wait, so that whoever lets it go on
-        has seen it. `by`: None for the runner; `node`: as in `Held`."""
+        """Hold the run and record that, unless it is stopped, or held already for a reason that is as
+        serious. A fault, or a breakpoint, is recorded also where a person made the run wait, so that
+        whoever lets it go on has seen it. `by`: None for the runner; `node`: as in `Held`."""
         self._hold(Held(at=self._clock_us(), why=why, by=by, how=how, node=node))
 
     def wait_for_person(self, by: Author, reason: str, request_id: str) -> None:
@@ -84,8 +97,8 @@ class LedGate(Gate):
         self._hold(held, by.id)
 
     def _hold(self, held: Held, author: str = "") -> None:
-        is_news = held.how == "trouble" and self.held is not None and self.held.how != "trouble"
-        if self.is_final or (self.held is not None and not is_news):
+        is_known = self.held is not None and _RANK[self.held.how] >= _RANK[held.how]
+        if self.is_final or is_known:
             return
         self.hold(held)
         self._let, self._let_by, self._until = None, None, ""
@@ -102,7 +115,7 @@ class LedGate(Gate):
 
     async def admit(self, step: Step) -> None:
         """Wait until the gate lets the piece of this step pass, and record that it waits."""
-        self._halt_before(step)
+        self.halt_before(step)
         if self.lets(step):
             return
         self._ready[step.call.number] = step
@@ -111,7 +124,7 @@ class LedGate(Gate):
                 self._note_waiting(step)
             while not self.lets(step):
                 await self._opened.wait()
-                self._halt_before(step)
+                self.halt_before(step)
         finally:
             del self._ready[step.call.number]
             self._noted.discard(step.call.number)
@@ -120,11 +133,54 @@ class LedGate(Gate):
         """Return whether the piece of this step may leave now."""
         return self.is_open and self._let in (None, step)
 
-    def _halt_before(self, step: Step) -> None:
-        """Hold the run if it is to wait before this step."""
+    def halt_before(self, step: Step) -> None:
+        """Hold the run if it is to wait before this step: since a person wants that, or at a
+        breakpoint, once for each call."""
+        self._calls.setdefault(step.node, set()).add(step.call.number)
+        if step is self._let or (self.held is not None and self.held.how == "trouble"):
+            return
         if self.is_open and step.node == self._until:
             why = f"It went on until {step.node}, which waits to begin."
             self.hold_run(why, self._let_by, how="step", node=step.node)
+        call = step.call
+        for each in self.breakpoints:
+            if (
+                each.is_at_end
+                or each.action != step.node
+                or (each.action, call.number) in self._reached
+            ):
+                continue
+            if each.holds(self._visit(call), call.inputs):
+                self._reached.add((each.action, call.number))
+                self.hold_run(f"Breakpoint {each.words()}.", how="breakpoint", node=step.node)
+
+    def take_up(self, left: LeftOpen) -> None:
+        """Continue with the visits and breakpoints of a run that an earlier process left."""
+        self.breakpoints = left.breakpoints
+        for number, node in left.calls.items():
+            self._calls.setdefault(node, set()).add(number)
+
+    def _visit(self, call: Call) -> int:
+        return sum(number <= call.number for number in self._calls.get(call.node, ()))
+
+    def halt_after(self, step: Step, outcome: Precondition, outputs: Mapping[str, Any]) -> None:
+        """Hold the run at the breakpoints after this step, which has ended, before anything follows.
+        `outputs`: its values by flat name."""
+        told = outcome.removeprefix("on_")
+        for each in self.breakpoints:
+            is_here = each.is_at_end and each.action == step.node and told in each.outcomes
+            if is_here and each.holds(self._visit(step.call), outputs):
+                why = f"Breakpoint {each.words()}."
+                if self.held is not None and self.held.how == "trouble":
+                    self._due.append(why)
+                self.hold_run(why, how="breakpoint", node=step.node)
+
+    def set_breakpoints(self, author: Author, breakpoints: tuple[Breakpoint, ...]) -> None:
+        """Let the run wait at these breakpoints from now on, and record that. A run that waits at one
+        that is there no more waits still."""
+        self.breakpoints = breakpoints
+        event = BreakpointsSet(at=self._clock_us(), author=author, breakpoints=breakpoints)
+        self._tell(event, author.id)
 
     def passed(self, step: Step) -> None:
         """Hold the run again if this step was the only one that might pass: its piece has left, or
@@ -205,3 +261,6 @@ class LedGate(Gate):
         )
         self._tell(released, press.author.id)
         self.release()
+        due, self._due = self._due, []
+        for why in due:  # reached during trouble, and not seen by anybody
+            self.hold_run(why, how="breakpoint")

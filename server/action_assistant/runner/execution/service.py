@@ -130,8 +130,15 @@ class ExecutionService:
         )
         self._conductors = Conductors(robots, look, self._runs, self.history, simulator, runtime)
         self._led = LedCommands(
-            self._conductors, self.rights, self.sight, movable=self._movable, find=self.find
+            self._conductors,
+            self.rights,
+            self.sight,
+            movable=self._movable,
+            find=self.find,
+            requested=self.history.requested,
+            in_worker=runtime.run_in_worker,
         )
+        self.set_breakpoints: Final = self._led.set_breakpoints
         self.go_on: Final = self._led.go_on
         self.step: Final = self._led.step
         self.wait: Final = self._led.wait

@@ -48,6 +48,7 @@ from action_assistant.runner.start.rights_registry import (
     nothing_released,
 )
 from action_assistant.runner.stop.foreign_stop import ForeignStopLoop
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.check import forbids_start
 from action_assistant.umrf.facts import SIMULATED, EngineFacts, facts_of
 from action_assistant.umrf.kept_values import has_keeper
@@ -99,6 +100,11 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     def overridden(self) -> tuple[str, ...]:
         """The codes of the problems that the starter has chosen to override."""
         return self.request.override.codes if self.request.override else ()
+
+    @property
+    def breakpoints(self) -> tuple[Breakpoint, ...]:
+        """The breakpoints at which the run will wait: none if its engine gets the whole graph."""
+        return self.led.pieces.breakpoints if self.led and not self.is_simulated else ()
 
 
 class LedStart(msgspec.Struct, frozen=True, kw_only=True):
@@ -459,7 +465,9 @@ class StartChecks:
             item = preflight.refusal_item(_code_of(refused), refused)
             return [preflight.with_verdict(CONDUCTED, [item])]
         whole = ready.whole
-        items = [preflight.graph_item(whole), *led_items(ready)]
+        is_simulated = not engines_of(request)
+        marks = preflight.breakpoint_items(request.breakpoints, is_led=not is_simulated)
+        items = [preflight.graph_item(whole), *led_items(ready), *marks]
         found = [preflight.with_verdict(CONDUCTED, items, whole.digest, whole.tree_digest)]
         for name in engines_of(request):
             try:
@@ -495,6 +503,7 @@ class StartChecks:
         try:
             ready = await self._run_in_worker(partial(prepared, approved=False), request, facts, "")
             items.append(preflight.graph_item(ready))
+            items += preflight.breakpoint_items(request.breakpoints, is_led=False)
             if request.behaviours:
                 await self._behaviours_for(ready)
         except Refused as refused:

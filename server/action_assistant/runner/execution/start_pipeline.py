@@ -242,6 +242,7 @@ def _to_store(
         subgraphs=ready.subgraphs,
         tree_digest=ready.tree_digest if request.subgraphs or request.tree_digest else None,
         led=_led_of(accepted),
+        breakpoints=accepted.breakpoints,
         drill=request.drill,
     )
     targets = () if accepted.is_simulated or accepted.led else (request.engine,)

@@ -87,6 +87,7 @@ _SAID: Final[Mapping[str, tuple[AuditKind, str]]] = {
     "run.resume_requested.v1": ("starts", "let the paused {run} go on"),
     "run.modify_requested.v1": ("starts", "gave {run} another version of its graph"),
     "run.stop_requested.v1": ("stops", "pressed Stop of {run}"),
+    "run.breakpoints_set.v1": ("starts", "set the breakpoints of {run}"),
     "run.released.v1": ("starts", "let the held {run} go on"),
     "run.marked.v1": ("starts", "marked {run}"),
     "run.incident_kept.v1": ("starts", "keeps {run} as an incident"),

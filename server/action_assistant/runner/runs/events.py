@@ -14,6 +14,7 @@ from action_assistant.journal.events import BareEvent, Draft
 from action_assistant.runner.links.engine_process import EngineProcess
 from action_assistant.runner.links.observations import Seen
 from action_assistant.runner.runs.visits import Visit
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.model import Precondition
 from action_assistant.web.auth.caller import stamped
@@ -116,6 +117,7 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     subgraphs: tuple[RunSubgraph, ...] = ()  # all graphs inside, by value
     tree_digest: str | None = None  # of the graph together with them; None if unknown
     led: Led | None = None  # of a led run
+    breakpoints: tuple[Breakpoint, ...] = ()  # where it waits
     piece: PieceOf | None = None  # of a piece, which is no run of its own for people
     batons: tuple[str, ...] = ()  # the robots whose baton the author held
     watching: tuple[str, ...] = ()  # the robots that the author said to watch
@@ -420,6 +422,16 @@ class Held(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     request_id: str = ""
 
 
+class BreakpointsSet(msgspec.Struct, frozen=True, kw_only=True):
+    """A person set the breakpoints of a led run: these count from now on."""
+
+    kind: ClassVar[str] = "run.breakpoints_set.v1"
+
+    at: int
+    author: Author
+    breakpoints: tuple[Breakpoint, ...]
+
+
 class PieceWaits(msgspec.Struct, frozen=True, kw_only=True):
     """A call of a led run is ready to begin, and waits before the held gate. It waits until its piece
     begins, or the call ends."""
@@ -489,6 +501,7 @@ RunEvent: TypeAlias = (
     | PieceRest
     | PieceEnded
     | PieceWaits
+    | BreakpointsSet
     | Held
     | Released
     | HandedOver
@@ -522,6 +535,7 @@ _DECODERS: Final[Mapping[str, msgspec.json.Decoder[RunEvent]]] = {
         PieceRest,
         PieceEnded,
         PieceWaits,
+        BreakpointsSet,
         Held,
         Released,
         HandedOver,

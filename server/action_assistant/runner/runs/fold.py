@@ -25,6 +25,7 @@ from action_assistant.runner.links.parameter_texts import shortened
 from action_assistant.runner.runs.events import (
     AlarmRaised,
     Answered,
+    BreakpointsSet,
     Ended,
     EngineSaid,
     HandedOver,
@@ -185,6 +186,8 @@ def follow(run: Run, event: RunEvent) -> Run:
         case Held(by=by):
             held = replace(run, held=event)
             return held if by is None else _pressed(held, event.request_id, wait_press(by))
+        case BreakpointsSet():
+            return replace(run, breakpoints=event.breakpoints)
         case PieceWaits():
             return replace(run, waits=run.waits | {event.call: (event.node, event.engine)})
         case Released(author=by, since=since, step=step, until=until):

@@ -18,6 +18,7 @@ from action_assistant.runner.runs.events import (
     PieceRest,
 )
 from action_assistant.runner.runs.visits import ActionRun, Message
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.kept_values import NOTHING_KEPT, KeptValues
 from action_assistant.umrf.laps import Laps
 
@@ -138,6 +139,7 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     held: Held | None = None  # why a led run begins nothing further
     #: Of a held run: the actions that are ready to begin and wait, with their robots, by call.
     waits: dict[int, tuple[str, str]] = {}
+    breakpoints: tuple[Breakpoint, ...] = ()  # at which a led run waits
     lead: Author | None = None  # who let it go on last, or was handed it; None: its author
     tree_digest: str | None = None  # of the graph together with those inside; None if unknown
     batons: tuple[str, ...] = ()  # the robots whose baton the author held at the start

@@ -24,6 +24,7 @@ from action_assistant.runner.runs.sent_graphs import Sent, SubgraphShown, subgra
 from action_assistant.runner.runs.sight import HIDDEN_NAME
 from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.safe_text import hold_names
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.json.text import UmrfGraph
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
@@ -61,6 +62,7 @@ _BLANK: Final[dict[str, Any]] = {
     "took": None,
     "detail": "",
     "held": None,
+    "breakpoints": msgspec.UNSET,
     "lead": msgspec.UNSET,
     "batons": msgspec.UNSET,
     "cause": "",
@@ -216,7 +218,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     """A run as lists show it. `took`: the time from `started_at` until nothing was seen moving any
     more, which is before the proof at `ended_at`; null if unknown. `robots`: of a led run, the
     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
-    further; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
+    further; `breakpoints`: where it waits; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
     held at the start; `watching`: those that they said to watch. `hidden`: the
     reader may not see its graph, so that little else is given."""
 
@@ -248,6 +250,7 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     recorded: bool
     robots: dict[str, str] | None = None
     held: HeldShown | None = None
+    breakpoints: tuple[Breakpoint, ...] | msgspec.UnsetType = msgspec.UNSET
     lead: Author | msgspec.UnsetType = msgspec.UNSET
     batons: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     watching: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
@@ -521,6 +524,7 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "recorded": recorded,
         "robots": None if run.led is None else run.led.robots,
         "held": _held(run),
+        "breakpoints": run.breakpoints or msgspec.UNSET,
         "lead": run.lead or msgspec.UNSET,
         "batons": run.batons or msgspec.UNSET,
         "watching": run.watching or msgspec.UNSET,

@@ -23,6 +23,7 @@ from action_assistant.runner.runs.sent_graphs import (
     tree_of,
 )
 from action_assistant.runner.start.piece_texts import PieceText, texts_of
+from action_assistant.umrf.breakpoints import Breakpoint, NoSuchPlace, pinned
 from action_assistant.umrf.check import blocking, check, forbids_start, is_final
 from action_assistant.umrf.checks.actors import led_problems
 from action_assistant.umrf.digest import digest
@@ -52,6 +53,7 @@ _Name = Annotated[str, msgspec.Meta(min_length=1, max_length=100)]
 #: Made by the client, once per press; "" from a client that repeats nothing.
 _PressId = Annotated[str, msgspec.Meta(max_length=200)]
 _NameText = Annotated[str, msgspec.Meta(max_length=1000)]
+Breakpoints = Annotated[tuple[Breakpoint, ...], msgspec.Meta(max_length=200)]
 
 #: True for each robot of which a person says that they watch it.
 Watching: TypeAlias = Annotated[dict[_Name, bool], msgspec.Meta(max_length=100)]
@@ -93,6 +95,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     watching: Watching = {}
     drill: bool = False
     sight: Sight | None = None
+    breakpoints: Breakpoints = ()
 
 
 class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -123,6 +126,15 @@ class WaitRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     reason: Annotated[str, msgspec.Meta(max_length=1000)] = ""
     request_id: _PressId = ""
+
+
+class BreakpointsRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Sets the breakpoints of a led run. `was`: those that the person saw; if there are others now, it
+    is refused. `watching`: as in `StartRequest`, if one of them is taken away."""
+
+    breakpoints: Breakpoints
+    was: Breakpoints
+    watching: Watching = {}
 
 
 class ResumeRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -163,6 +175,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     watching: Watching = {}
     drill: bool = False
     sight: Sight | None = None
+    breakpoints: Breakpoints = ()
 
     def for_engine(self, engine: str) -> StartRequest:
         """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
@@ -185,6 +198,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             else {name: said for name, said in self.watching.items() if name == engine},
             drill=self.drill,
             sight=self.sight,
+            breakpoints=self.breakpoints,
         )
 
 
@@ -386,7 +400,7 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     `players`: the robot of each action that a robot plays, by full name; `texts`: the pieces;
     `by_robot`: all actions of a robot as one graph without arrows, which is looked at
     before the start and never sent. `problems`: what leading the graph means; `remedies`: what
-    would take a problem away, by its code, as a sentence.
+    would take a problem away, by its code, as a sentence; `breakpoints`: where the run will wait.
     """
 
     whole: Prepared
@@ -395,6 +409,7 @@ class PreparedPieces(msgspec.Struct, frozen=True, kw_only=True):
     by_robot: dict[str, Prepared]
     problems: tuple[Problem, ...]
     remedies: dict[str, str] = {}
+    breakpoints: tuple[Breakpoint, ...] = ()
 
 
 def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
@@ -416,6 +431,7 @@ def prepared_pieces(
     whole = prepared(request, facts, run, approved=approved)
     graph, inside = codec.read(whole.umrf).graph, graphs_in(whole.subgraphs)
     _check_robots(request.robots, actors_in(graph, inside))
+    breakpoints = pinned_in(graph, request.breakpoints)
     hindering = (*subgraph_obstacles(graph, inside, request.robots), *obstacles(graph))
     if hindering:
         raise Conflict(
@@ -440,7 +456,22 @@ def prepared_pieces(
         },
         problems=tuple(problems),
         remedies=as_one_step(placed, problems, PINNED),
+        breakpoints=breakpoints,
     )
+
+
+def pinned_in(graph: Graph, breakpoints: Sequence[Breakpoint]) -> tuple[Breakpoint, ...]:
+    """Return the breakpoints for a run of a graph. Raise BadInput for one that has no place there."""
+    try:
+        return pinned(graph, breakpoints)
+    except NoSuchPlace as why:
+        raise BadInput(str(why), where={"path": "/breakpoints"}) from why
+
+
+def pinned_for_text(umrf: str, breakpoints: Sequence[Breakpoint]) -> tuple[Breakpoint, ...]:
+    """Return the breakpoints for a run of the graph in a UMRF text. For workers. Raise BadInput for one
+    that has no place there."""
+    return pinned_in(codec.read(umrf).graph, breakpoints)
 
 
 def _part_of(

@@ -34,6 +34,7 @@ from action_assistant.runner.runs.sent_graphs import graphs_in
 from action_assistant.runner.start.admission import Admitted, Prepared
 from action_assistant.runner.start.built_libraries import older_libraries
 from action_assistant.safe_text import hold_names
+from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.check import check, forbids_start, is_final
 from action_assistant.umrf.codes import QUIET
 from action_assistant.umrf.facts import EngineFacts
@@ -654,6 +655,20 @@ def course_items(found: CheckedCourses) -> tuple[Item, ...]:
         total = counted(len(courses), "expected course")
         sentences.insert(0, f"It does not go as expected, in {len(other)} of {total}.")
     return (Item(code="courses", verdict="warned", text=" ".join(sentences)),)
+
+
+def breakpoint_items(breakpoints: Sequence[Breakpoint], *, is_led: bool) -> tuple[Item, ...]:
+    """Return the item about the breakpoints of a start, if it has any. `is_led`: the runner leads it;
+    an engine that gets the whole graph knows none."""
+    if not breakpoints:
+        return ()
+    number = counted(len(breakpoints), "breakpoint")
+    if is_led:
+        return (Item(code="breakpoints", verdict="passed", text=f"The run waits at {number}."),)
+    text = (
+        f"The whole graph is handed over: {number} of it will hold nothing. Lead it step by step."
+    )
+    return (Item(code="breakpoints", verdict="warned", text=text),)
 
 
 def unknown_courses_item(why: str) -> Item:
