@@ -250,3 +250,37 @@ def test_a_stop_that_was_pressed_while_the_runner_stood_still_works(
                 assert begun.since(thawed + HEARD_S) == []
         finally:
             runner.end()
+
+
+def test_a_run_that_waits_survives_a_kill_of_the_runner_and_makes_one_step(
+    domains: list[int], tmp_path: Path
+) -> None:
+    runner = RunnerProcess(tmp_path / "runner").start()
+    with robots_of("emulated", domains, tmp_path) as (begun, names):
+        try:
+            with runner.client() as client:
+                scene = Scene(client, begun, names)
+                way = f"/api/runs/{scene.run}/wait"
+                client.post(way, json={"reason": "Look."}).raise_for_status()
+                waits_from = time.time() + LATE_S
+                runner.kill()
+                runner.start()
+            with runner.client() as client:
+                scene.client = client
+                scene.wait_until_held()
+                assert "made it wait: Look." in scene.shown()["held"]["why"]
+                until("nothing is ready", lambda: scene.shown()["held"].get("next"), 15)
+                assert begun.since(waits_from) == []
+                at, since = time.time(), {"since": scene.shown()["held"]["since"]}
+                post, way = client.post, f"/api/runs/{scene.run}/step"
+                until("no step is made", lambda: post(way, json=since).is_success, 15, scene.shown)
+                until("nothing begins", lambda: begun.since(at), 15, scene.shown)
+                scene.wait_until_held()
+                time.sleep(2.5)
+                assert len(begun.since(at)) == 1
+                assert scene.stop() == "stopped"
+                ended = time.time()
+                time.sleep(1)
+                assert begun.since(ended) == []
+        finally:
+            runner.end()
