@@ -102,7 +102,7 @@ def _database(parser: argparse.ArgumentParser, *, switch: bool = False) -> None:
         "--database",
         metavar="URL",
         default=settings.database(),
-        help="of the editor; default: sqlite, in the data folder",
+        help="of the editor; default: the one that was served last, at first sqlite in the data folder",
     )
     if switch:
         parser.add_argument(
@@ -218,9 +218,12 @@ def _secrets(data: Path) -> tuple[str, ...]:
 
 
 def _editor_settings(options: argparse.Namespace, data: Path) -> settings.EditorSettings:
+    from action_assistant.editor.log.database_location import to_serve
+
+    switch = options.switch_database
     return settings.EditorSettings(
         data=data,
-        database=options.database or f"sqlite:///{data / 'editor.db'}",
+        database=options.database or to_serve(data, switch=switch),
         host=_host(options),
         port=options.port,
         runner_port=options.runner_port or options.port + 1,
@@ -228,7 +231,7 @@ def _editor_settings(options: argparse.Namespace, data: Path) -> settings.Editor
         limits=settings.limits(),
         share=options.share,
         tls=options.tls,
-        switch_database=options.switch_database,
+        switch_database=switch,
         reached=reached(options),
         metrics_token=settings.metrics_token(),
         sessions=settings.sessions(),

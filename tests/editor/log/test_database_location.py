@@ -59,13 +59,29 @@ def test_another_database_than_before_is_refused_unless_told(
     database_location.check(data, url, switch=False)  # told once
     # Another name of the same server leads to the same log.
     database_location.check(data, url.replace("127.0.0.1", "localhost"), switch=False)
-    said = refused(data)
+    said = refused(data, "--database", own)
     assert database_location.shown(url) in said
     assert "without --database" in said
     with pytest.raises(CannotStart, match="would not be seen"):
         database_location.check(data, own, switch=False)
     with pytest.raises(CannotStart, match="would not be seen"):
         database_location.check(data, postgres.new_database(), switch=False)
+
+
+def test_a_folder_serves_the_database_that_it_remembers(tmp_path: Path, postgres: Server) -> None:
+    data = tmp_path / "data"
+    with running(data, postgres.new_database()) as editor, editor.client() as http:
+        http.post("/api/graphs", json={"name": "mine"}).raise_for_status()
+    with running(data) as editor:
+        assert "mine" in names(editor)
+    assert not (data / "editor.db").exists()
+    own = f"sqlite:///{data / 'editor.db'}"
+    assert database_location.to_serve(data, switch=True) == own
+    with pytest.raises(CannotStart, match="which the folder remembers"):
+        database_location.check(data, own, switch=False)
+    database_location.remember(data, f"sqlite:///{tmp_path / 'gone.db'}")
+    with pytest.raises(CannotStart, match=r"There is no .*gone\.db"):
+        database_location.to_serve(data, switch=False)
 
 
 def test_a_folder_without_graphs_takes_any_database(tmp_path: Path, postgres: Server) -> None:

@@ -49,6 +49,14 @@ def of(data: Path) -> str:
     return _own(data)
 
 
+def to_serve(data: Path, *, switch: bool) -> str:
+    """Return the URL of the database that an editor without --database serves: the one that the data
+    folder remembers, or its own one, also with `switch`. Raise CannotStart if the remembered one is
+    a file that is missing, or cannot be read."""
+    known = None if switch else remembered(data)
+    return (known and journal_of(data, None)) or _own(data)
+
+
 def journal_of(data: Path, given: str | None) -> str | None:
     """Return the URL of the journal with the graphs of the data folder `data`, or `given` if it is
     not None; None if the folder has no graphs. Raise CannotStart if the database is missing."""
@@ -207,7 +215,7 @@ def _refusal(data: Path, known: str, url: str, count: int | None) -> str:
     )
     return (
         f"{many} of {data} {'is' if count == 1 else 'are'} in {where}, and would not be seen {asked}. "
-        f"Start {before}; or take everything along: `action-assistant backup FILE`, then `restore "
+        f"Start {before}, which the folder remembers; or take everything along: `action-assistant backup FILE`, then `restore "
         "FILE` into the other database; or leave it there and go on with the other database: "
         "--switch-database."
     )
