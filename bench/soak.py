@@ -126,6 +126,11 @@ PARTS: Final[dict[str, Part]] = {
         {"TEST_GUESSES": "1000"},
         ("-s", "tests/web/auth/test_guesses.py"),
     ),
+    "audit": Part(
+        "1,000 deeds of 20 people, all of which are found in the audit",
+        {"TEST_DEEDS": "1000", "TEST_SEED": "2"},
+        ("tests/test_audit.py", "-k", "20_people"),
+    ),
     "texts": Part(
         "each hostile text at every place of both processes that takes one",
         {"TEST_LONG": "1"},
