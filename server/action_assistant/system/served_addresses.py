@@ -24,7 +24,7 @@ _BOOT: Final = Path("/proc/sys/kernel/random/boot_id")
 _NETWORK: Final = Path("/proc/self/ns/net")
 
 
-class ServedAddress(msgspec.Struct, frozen=True):
+class ServedAddress(msgspec.Struct, frozen=True, omit_defaults=True):
     """The address of a process. `url`: without a path. `place`: the computer, or container with a
     network of its own, in which the URL is valid. `lives`: the process still holds the file; it is
     not stored."""
