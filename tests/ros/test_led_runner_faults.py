@@ -262,7 +262,7 @@ def test_a_run_that_waits_survives_a_kill_of_the_runner_and_makes_one_step(
                 scene = Scene(client, begun, names)
                 way = f"/api/runs/{scene.run}/wait"
                 client.post(way, json={"reason": "Look."}).raise_for_status()
-                waits_from = time.time() + LATE_S
+                waits_from = time.time() + HEARD_S
                 runner.kill()
                 runner.start()
             with runner.client() as client:

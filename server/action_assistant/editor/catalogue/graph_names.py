@@ -98,7 +98,7 @@ class GraphNames:
 
     @property
     def are_read(self) -> bool:
-        """Whether every name was read once, so that a refresh reads only what has changed since."""
+        """Return whether every name was read once, so that a refresh reads only what has changed since."""
         return self._position is not None
 
     async def refresh(self) -> None:
