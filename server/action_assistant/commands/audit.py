@@ -130,7 +130,10 @@ def _export(options: argparse.Namespace) -> int:
     try:
         with open(options.file, "xb", opener=opener) as file:
             return maintenance.for_each(
-                options.data.resolve(), maintenance.journals_of(options), partial(write, file)
+                options.data.resolve(),
+                maintenance.journals_of(options),
+                partial(write, file),
+                upgrades=False,
             )
     except OSError as error:
         raise CannotStart(f"{options.file} cannot be written: {error.strerror}.") from error
@@ -158,7 +161,7 @@ def _check(options: argparse.Namespace) -> int:
         return is_same
 
     journals = maintenance.journals_of(options)
-    code = maintenance.for_each(options.data.resolve(), journals, compare)
+    code = maintenance.for_each(options.data.resolve(), journals, compare, upgrades=False)
     for log in {log for log, _ in streams} - {each.branch for each in journals}:
         print(one_line(f"{log}: there is no such log here"))
         code = 1
