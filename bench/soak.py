@@ -117,7 +117,8 @@ PARTS: Final[dict[str, Part]] = {
         ("-s", "tests/test_nobody_delays_stop.py"),
     ),
     "matrix": Part(
-        "each role and scope at every route and socket, before and after each kind of revocation",
+        "each role and scope at every route and socket, with each kind of graph, run and robot, before and after "
+        "each kind of revocation",
         {"TEST_MATRIX": "1"},
         ("-s", "tests/web/auth/test_matrix.py"),
     ),
