@@ -250,8 +250,9 @@ class Week:
         """An owner releases a version and takes that back."""
         if not self.graphs:
             return
-        graph = self.random.choice(self.graphs)
-        version = self.own("POST", f"/api/graphs/{graph}/versions", json={}).json()["id"]
+        graph, self.number = self.random.choice(self.graphs), self.number + 1
+        label = {"label": f"v{self.number}"}  # without one, a version that is there is the answer
+        version = self.own("POST", f"/api/graphs/{graph}/versions", json=label).json()["id"]
         self.fact("local", "version.published.v1", graph)
         path = f"/api/versions/{version}/release"
         assert guest.editor("PUT", path).status_code == 403
