@@ -39,9 +39,8 @@ export function useReadMentions() {
         const mentions = inbox.mentions.map((each) =>
           keys.includes(each.key) ? { ...each, is_read: true } : each,
         );
-        const now = mentions.filter(({ is_read }) => !is_read).length;
-        const before = inbox.mentions.filter(({ is_read }) => !is_read).length;
-        return { mentions, unread: Math.max(0, inbox.unread - before + now) };
+        const read = inbox.mentions.filter((each, i) => each !== mentions[i] && !each.is_read);
+        return { mentions, unread: inbox.unread - read.length };
       });
     },
     onSettled: renewing(() => client.invalidateQueries({ queryKey })),

@@ -241,7 +241,7 @@ export function letStep(
   action: string,
   watching: Watching = {},
 ): Promise<Run> {
-  return sendPress(`step ${run} ${since} ${action}`, (request) => {
+  return sendPress(["step", run, since, action].join(" "), (request) => {
     const body = { since, request_id: request, watching, action };
     return runnerAt(runner).post("/api/runs/{run}/step", { path: { run }, body });
   });

@@ -21,14 +21,13 @@ const LATER = 30; // ms: whoever closes the dialog may put the focus elsewhere m
 
 /** Gives the focus to the element that had it before, unless something else took it since the dialog closed. */
 function giveBack(before: Element | null, atEnd: Element | null): void {
-  const now = document.activeElement;
-  if (now !== atEnd && now !== null && now !== document.body) return;
-  if (atEnd instanceof HTMLElement) atEnd.blur();
-  if (before instanceof HTMLElement && before !== document.body) before.focus();
-  if (document.activeElement !== document.body) return;
+  const { activeElement: now, body } = document;
+  if (now !== atEnd && now !== body) return;
+  (atEnd as HTMLElement | null)?.blur();
+  (before as HTMLElement | null)?.focus();
+  if (document.activeElement !== body) return;
   // What had the focus is gone or off: the dialog behind keeps it.
-  const dialogs = document.querySelectorAll<HTMLElement>("[role=dialog]");
-  dialogs.item(dialogs.length - 1)?.focus();
+  [...document.querySelectorAll<HTMLElement>("[role=dialog]")].at(-1)?.focus();
 }
 
 /** Makes a dialog the one in front while it is open. */
