@@ -50,7 +50,7 @@ const PAGE = "src/app/main.tsx";
  */
 const BUDGETS: readonly (readonly [page: string, most: number, entries: readonly string[]])[] = [
   ["STOP alone", 84, []],
-  ["the list of graphs", 188, [PAGE, "src/app/home-screen.tsx"]],
+  ["the list of graphs", 189, [PAGE, "src/app/home-screen.tsx"]],
   ["the editor", 350, [PAGE, "src/app/graph-screen.tsx"]],
   ["administration", 170, [PAGE, "src/administration/administration-page.tsx"]],
   ["robots", 221, [PAGE, "src/robots/robots-page.tsx"]],
