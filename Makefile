@@ -17,7 +17,7 @@ unit e2e ros-test soak soak-ros pictures screens browsers bench: export ROS_AUTO
 PYTHON ?= python3
 BIN := .venv/bin
 # How many processes share the Python tests, of which many wait; each test file stays with one.
-PROCESSES ?= 3
+PROCESSES ?= 5
 ROS := .venv-ros/bin
 # Tests see nothing of a sourced ROS 2 either; `make run` does.
 BARE := env -u AMENT_PREFIX_PATH -u COLCON_PREFIX_PATH -u LD_LIBRARY_PATH

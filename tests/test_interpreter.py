@@ -65,6 +65,7 @@ def test_the_wheels_do_not_see_a_sourced_ros() -> None:
     assert this.environment(sourced) == sourced
 
 
+@pytest.mark.long
 @pytest.mark.skipif(rclpy_fits(), reason="this Python speaks ROS 2 by itself")
 def test_without_rclpy_everything_else_works_and_the_reason_is_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -74,6 +74,7 @@ def test_modules_that_the_other_system_lacks_cannot_be_imported() -> None:
     assert answer.stdout == "win32 False\n"
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("system", ["win32", "darwin"])
 def test_files_are_checked_converted_simulated_and_compared_as_on_linux(
     system: str, capfd: pytest.CaptureFixture[str]
@@ -96,6 +97,7 @@ def test_files_are_checked_converted_simulated_and_compared_as_on_linux(
     assert answer.stdout == "".join(expected), answer.stderr
 
 
+@pytest.mark.long
 def test_packages_are_written_as_on_linux(tmp_path: Path) -> None:
     words = ("package", str(EXAMPLES[0]), "--output")
     again = (*words, str(tmp_path / "there"))

@@ -63,6 +63,7 @@ def test_all_files_of_a_data_folder_belong_to_this_user_alone(tmp_path: Path) ->
     assert while_in_use == modes(data) == modes(back) == {}
 
 
+@pytest.mark.long
 def test_a_folder_of_an_older_version_is_closed_and_doctor_tells(tmp_path: Path) -> None:
     data = tmp_path / "data"
     for name in ("archive/2026/a.gz", "recordings/David/b.gz", "editor.db", "runner.db-wal"):

@@ -173,6 +173,7 @@ def test_a_page_that_shows_something_else_notices_and_the_server_counts_it(
         page("leave", name=name)
 
 
+@pytest.mark.long
 def test_edits_made_while_the_server_was_gone_are_saved_when_it_is_back(
     page: Page, tmp_path: Path
 ) -> None:

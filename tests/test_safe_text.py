@@ -211,6 +211,7 @@ def test_printed_addresses_of_databases_have_no_password(tmp_path: Path) -> None
             assert "Traceback" not in answer.stderr
 
 
+@pytest.mark.long
 def test_at_a_terminal_the_link_is_shown_to_its_owner(tmp_path: Path) -> None:
     ours, theirs = pty.openpty()
     port = free_ports()

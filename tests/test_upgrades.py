@@ -163,6 +163,7 @@ def said_by(product: Product) -> dict[str, Any]:
         return answers(editor, runner)
 
 
+@pytest.mark.long
 def test_data_of_the_first_version_come_to_this_one_and_back(tmp_path: Path) -> None:
     data = tmp_path / "data"
     then = of_the_first(data)
@@ -315,6 +316,7 @@ def test_damage_that_was_there_is_in_the_copy_and_is_told(
         go_back(tmp_path, None, [copy.path])
 
 
+@pytest.mark.long
 def test_events_since_the_upgrade_are_counted_and_kept_aside(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

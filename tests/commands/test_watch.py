@@ -167,6 +167,7 @@ def test_a_name_steers_no_terminal_and_makes_no_line_of_its_own(product: Product
         assert json.loads(values.line())["field"] == "name"
 
 
+@pytest.mark.long
 def test_watch_reconnects_when_the_server_is_back_and_prints_missed_changes(tmp_path: Path) -> None:
     product = Product(tmp_path / "data")
     product.start()

@@ -42,6 +42,7 @@ def epochs(editor: Editor) -> list[str]:
         return [json.loads(body)["why"] for (body,) in rows]
 
 
+@pytest.mark.long
 def test_a_backup_of_a_running_server_restores_all_its_graphs(
     editor: Editor, tmp_path: Path
 ) -> None:

@@ -12,6 +12,7 @@ from action_assistant.commands.backups import backup
 from commands.backups.test_restore import filled, here
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("now", [0.0, 315_532_799.0, 4_354_819_200.0, 6_000_000_000.0])
 def test_a_backup_is_made_wherever_the_clock_stands(
     tmp_path: Path, now: float, monkeypatch: pytest.MonkeyPatch

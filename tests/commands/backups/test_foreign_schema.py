@@ -73,6 +73,7 @@ def with_schema(file: Path, branch: Branch, sql: str) -> Path:
     return changed(file, change)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("sql", "branch"), [*zip(DROPPED, itertools.cycle(BRANCHES), strict=False)]
 )
@@ -121,6 +122,7 @@ def test_a_schema_that_cannot_be_read_is_one_sentence(
     assert "malformed" in capfd.readouterr().err
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("sql", [*DROPPED, *REFUSED])
 def test_verify_names_what_is_not_ours_and_does_not_call_it_sound(
     data: Path, sql: str, capfd: pytest.CaptureFixture[str]

@@ -155,6 +155,7 @@ def test_two_at_once_are_refused(data: Path, tmp_path: Path) -> None:
         slow.wait(20)
 
 
+@pytest.mark.long
 def test_the_server_makes_them_by_itself(tmp_path: Path) -> None:
     """Killed, the process that makes them comes again; and it ends with the server."""
     data, into = tmp_path / "data", tmp_path / "b"

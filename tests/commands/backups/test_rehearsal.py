@@ -48,6 +48,7 @@ def changed(file: Path, target: Path, *commands: str) -> Path:
     return target
 
 
+@pytest.mark.long
 def test_a_sound_one_is_proven_and_nothing_is_left(file: Path, tmp_path: Path) -> None:
     done = ran("restore", "--rehearse", file, "--data", tmp_path)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -64,6 +64,7 @@ def test_a_regular_backup_leaves_alone_one_that_is_just_being_made_there(
     assert not list(into.glob(".backup-*"))
 
 
+@pytest.mark.long
 def test_two_rehearsals_see_all_that_is_in_the_backup(data: Path, tmp_path: Path) -> None:
     file = tmp_path / "m.zip"
     assert ran("backup", file, "--data", data).returncode == 0

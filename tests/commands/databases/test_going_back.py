@@ -156,6 +156,7 @@ def check(there: Upgraded, before: dict[str, Any], after: dict[str, Any]) -> str
     return "before" if now == before else "after"
 
 
+@pytest.mark.long
 @pytest.mark.timeout(0)
 def test_killed_anywhere_a_file_is_as_it_was_or_as_it_shall_be(tmp_path: Path) -> None:
     first = upgraded(tmp_path / "data")
@@ -245,6 +246,7 @@ def test_a_full_disk_leaves_no_part_of_a_copy(tmp_path: Path) -> None:
     assert not list(there.data.glob(".*.part"))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("scheme", ["sqlite", "sqlite+pysqlite"])
 def test_a_file_that_is_elsewhere_is_put_back_too(tmp_path: Path, scheme: str) -> None:
     there = upgraded(tmp_path / "data")
@@ -259,6 +261,7 @@ def test_a_file_that_is_elsewhere_is_put_back_too(tmp_path: Path, scheme: str) -
         assert ask_once(url, stored) == after
 
 
+@pytest.mark.long
 def test_an_older_version_puts_nothing_back_on_a_server(tmp_path: Path, postgres: Server) -> None:
     """The older version does not know all tables that it would have to remove."""
     there = upgraded(tmp_path / "data", postgres.new_database())

@@ -157,6 +157,7 @@ def test_a_database_with_other_events_is_left_alone(tmp_path: Path, postgres: Se
     assert len(events(url)) == 60
 
 
+@pytest.mark.long
 def test_while_somebody_may_write_nothing_is_moved(tmp_path: Path, postgres: Server) -> None:
     data = tmp_path / "data"
     with running(data):

@@ -39,6 +39,7 @@ def data(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_every_event_is_there_once_however_often_it_is_copied(data: Path, postgres: Server) -> None:
     url = postgres.new_database()
     for _ in range(2):
@@ -118,6 +119,7 @@ def test_new_runs_are_copied_also_after_the_database_was_away(
             log.close()
 
 
+@pytest.mark.long
 def test_a_target_that_runs_cannot_be_copied_to_is_refused_with_the_reason(data: Path) -> None:
     for to, told in (
         ("nonsense", "is not a URL"),

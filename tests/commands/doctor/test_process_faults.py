@@ -58,6 +58,7 @@ def _answers(port: int) -> bool:
         return False
 
 
+@pytest.mark.long
 def test_an_installation_that_runs_and_is_sound_has_nothing_wrong(
     product: tuple[Product, int],
 ) -> None:
@@ -88,6 +89,7 @@ def test_processes_with_the_token_of_another_folder_are_named(
     assert [each.code for each in found] == ["token-differs", "token-differs"]
 
 
+@pytest.mark.long
 def test_a_runner_of_another_version_and_with_another_clock_is_named(
     data: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -102,6 +104,7 @@ def test_a_runner_of_another_version_and_with_another_clock_is_named(
     assert {each.where for each in found.values()} == {f"127.0.0.1:{port + 1}"}
 
 
+@pytest.mark.long
 def test_certificates_of_ones_own_are_looked_at_where_they_are_shown(
     served: Path, tmp_path: Path
 ) -> None:
@@ -147,6 +150,7 @@ MISTAKES = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.skipif(not NGINX, reason="nginx is not installed")
 @pytest.mark.parametrize("code", [*MISTAKES, ""])
 def test_a_proxy_that_is_set_up_wrongly_is_named_by_its_mistake(

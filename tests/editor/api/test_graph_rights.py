@@ -366,6 +366,7 @@ def test_a_check_counts_no_graph_out_of_sight_among_those_of_one_name(
     owner.put(f"/api/graphs/{made[1]}/rule", json={"rule": rule}).raise_for_status()
     mine = {"authorization": f"Bearer {TOKEN}"}
     assert (codes(mine), codes(nobody)) == (before, before - {"subgraph-ambiguous"})
+    owner.put(f"/api/graphs/{made[1]}/rule", json={"rule": None}).raise_for_status()
     for graph in made:
         owner.delete(f"/api/graphs/{graph}").raise_for_status()
 

@@ -2,6 +2,8 @@
 
 import asyncio
 import json
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -171,13 +173,14 @@ async def test_the_list_says_who_is_in_a_graph_now(tmp_path: Path) -> None:
     "fault", [GaveUp("This took longer than it may."), RecursionError("too deep"), KeyError("name")]
 )
 async def test_a_graph_of_which_nothing_can_be_found_out_stays_in_the_list_with_the_others(
-    tmp_path: Path, fault: Exception, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, fault: Exception
 ) -> None:
     settings = EditorSettings(data=tmp_path, database=f"sqlite:///{tmp_path / 'editor.db'}")
     async with open_services(settings) as services:
         made, _ = await services.catalogue.bring(json.dumps(NAV).encode(), "ada")
         others = {view.id for view in await services.catalogue.all()} - {made.id}
-    monkeypatch.setattr(graph_facts, "form", lambda: b"another")
+    with closing(sqlite3.connect(tmp_path / "editor.db")) as database, database:
+        database.execute("DELETE FROM graph_facts")
     async with open_services(settings) as services:
         asked = services.graph_reader._run_in_worker
 

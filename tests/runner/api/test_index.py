@@ -70,6 +70,7 @@ def test_only_operators_may(client: httpx.Client) -> None:
     assert described["paths"]["/api/robots/{name}/index"]["post"]["x-needs"] == "operate"
 
 
+@pytest.mark.long
 def test_a_folder_that_is_missing_is_the_trouble_of_its_robot_alone(tmp_path: Path) -> None:
     index, missing = tmp_path / "index", tmp_path / "missing"
     index.mkdir()

@@ -290,6 +290,7 @@ def shown(folder: Path) -> dict[str, bytes | str]:
     return {shown_path(path): text for path, text in held(folder).items()}
 
 
+@pytest.mark.long
 @given(
     files=st.dictionaries(paths, contents, max_size=6), link=st.booleans(), replaces=st.booleans()
 )

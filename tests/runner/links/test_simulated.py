@@ -108,6 +108,7 @@ async def test_a_start_that_is_given_up_meanwhile_can_be_stopped() -> None:
         await shown(bench, bench.endless, has_ended("STOPPED"))
 
 
+@pytest.mark.long
 async def test_a_simulation_that_says_very_much_leaves_the_loop_free() -> None:
     """Hundreds of actions that begin and end a hundred times a second."""
     reports = 0

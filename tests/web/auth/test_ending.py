@@ -106,6 +106,7 @@ def test_links_and_sessions_end_on_a_full_disk_and_the_log_catches_up(
             eventually(recorded)
 
 
+@pytest.mark.long
 def test_a_link_is_revoked_without_postgres(tmp_path: Path) -> None:
     if servers.binaries() is None:
         pytest.skip("Postgres is not installed (Debian: postgresql)")

@@ -71,6 +71,7 @@ def at_once(number: int, ask: Callable[[], httpx.Response]) -> list[int]:
         return sorted(pool.map(one, range(number)))
 
 
+@pytest.mark.long
 def test_a_code_and_a_claim_that_are_sent_at_once_let_one_in(
     product: Product, arrive: Arrive
 ) -> None:

@@ -153,6 +153,7 @@ def closed(socket: ClientConnection) -> int | None:
     return socket.close_code
 
 
+@pytest.mark.long
 def test_serve_makes_a_link_for_each_role_and_says_where_they_are(product: Product) -> None:
     """The links are printed at a terminal only, because other output is kept and read by others."""
     eventually(lambda: "people list" in product.log.read_text())
@@ -314,6 +315,7 @@ def test_the_runner_needs_no_editor_to_put_somebody_out(tmp_path: Path, arrive: 
                 product.process("editor").resume()
 
 
+@pytest.mark.long
 def test_log_and_folder_agree_again_whatever_was_lost(tmp_path: Path) -> None:
     editor = Editor(tmp_path / "data")
     editor.start()

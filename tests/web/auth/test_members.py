@@ -150,6 +150,7 @@ def test_a_person_ends_on_a_full_disk_and_the_log_catches_up(
         eventually(recorded)
 
 
+@pytest.mark.long
 def test_a_person_ends_without_postgres(tmp_path: Path) -> None:
     if servers.binaries() is None:
         pytest.skip("Postgres is not installed (Debian: postgresql)")
@@ -263,6 +264,7 @@ def test_a_browser_that_becomes_the_device_of_another_person_leaves_its_session(
         assert left.status_code == 401
 
 
+@pytest.mark.long
 def test_a_recovery_link_of_the_command_line_works_with_the_server_down_and_up_and_damaged_files(
     tmp_path: Path, arrive: Arrive
 ) -> None:

@@ -76,6 +76,7 @@ def test_a_command_needs_nothing_but_the_public_address(proxied: Proxied, tmp_pa
     assert proxied.cli("stop", "--all", *server).returncode == 0
 
 
+@pytest.mark.long
 def test_a_path_reaches_the_runner_as_it_was_written(proxied: Proxied) -> None:
     direct = proxied.product.runner()
     with direct:

@@ -14,7 +14,9 @@ import pytest
 
 from support.product import TOKEN, Product, running
 
-CHROMIUM: Final = shutil.which("chromium") or shutil.which("chromium-browser")
+CHROMIUM: Final = next(
+    filter(None, map(shutil.which, ("chromium-headless-shell", "chromium"))), None
+)
 EVIL: Final = "evil.test"
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="there is no Chromium")

@@ -86,6 +86,7 @@ def test_values_of_every_native_type_come_in_and_go_on_to_the_next_action(
     assert told == {f"out::{kind}": value for kind, value in TYPES.items()}
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("line", "why"),
     [
