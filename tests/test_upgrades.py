@@ -106,6 +106,7 @@ def stored(connection: Connection) -> dict[str, Any]:
     return contents(connection, sorted(set(inspect(connection).get_table_names()) - own))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("place", "revision"), EACH, indirect=["place"])
 def test_every_revision_comes_to_this_one_and_back_by_its_copy(
     place: Place, revision: str, capsys: pytest.CaptureFixture[str]

@@ -130,6 +130,7 @@ def named(name: str) -> Callable[[Any], None]:
     return lambda actions: actions.update({KEY: name})
 
 
+@pytest.mark.long
 def test_changes_of_others_are_told_with_moment_and_person(product: Product) -> None:
     graph = graph_in(product, "told")
     with watching(product, "told") as watch:

@@ -35,6 +35,7 @@ pytestmark = [
         "_ROS_WHEELS_BOOTSTRAP_COMPLETE" not in os.environ,
         reason="messages are built with the wheels of `make ros`",
     ),
+    pytest.mark.long,
     pytest.mark.timeout(300),  # a compiler shares two cores with other tests
 ]
 

@@ -177,7 +177,11 @@ class Scene:
         return str(over(self.client, self.run, 60)["state"])
 
 
-@pytest.mark.parametrize("fault", [frozen, killed, moved], ids=lambda each: each.__name__)
+@pytest.mark.parametrize(
+    "fault",
+    [frozen, pytest.param(killed, marks=pytest.mark.long), moved],
+    ids=lambda each: each.__name__,
+)
 @pytest.mark.parametrize("kind", ["emulated", "real"])
 def test_a_led_run_is_held_and_begins_nothing(
     kind: str, fault: Fault, domains: list[int], tmp_path: Path

@@ -55,6 +55,7 @@ def sound(folder: Path) -> dict[str, int]:
     return found
 
 
+@pytest.mark.long
 @pytest.mark.timeout(0)
 def test_a_killed_backup_leaves_no_file_and_harms_nothing(data: Path, tmp_path: Path) -> None:
     into, chance = tmp_path / "b", random.Random(5)

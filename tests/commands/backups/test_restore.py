@@ -154,6 +154,7 @@ HOSTILE: Final = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("kind", HOSTILE)
 def test_a_file_that_is_not_what_it_says_writes_nothing(
     file: Path, tmp_path: Path, kind: str

@@ -50,6 +50,7 @@ def data(tmp_path: Path) -> Path:
     return folder
 
 
+@pytest.mark.long
 def test_a_regular_backup_leaves_alone_one_that_is_just_being_made_there(
     data: Path, tmp_path: Path
 ) -> None:

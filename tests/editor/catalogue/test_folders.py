@@ -98,6 +98,7 @@ def test_a_deleted_graph_comes_back_where_its_folder_has_gone_meanwhile(
     assert client.post(f"/api/graphs/{graph}/recover").json()["folder"] == outer
 
 
+@pytest.mark.long
 def test_what_is_refused_says_why_and_changes_nothing(client: httpx.Client) -> None:
     lab, other = folder(client, "Lab"), folder(client, "Other")
     graph = made(client, "Patrol", "Step")

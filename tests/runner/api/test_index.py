@@ -34,6 +34,7 @@ def client(tmp_path_factory: pytest.TempPathFactory, index: Path) -> Iterator[ht
     process.end()
 
 
+@pytest.mark.long
 def test_a_graph_is_written_replaced_on_request_and_shown_in_the_robot_s_log(
     client: httpx.Client, index: Path
 ) -> None:

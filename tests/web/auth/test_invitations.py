@@ -300,6 +300,7 @@ def followed(guest: Guest, url: str) -> Iterator[threading.Event]:
     thread.join(10)
 
 
+@pytest.mark.long
 def test_the_runner_needs_no_editor_to_put_somebody_out(tmp_path: Path, arrive: Arrive) -> None:
     with running(tmp_path / "data", "--share", "--host", "127.0.0.1", hosts=LAB) as product:
         invitation = invite(product, "operator")
@@ -343,6 +344,7 @@ def test_log_and_folder_agree_again_whatever_was_lost(tmp_path: Path) -> None:
     editor.end()
 
 
+@pytest.mark.long
 def test_links_from_the_command_line(product: Product, arrive: Arrive) -> None:
     made = product.cli("people", "invite", "editor", "--label", "lab tablet")
     assert made.returncode == 0, made.stderr

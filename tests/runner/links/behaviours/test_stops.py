@@ -92,6 +92,7 @@ def test_a_behaviour_that_never_ends_is_killed_five_seconds_after_its_stop_and_d
     until(lambda: not processes())
 
 
+@pytest.mark.long
 def test_a_behaviour_that_floods_leaves_the_runner_and_other_runs_alone(
     client: httpx.Client, folder: Path
 ) -> None:
@@ -172,6 +173,7 @@ def test_the_end_of_the_engines_process_ends_its_behaviours(
     assert over(client, run)["state"] == "lost"
 
 
+@pytest.mark.long
 def test_the_largest_number_of_behaviours_runs_at_once_and_obeys_one_stop(
     client: httpx.Client, folder: Path
 ) -> None:
