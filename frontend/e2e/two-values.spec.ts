@@ -116,6 +116,7 @@ async function chooseOther(page: Page, field: string): Promise<void> {
 test("who stayed is told what an edit from offline replaced, and both lists survive a reload and a closed tab", async ({
   browser,
 }) => {
+  test.skip(LONG !== "", LONG);
   const ada = await product.person(browser, "Ada", { loadsAhead: true });
   const mari = await product.person(browser, "Mari", { loadsAhead: true });
   await clientIds(ada.page, 3_000_000_000);
