@@ -17,7 +17,7 @@ unit e2e ros-test soak soak-ros pictures screens browsers bench: export ROS_AUTO
 PYTHON ?= python3
 BIN := .venv/bin
 # How many processes share the Python tests, of which many wait; each test file stays with one.
-PROCESSES ?= 5
+PROCESSES ?= 4
 ROS := .venv-ros/bin
 # Tests see nothing of a sourced ROS 2 either; `make run` does.
 BARE := env -u AMENT_PREFIX_PATH -u COLCON_PREFIX_PATH -u LD_LIBRARY_PATH
@@ -96,7 +96,7 @@ figures: .venv/.done ## sizes and language of the code, today and at an earlier 
 .PHONY: test
 test: setup ros ## every check and every test, also in a real browser
 	@# Most of these wait for processes and robots: together they take little longer than the longest.
-	@$(MAKE) --no-print-directory --jobs=5 --output-sync=target check unit ros-test
+	@$(MAKE) --no-print-directory --jobs=4 --output-sync=target check unit ros-test
 	@$(MAKE) --no-print-directory e2e
 
 .PHONY: unit
