@@ -51,6 +51,7 @@ def test_a_process_that_dies_comes_back_and_the_other_stays(tmp_path: Path, name
         assert f"{name} died (SIGKILL)" in product.log.read_text()
 
 
+@pytest.mark.long
 def test_a_frozen_editor_is_started_anew_and_a_frozen_runner_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

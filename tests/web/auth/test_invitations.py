@@ -168,6 +168,7 @@ def test_serve_makes_a_link_for_each_role_and_says_where_they_are(product: Produ
     assert "#i=" not in product.log.read_text()
 
 
+@pytest.mark.long
 def test_links_are_shown_with_a_code_for_each_role(product: Product) -> None:
     text = invitations_as_text(product.url, Keys(TOKEN))
     with product.editor() as editor:
