@@ -31,7 +31,6 @@ def note(by: int) -> Addition:
     return Addition("notes", (Draft("noted.v1", "", b"%d" % by),))
 
 
-@pytest.mark.long
 async def test_a_log_stays_sound_while_a_stream_leaves_it_and_after(open_journal: Open) -> None:
     journal = await open_journal()
     await filled(journal)

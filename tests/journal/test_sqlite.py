@@ -1,6 +1,7 @@
 """Properties of the journal on SQLite alone."""
 
 import asyncio
+import contextlib
 import os
 import shutil
 import sqlite3
@@ -169,3 +170,20 @@ async def test_the_log_that_a_long_reader_keeps_is_copied_once_it_has_gone(
     await journal.append("a", [DRAFT])
     await until(lambda: path.stat().st_size > 1_000_000)
     await journal.close()
+
+
+def test_a_close_in_the_moment_of_a_checkpoint_does_not_wait_for_ever(tmp_path: Path) -> None:
+    class ClosedWhenCleared(threading.Event):
+        def clear(self) -> None:
+            checkpoints._closed.set()
+            self.set()  # as `close` does, right before the thread clears it
+            super().clear()
+
+    with contextlib.closing(sqlite3.connect(tmp_path / "log.db")) as database:
+        database.execute("PRAGMA journal_mode=WAL")
+        checkpoints = sqlite.Checkpoints(tmp_path / "log.db", sqlite3)
+        checkpoints._due = ClosedWhenCleared()
+        checkpoints.committed()
+        assert checkpoints._thread is not None
+        checkpoints._thread.join(20)
+        assert not checkpoints._thread.is_alive()

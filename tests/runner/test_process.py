@@ -66,7 +66,7 @@ def test_after_kill_9_a_run_is_told_truthfully(own_process: RunnerProcess) -> No
 def test_a_stop_that_came_while_the_runner_stood_still_is_carried_out(
     process: RunnerProcess,
 ) -> None:
-    """It stands still for longer than a connection may be silent, and two clients do not wait."""
+    """The runner stands still for longer than a connection may be silent, and two clients do not wait."""
     bearer = "".join(f"\r\n{name}: {value}" for name, value in BEARER.items())
     head = f"HTTP/1.1\r\nhost: 127.0.0.1:{process.port}{bearer}\r\ncontent-length: "
     with process.client() as client, ExitStack() as opened:

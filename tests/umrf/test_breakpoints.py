@@ -1,4 +1,4 @@
-"""Where a led run waits, and by which values."""
+"""Breakpoints hold a led run at their place, visit, outcome and value, and nowhere else."""
 
 import msgspec
 import pytest

@@ -176,6 +176,8 @@ class Checkpoints:
         try:
             while self._due.wait() and not self._closed.wait(pause):
                 self._due.clear()
+                if self._closed.is_set():  # or the signal of `close` was cleared just now
+                    break
                 pages = self._copied(engine)
                 rate = pages / (time.monotonic() - ended)
                 pause = min(max(_PAGES / max(rate, 1.0), _SOONEST_S), _LATEST_S)

@@ -178,7 +178,7 @@ async def test_what_starts_teach_is_bounded_and_nothing_hidden_is_forgotten(
 
 @virtual
 async def test_a_change_needs_the_sight_of_the_graph_that_is_sent(tmp_path: Path) -> None:
-    """That of another version, which everybody may see, would show them what nobody has judged."""
+    """The sight of another version, which everybody may see, would show them what nobody has judged."""
     sights, harness = Sights(tmp_path), Harness()
     sights.say(0, CLOSED)
     harness.sources = StartSources(sight=sights.runner)
