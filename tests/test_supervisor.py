@@ -51,13 +51,13 @@ def test_a_process_that_dies_comes_back_and_the_other_stays(tmp_path: Path, name
         assert f"{name} died (SIGKILL)" in product.log.read_text()
 
 
-@pytest.mark.long
 def test_a_frozen_editor_is_started_anew_and_a_frozen_runner_is_reported(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("ACTION_ASSISTANT_WATCHDOG", "2")
     with running(tmp_path / "data") as product:
         editor, runner = product.process("editor"), product.process("runner")
+        eventually(lambda: "ready at" in product.log.read_text(), 60)  # it is watched from then on
         editor.suspend()
         eventually(lambda: not editor.is_running(), 60)
         product.wait_until_ready()

@@ -36,6 +36,7 @@ _BACK_OFF: Final = (0.2, 0.5, 1.0, 2.0, 5.0, 10.0)  # seconds before the n-th re
 _TICK: Final = 0.1
 _ENDING: Final = 8.0  # seconds that a process gets to end by itself
 _ASKED_EACH: Final = 5.0  # seconds between two questions whether a process answers, at most
+_ASKED_FIRST: Final = 0.2  # seconds between two questions until a start has answered
 _SAID_AFTER: Final = 15.0  # seconds of silence after which it is said, at most
 _SAID_EACH: Final = 60.0  # seconds of silence between two lines about it
 #: What hangs and may be ended: the editor keeps nothing in memory that it has acknowledged.
@@ -205,7 +206,12 @@ class Watchdog:
             answers = is_alive(self._url, self._trust, self._pause)
             took = min(time.monotonic() - asked, self._pause)
             self.note(starts, answers=answers, seconds=took + self._pause)
-            time.sleep(self._pause)
+            time.sleep(self._pause if self.has_heard else _ASKED_FIRST)
+
+    @property
+    def has_heard(self) -> bool:
+        """Return whether the process has answered since its last start, so that silence counts."""
+        return self._starts == self._child.starts
 
     def note(self, starts: int, *, answers: bool, seconds: float) -> None:
         """Take up whether the process answered a question. `starts`: how often it had been started
@@ -215,7 +221,7 @@ class Watchdog:
                 say(f"{self._child.name} answers again after {self._silent:.0f} s")
             self._heard(starts)
             return
-        if not self._starts == self._child.starts == starts:
+        if not self.has_heard or self._starts != starts:
             return  # it has never answered since its start
         self._silent += seconds
         if self._ends and self._silent >= self._limit:
@@ -253,14 +259,15 @@ def serve(plan: ServePlan) -> int:
     children = _children(plan)
     keeper = _keeper(plan)
     say("starting …")
+    watchdogs: list[Watchdog] = []
     for child in children:
         child.start(reading)
         if plan.watchdog is not None:
             watchdog = Watchdog(child, _origin(plan), trust, plan.watchdog)
             threading.Thread(target=watchdog.run, name=f"watch {child.name}", daemon=True).start()
-    threading.Thread(
-        target=_announce_page, args=(plan, keys, trust, children, enough), name="greet", daemon=True
-    ).start()
+            watchdogs.append(watchdog)
+    greeting = (plan, keys, trust, children, watchdogs, enough)
+    threading.Thread(target=_announce_page, args=greeting, name="greet", daemon=True).start()
     try:
         while not enough.within(_TICK):
             for child in children:
@@ -359,13 +366,17 @@ def _announce_page(
     keys: Keys,
     trust: ssl.SSLContext | None,
     children: list[Child],
+    watchdogs: list[Watchdog],
     enough: EndSignal,
 ) -> None:
-    """Wait until both processes answer, then print the URL of the page and open it in a browser. Do
-    nothing if the program is told to end (`enough`) before."""
+    """Wait until both processes answer and are watched, then print the URL of the page and open it in
+    a browser. Do nothing if the program is told to end (`enough`) before."""
     origin = _origin(plan)
     if not _wait_for_answers(origin, keys, trust, children, enough):
         return
+    while not all(watchdog.has_heard for watchdog in watchdogs):
+        if enough.within(_TICK):
+            return
     base = f"{origin}:{plan.port}"
     url = f"{base}/#t={keys.token}"
     shown_at = f"{plan.reached.public.page}/#t={keys.token}" if plan.reached.public else url
