@@ -133,16 +133,18 @@ class Catalogue:
         rows = await self._journal.query(chosen)
         if self._checks.names.are_read or len(rows) <= READ_FOR_A_LIST:
             await self._checks.names.refresh()
+        has_names = self._checks.names.are_read
+        may_read = READ_FOR_A_LIST if has_names else 0
         views: list[GraphView] = []
         later: dict[str, int] = {}
-        to_read = READ_FOR_A_LIST if self._checks.names.are_read else 0
         for start in range(0, len(rows), _AT_ONCE):
             some = rows[start : start + _AT_ONCE]
             await self._checks.facts.recall([row.id for row in some])
             for row in some:
-                is_known = self._checks.is_known(row.id, row.seq)
-                if to_read or (is_known and self._checks.names.are_read):
-                    to_read -= not is_known
+                if has_names and self._checks.is_known(row.id, row.seq):
+                    views.append(await self._view(row))
+                elif may_read:
+                    may_read -= 1
                     views.append(await self._view(row))
                 else:
                     later[row.id] = row.seq

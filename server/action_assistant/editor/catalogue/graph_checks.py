@@ -243,10 +243,13 @@ class GraphChecks:
         while True:
             await self._wanted.wait()
             self._wanted.clear()
+            try:
+                await self.names.refresh()
+            except Refused as error:  # the names that are known serve
+                log.warning("the names of graphs are not read: %s", error.detail)
             while self._later:
                 graph, newest = self._later.popitem()
                 try:
-                    await self.names.refresh()
                     await self.summary(graph, newest)
                 except Refused as error:
                     log.warning("%s: its facts are not computed: %s", graph, error.detail)
@@ -275,13 +278,13 @@ class GraphChecks:
             return counted
         return about.inside
 
-    async def _about(self, graph: str, newest: int, *, is_current: bool = True) -> Facts:
+    async def _about(self, graph: str, newest: int, *, of_any_version: bool = False) -> Facts:
         """Return the facts about a graph, without those inside, from the cache or a worker.
-        `newest`: the number of its newest change. `is_current`: False also takes facts that another
+        `newest`: the number of its newest change. `of_any_version`: also take facts that another
         version of this program computed. Raise Unavailable if it cannot be read, TooLarge if it
         needs too much memory."""
         known = self.facts.get(graph)
-        if known is not None and known.newest >= newest and known.is_current >= is_current:
+        if known is not None and known.newest >= newest and (known.is_current or of_any_version):
             return known
         hopeless = self._hopeless.get(graph)
         if hopeless is not None and hopeless[0] >= newest:
@@ -302,7 +305,7 @@ class GraphChecks:
         room = self._rooms.open_room(graph_stream(graph))
         if room is not None and kind == "graph":
             return await room.read(lambda replica, _: document.name_of(replica.doc))
-        return _name_in((await self._about(graph, newest, is_current=False)).info, kind)
+        return _name_in((await self._about(graph, newest, of_any_version=True)).info, kind)
 
     async def _known_names(
         self, documents: Mapping[str, tuple[int, DocumentKind]]
@@ -367,7 +370,7 @@ class GraphChecks:
         if known is None:
             return None
         try:
-            about = await self._about(known.graph, known.seq, is_current=False)
+            about = await self._about(known.graph, known.seq, of_any_version=True)
         except (*HOPELESS, NotFound):
             return None
         if about.info.name != name:  # renamed meanwhile; the next call has the new name

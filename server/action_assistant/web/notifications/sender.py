@@ -109,8 +109,8 @@ class Notifications:
         while True:
             try:
                 await self.outbox.prune(self._clock_us())
-            except Unavailable:
-                pass
+            except Unavailable as error:
+                log.warning("old messages are not deleted yet: %s", error.detail)
             except Exception:  # no message may end a process, which others need for Stop
                 log.exception("old messages cannot be deleted")
             await anyio.sleep(_PRUNE_S)
