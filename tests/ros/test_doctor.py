@@ -50,7 +50,10 @@ def test_the_faults_of_each_robot_are_told_apart(tmp_path: Path, domains: list[i
         engine(four) as frozen,
     ):
         frozen.holding.set()
-        code, found = doctor(data, one)
+        for _ in range(3):  # on a busy machine it may not have waited for an answer for long enough
+            code, found = doctor(data, one)
+            if found["frozen"]["message"] != "It has not answered yet.":
+                break
     assert code == 1
     assert "sound" not in found
     assert "Engines answer on /sound/umrf_graph_get, /stranger" in found["elsewhere"]["message"]
