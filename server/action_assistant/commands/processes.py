@@ -287,9 +287,11 @@ def _backup_plan(options: argparse.Namespace) -> "BackupPlan | None":
 def _editor(options: argparse.Namespace) -> int:
     gc.disable()  # until it listens: what is loaded by then stays
     from action_assistant.editor.app import create_app
+    from action_assistant.editor.workers import prepare_workers
     from action_assistant.system.served_addresses import published
     from action_assistant.web.server.listen import serve as listen
 
+    prepare_workers()
     data = settings.data_folder(options.data.resolve())
     _log("editor", options, *_secrets(data))
     chosen = _editor_settings(options, data)
@@ -308,9 +310,11 @@ def _editor(options: argparse.Namespace) -> int:
 def _runner(options: argparse.Namespace) -> int:
     gc.disable()  # until it listens: what is loaded by then stays
     from action_assistant.runner.app import create_app
+    from action_assistant.runner.workers import prepare_workers
     from action_assistant.system.served_addresses import published
     from action_assistant.web.server.listen import serve as listen
 
+    prepare_workers()
     data = settings.data_folder(options.data.resolve())
     _log("runner", options, *_secrets(data))
     chosen = settings.RunnerSettings(

@@ -8,7 +8,7 @@ from typing import Final, TypeVar, cast
 import msgspec
 from anyio import CapacityLimiter
 
-from action_assistant.web.workers.lanes import Lane, kept_warm
+from action_assistant.web.workers.lanes import Lane, kept_warm, start_fork_server
 
 T = TypeVar("T")
 
@@ -32,6 +32,12 @@ _PRELOADED: Final = (
     "action_assistant.editor.history.drafts.merge_previews",
 )
 _NICE: Final = 5
+
+
+def prepare_workers() -> None:
+    """Fork the fork server of the editor's workers: at the start, before there are threads, data or
+    sockets."""
+    start_fork_server(_PRELOADED)
 
 
 class EditorWorkers:

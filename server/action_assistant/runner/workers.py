@@ -13,7 +13,7 @@ from action_assistant.web.workers.lanes import Crashed, Lane, kept_warm
 if TYPE_CHECKING:  # not on Windows
     from multiprocessing.context import ForkServerProcess
 
-__all__ = ["Crashed", "Lane", "RunnerWorkers", "child"]
+__all__ = ["Crashed", "Lane", "RunnerWorkers", "child", "prepare_workers"]
 
 #: Modules that the fork server imports before it makes workers.
 _PRELOADED: Final = (
@@ -23,6 +23,12 @@ _PRELOADED: Final = (
 )
 _NICE: Final = 5  # nice values: of lanes that a person waits for, and of others
 _NICER: Final = 10
+
+
+def prepare_workers() -> None:
+    """Fork the fork server of the runner's workers: at the start, before there are threads, data or
+    sockets."""
+    workers.start_fork_server(_PRELOADED)
 
 
 class RunnerWorkers:

@@ -1,8 +1,12 @@
 """Workers are there before they are needed, and never in the way of a start."""
 
+import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from operator import add
-from typing import Any
+from pathlib import Path
+from typing import Any, Final
 
 import anyio
 import pytest
@@ -46,7 +50,10 @@ async def test_a_worker_is_warmed_without_any_request(
                 await anyio.sleep(0.01)
 
 
-async def test_a_request_before_the_warm_up_gets_a_worker(lane: Watched) -> None:
+async def test_a_request_before_the_warm_up_gets_a_worker(
+    lane: Watched, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(lanes, "_FIRST_S", 600)  # a new process may take longer than 2 s
     async with kept_warm(lane):
         assert await lane(add, 2, 3) == 5
     assert lane.begun == 0
@@ -66,3 +73,57 @@ async def test_a_worker_that_dies_before_its_first_work_counts_as_a_death(
             await lane(add, 2, 3)
     assert lane.deaths == 1
     assert await lane(add, 2, 3) == 5
+
+
+#: Prints what workers find: of the fork server that was prepared, and of the next one when that died.
+_SCRIPT: Final = """
+import colorsys, gc, os, signal
+import anyio
+from action_assistant.web.workers import lanes
+from web.workers import worker_looks
+
+gc.disable()  # as the servers do until they listen
+opened = os.open(colorsys.__file__, os.O_RDONLY)
+if {prepared}:
+    lanes.start_fork_server(())
+
+async def main():
+    lane = lanes.Lane("try", 1, 30, 0, anyio.CapacityLimiter(4), ())
+    print(await lane(worker_looks.look, opened, colorsys.__file__))
+    os.kill(await lane(worker_looks.parent), signal.SIGKILL)
+    lane.close()
+    with anyio.fail_after(60):
+        while True:
+            try:
+                print(await lane(worker_looks.look, opened, colorsys.__file__))
+                break
+            except lanes.Crashed:
+                await anyio.sleep(0.05)
+    lane.close()
+
+anyio.run(main)
+"""
+
+
+def found_by_workers(*, prepared: bool) -> list[str]:
+    """What a worker of a new process finds, and one that is made after the fork server was killed."""
+    tests = str(Path(__file__).parents[2])
+    return subprocess.run(
+        [sys.executable, "-c", _SCRIPT.format(prepared=prepared)],
+        env={**os.environ, "PYTHONPATH": tests},
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=100,
+    ).stdout.splitlines()
+
+
+ANEW = "imports anew, collects garbage, has nothing open"
+
+
+def test_a_prepared_fork_server_has_what_was_imported_and_nothing_that_was_open() -> None:
+    assert found_by_workers(prepared=True) == [ANEW.replace("anew", "shared"), ANEW]
+
+
+def test_a_fork_server_that_was_not_prepared_is_a_new_interpreter() -> None:
+    assert found_by_workers(prepared=False) == [ANEW, ANEW]

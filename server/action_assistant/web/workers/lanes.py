@@ -1,9 +1,10 @@
 """Worker processes: whatever may take long happens in them, so that the event loop stays free.
 
-A thread would not do: it shares the interpreter lock with the loop. Workers are forked by a server
-process that `multiprocessing` starts afresh, so they hold nothing of ours, no rclpy, no locks of its
-threads, and a new one is there within milliseconds. What is asked of them has to be a function of a
-module, with values that can be pickled.
+A thread would not do: it shares the interpreter lock with the loop. Workers are forked by the fork
+server of `multiprocessing`, which begins before this process has threads, data or sockets
+(`start_fork_server`), so they hold nothing of ours, no rclpy, no locks of its threads, and a new one
+is there within milliseconds. What is asked of them has to be a function of a module, with values
+that can be pickled.
 """
 
 import asyncio
@@ -14,10 +15,13 @@ import multiprocessing
 import os
 import pickle
 import signal
+import sys
 import threading
+import traceback
 from collections.abc import AsyncIterator, Awaitable, Callable, Iterator, Sequence
 from contextlib import asynccontextmanager, contextmanager
 from functools import cache
+from multiprocessing import resource_tracker, util
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Protocol, TypeVar
@@ -44,6 +48,7 @@ __all__ = [
     "child",
     "kept_warm",
     "run_here",
+    "start_fork_server",
 ]
 
 log: Final = logging.getLogger(__name__)
@@ -67,6 +72,50 @@ def _context() -> "ForkServerContext":
     """Return the context that forks workers from a process without other state. It does not exist
     on Windows."""
     return multiprocessing.get_context("forkserver")
+
+
+def start_fork_server(preloaded: Sequence[str]) -> None:
+    """Fork the process that will fork the workers, with the modules that this process has imported.
+
+    A fork server that is started as a new interpreter imports them again, for 1.5 s of a processor.
+    To be called after the imports and before this process has threads, data or sockets. Where
+    forking is not safe, the first worker starts a new interpreter, as it does when the fork server
+    dies.
+    """
+    if sys.platform != "linux" or threading.active_count() > 1:
+        return
+    from multiprocessing import forkserver  # not on Windows
+
+    resource_tracker.ensure_running()  # a process of its own, in a new interpreter
+    _context().set_forkserver_preload(list(preloaded))
+    started_anew = util.spawnv_passfds
+    util.spawnv_passfds = _forked
+    try:
+        forkserver.ensure_running()
+    finally:
+        util.spawnv_passfds = started_anew
+
+
+def _forked(path: bytes, args: Sequence[Any], passfds: Sequence[int]) -> int:
+    """Do in a fork of this process what the interpreter at `path` would do for `-c` among `args`,
+    with no open files but `passfds` and the standard ones. Return the number of the process."""
+    process = os.fork()
+    if process:
+        return process
+    try:
+        end = os.sysconf("SC_OPEN_MAX")
+        kept = sorted(passfds)
+        for before, after in zip([2, *kept], [*kept, end], strict=True):
+            os.closerange(before + 1, after)
+        gc.freeze()  # pages that nobody writes to stay shared
+        gc.enable()
+        exec(args[-1], {})  # a line that `multiprocessing` writes
+    except SystemExit:
+        os._exit(0)  # no client is left
+    except BaseException:  # noqa: BLE001 - nothing of this process may go on here
+        traceback.print_exc()
+    finally:
+        os._exit(1)
 
 
 def wire() -> tuple[Connection, Connection]:
