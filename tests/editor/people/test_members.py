@@ -99,10 +99,10 @@ async def test_a_link_that_is_used_meanwhile_stays_used(
     made = await members.add("Ada", "viewer", OWNER.id, groups=(group.id,))
     link = made.links[0].id
     await asyncio.gather(
-        members.remove_group(group.id, OWNER.id), members.come_in(link, "Firefox", "")
+        members.remove_group(group.id, OWNER.id), members.come_in(link, "s1", "Firefox", "")
     )
     with pytest.raises((Unauthenticated, Withdrawn)):
-        await members.come_in(link, "Firefox", "")
+        await members.come_in(link, "s1", "Firefox", "")
 
 
 @pytest.mark.parametrize("name", ["\0", "a\x1b[31m", "a\u202eb", "\u200b"])

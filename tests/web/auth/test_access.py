@@ -73,7 +73,7 @@ class Nobody:
     async def look(self, proof: str) -> Invited:
         raise Unauthenticated(f"{proof} is not known.")
 
-    async def come_in(self, link: str, browser: str, address: str) -> PersonFile:
+    async def come_in(self, link: str, session: str, browser: str, address: str) -> PersonFile:
         raise AssertionError(f"{browser} at {address} came by {link}")
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:

@@ -262,18 +262,21 @@ class ProviderSignIn:
         settings, members = provider.settings, self._app_state.services.members
         person = provided_id(found.issuer, found.subject)
         members.refuse_ended(person)
-        role = settings.role(found.groups)
+        role, address = settings.role(found.groups), client_address(request.scope)
         if role is None:
-            await self._put_out(person, found)
+            with acting_for(person, Origin(found.name[:_NAME], address=address)):
+                await self._put_out(person, found)
             raise Forbidden(
                 f"{settings.name} knows you, but none of your groups there may come in here. Ask "
                 "the person who runs this server."
             )
         mapped = settings.groups.keys() & set(found.groups)
-        address = client_address(request.scope)
-        with acting_for(person, Origin(found.name[:_NAME], address=address)):
+        now = session_of(request)
+        goes_on = now is not None and now.personal and now.person.id == person
+        id_ = now.id if now is not None and goes_on else random_id()
+        with acting_for(person, Origin(found.name[:_NAME], id_, address=address)):
             came = await provided(members, found.issuer, found.subject, found.name, role, mapped)
-        session = await self._sessions.begin(came, request, goes_on=True)
+        session = await self._sessions.begin(came, id_, request)
         self._sessions.note_sign_in(session, "oidc", request)
         await to_thread.run_sync(self._browsers.note, session, browser_of(request), address)
         return session

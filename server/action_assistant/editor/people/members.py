@@ -44,6 +44,7 @@ from action_assistant.random_ids import random_id
 from action_assistant.safe_text import is_name
 from action_assistant.schema import editor_tables
 from action_assistant.web.auth import people_files
+from action_assistant.web.auth.caller import Origin, acting_for
 from action_assistant.web.auth.keys import Keys, PersonRef
 from action_assistant.web.auth.people_files import PeopleFiles, PersonFile
 from action_assistant.web.auth.revocations import Revocations
@@ -376,14 +377,16 @@ class Members:
         by = self._people.person(found.made_by.id).name
         return Invited(link, member.role, by, member.name)
 
-    async def come_in(self, link: str, browser: str, address: str) -> PersonFile:
-        """Use a personal link, and return its person. Of several who use it at once, one comes in.
-        Raise Unauthenticated or Withdrawn for the others, Unavailable if the log cannot be written."""
+    async def come_in(self, link: str, session: str, browser: str, address: str) -> PersonFile:
+        """Use a personal link for the session with this id, and return its person. Of several who use
+        it at once, one comes in. Raise Unauthenticated or Withdrawn for the others, Unavailable if the
+        log cannot be written."""
         member, _ = self._usable(link)
         self._set_link(link, datetime.now(UTC), browser, address)
         try:
             used = e.LinkUsed(link, browser, address)
-            await self._append([h.draft(e.LINK_USED, member.id, used)])
+            with acting_for(member.id, Origin(member.name, session, address=address)):
+                await self._append([h.draft(e.LINK_USED, member.id, used)])
         except Unavailable:
             self._set_link(link, None)  # nobody came in by it
             raise

@@ -22,6 +22,6 @@ class Reception:
         """Record that a person came in by a group link."""
         await self._invitations.welcome(invitation, person)
 
-    async def come_in(self, link: str, browser: str, address: str) -> PersonFile:
-        """Use a personal link, and return its person."""
-        return await self._members.come_in(link, browser, address)
+    async def come_in(self, link: str, session: str, browser: str, address: str) -> PersonFile:
+        """Use a personal link for the session with this id, and return its person."""
+        return await self._members.come_in(link, session, browser, address)

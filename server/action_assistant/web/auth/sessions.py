@@ -16,6 +16,7 @@ from msgspec.structs import replace
 
 from action_assistant.errors import BadInput, Forbidden, TooMany, Unauthenticated, Unavailable
 from action_assistant.kit.token_bucket import TokenBuckets
+from action_assistant.random_ids import random_id
 from action_assistant.web.auth.access import (
     Needs,
     Open,
@@ -127,9 +128,9 @@ class InvitationRegistry(Protocol):
     async def look(self, proof: str) -> Invited:
         """Return the invitation that a link proves. Raise Unauthenticated if the link is not valid."""
 
-    async def come_in(self, link: str, browser: str, address: str) -> PersonFile:
-        """Use a personal link, and return its person. Of several who use it at once, one comes in;
-        raise Unauthenticated for the others."""
+    async def come_in(self, link: str, session: str, browser: str, address: str) -> PersonFile:
+        """Use a personal link for the session with this id, and return its person. Of several who use
+        it at once, one comes in; raise Unauthenticated for the others."""
 
     async def welcome(self, invitation: str, person: PersonRef) -> None:
         """Record that a person came in by an invitation."""
@@ -274,24 +275,22 @@ class Sessions:
 
     async def _came(self, link: str, request: _Asking) -> Session:
         """Return the session of the person of a personal link."""
-        browser = browser_of(request)
-        person = await self._reception().come_in(link, browser, client_address(request.scope))
-        return await self.begin(person, request)
+        browser, session = browser_of(request), random_id()
+        address = client_address(request.scope)
+        person = await self._reception().come_in(link, session, browser, address)
+        return await self.begin(person, session, request)
 
-    async def begin(
-        self, person: PersonFile, request: _Asking, *, goes_on: bool = False
-    ) -> Session:
-        """Return a new session of a person with rights of their own. The session that this browser
-        had ends; if `goes_on` and it is of the same person, it goes on instead."""
+    async def begin(self, person: PersonFile, session: str, request: _Asking) -> Session:
+        """Return the session with this id of a person with rights of their own. The session that this
+        browser had ends, unless it is this one, which goes on."""
         now = session_of(request)
-        same = goes_on and now is not None and now.personal and now.person.id == person.id
-        if not same:
+        if now is None or now.id != session:
             await self.leave(request)
         return self._keys.new_session(
             person.name,
             role=person.role,
             person_id=person.id,
-            session_id=now.id if same and now is not None else None,
+            session_id=session,
             personal=True,
             seconds=self._standings.limits[person.role].longest,
         )
