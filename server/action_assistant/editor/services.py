@@ -34,12 +34,13 @@ from action_assistant.settings import EditorSettings
 from action_assistant.web.audit.log import AuditLog
 from action_assistant.web.auth.access import person_of
 from action_assistant.web.auth.graph_seals import RulesFile
-from action_assistant.web.auth.identity import Identity
+from action_assistant.web.auth.identity import ANYBODY, Identity
 from action_assistant.web.auth.keys import Keys, Person
 from action_assistant.web.auth.people_files import PeopleFiles
 from action_assistant.web.auth.released_versions import ReleasedVersions
 from action_assistant.web.auth.revocations import Revocations
 from action_assistant.web.network.connection_limits import ConnectionLimits
+from action_assistant.web.notifications.messages import Message
 from action_assistant.web.notifications.receivers import receivers_of
 from action_assistant.web.notifications.sender import Notifications
 
@@ -105,7 +106,11 @@ class EditorServices:
         public = settings.reached.public
         receivers = receivers_of(settings.notifications, KINDS)
         self.notifications = Notifications(
-            journal, receivers, KINDS, public.page if public is not None else ""
+            journal,
+            receivers,
+            KINDS,
+            public.page if public is not None else "",
+            self._is_seen_by_all,
         )
         self.inboxes = Inboxes(journal, self.change_index, receivers, may_see=self._may_see)
         self.history = GraphHistory(self.change_index)
@@ -118,6 +123,9 @@ class EditorServices:
         self.draft_merges = DraftMerges(
             journal, self.rooms, self.drafts, self.change_index, people, self.graph_checks
         )
+
+    async def _is_seen_by_all(self, message: Message) -> bool:
+        return await self.rights.may_see(str(message.facts["id"]), ANYBODY)
 
     async def _may_see(self, graph: str, person: str) -> bool:
         """Return whether a person may see a graph by their present role and groups. Somebody who came

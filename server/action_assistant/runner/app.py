@@ -27,6 +27,7 @@ from action_assistant.runner.api.caller import SMALL
 from action_assistant.runner.api.confirmations import routes as device_confirmations
 from action_assistant.runner.api.live import Hub
 from action_assistant.runner.api.monitoring import WatchedRunner
+from action_assistant.runner.api.run_guard import is_seen_by_all
 from action_assistant.runner.api.runs import routes
 from action_assistant.runner.api.services import RunnerServices
 from action_assistant.runner.archives.archive_store import ArchiveStore
@@ -73,6 +74,7 @@ from action_assistant.web.auth.view_links import ViewLinks
 from action_assistant.web.monitoring.monitoring import Monitoring
 from action_assistant.web.network.addresses import addresses_of
 from action_assistant.web.network.connection_limits import ConnectionLimits
+from action_assistant.web.notifications.messages import Message
 from action_assistant.web.notifications.receivers import receivers_of
 from action_assistant.web.notifications.routes import notification_routes
 from action_assistant.web.notifications.sender import Notifications
@@ -131,7 +133,11 @@ async def open_services(
                 tasks.start_soon(index_words, journal)
                 public = settings.reached.public
                 services.notifications = Notifications(
-                    journal, receivers, KINDS, public.page if public is not None else ""
+                    journal,
+                    receivers,
+                    KINDS,
+                    public.page if public is not None else "",
+                    partial(_is_seen_by_all, services),
                 )
                 control.idle_stop = partial(_note_idle_stop, services.audit)
                 old_audit = AuditRetention(journal, settings.audit_days, incident_times)
@@ -163,6 +169,11 @@ def _identity_now(
         groups=standing.groups,
         confirmed_at=standing.confirmed_at,
     )
+
+
+async def _is_seen_by_all(services: RunnerServices, message: Message) -> bool:
+    run, graph = (str(message.facts.get(name, "")) for name in ("run", "id"))
+    return await is_seen_by_all(services, run, graph)
 
 
 async def _note_token(audit: AuditLog, record: TokenRecord, person: str) -> None:

@@ -5,6 +5,7 @@ import socket
 import ssl
 import threading
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from email import message_from_bytes, policy
@@ -20,7 +21,7 @@ from standardwebhooks import Webhook as StandardWebhook
 
 from action_assistant.web.network.certificate import Certificate
 from action_assistant.web.notifications.messages import KINDS, Message
-from action_assistant.web.notifications.receivers import Webhook
+from action_assistant.web.notifications.receivers import Mailbox, Webhook
 
 KEY = b"0123456789abcdef0123456789abcdef"
 SECRET = "whsec_" + base64.b64encode(KEY).decode()
@@ -83,17 +84,32 @@ def http_receiver(context: ssl.SSLContext | None = None) -> Iterator[HttpReceive
 
 
 class Mails:
-    """The mails that a mail server has got. `refuses`: the answer to each mail instead."""
+    """The mails that a mail server has got. `refuses`: the answer to each mail instead; `unknown`:
+    addresses that it refuses; `got`, `refused`: how often each address got or was refused a mail."""
 
     def __init__(self) -> None:
         self.raw: list[bytes] = []
         self.refuses = ""
+        self.unknown: set[str] = set()
+        self.got: Counter[str] = Counter()
+        self.refused: Counter[str] = Counter()
+
+    async def handle_RCPT(  # noqa: N802
+        self, _server: Any, _session: Any, envelope: Any, address: str, _options: list[str]
+    ) -> str:
+        """Take or refuse an address."""
+        if address in self.unknown:
+            self.refused[address] += 1
+            return "550 no such user"
+        envelope.rcpt_tos.append(address)
+        return "250 OK"
 
     async def handle_DATA(self, _server: Any, _session: Any, envelope: Any) -> str:  # noqa: N802
         """Keep a mail."""
         if self.refuses:
             return self.refuses
         self.raw.append(envelope.content)
+        self.got.update(envelope.rcpt_tos)
         return "250 OK"
 
     @property
@@ -138,6 +154,21 @@ def webhook(url: str, name: str = "chat", **fields: Any) -> Webhook:
     """Return a webhook for all kinds; hosts on this computer are allowed."""
     given = {"allow": LOOPBACK, "kinds": frozenset(KINDS), "key": KEY} | fields
     return Webhook(name=name, url=urlsplit(url), **given)
+
+
+def mailbox(port: int, **fields: object) -> Mailbox:
+    """Return two mail addresses behind a mail server on this computer."""
+    given = {
+        "name": "lab",
+        "kinds": frozenset(KINDS),
+        "host": "localhost",
+        "port": port,
+        "security": "starttls",
+        "sender": "robots@example.org",
+        "to": ("lab@example.org", "night@example.org"),
+        "allow": LOOPBACK,
+    }
+    return Mailbox(**(given | fields))
 
 
 def failed_run(at: int = NOW, **facts: Any) -> Message:

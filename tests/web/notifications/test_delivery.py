@@ -11,32 +11,16 @@ import pytest
 from action_assistant.kit.clock import utc_us
 from action_assistant.web.notifications import delivery
 from action_assistant.web.notifications.delivery import NotDelivered, deliver, is_public
-from action_assistant.web.notifications.messages import KINDS
-from action_assistant.web.notifications.receivers import Mailbox
 from web.notifications.receiving import (
-    LOOPBACK,
     failed_run,
     http_receiver,
     mail_server,
+    mailbox,
     tls,
     webhook,
 )
 
 PAGE = "https://robots.example.org/temoto"
-
-
-def _mailbox(port: int, **fields: object) -> Mailbox:
-    given = {
-        "name": "lab",
-        "kinds": frozenset(KINDS),
-        "host": "localhost",
-        "port": port,
-        "security": "starttls",
-        "sender": "robots@example.org",
-        "to": ("lab@example.org", "night@example.org"),
-        "allow": LOOPBACK,
-    }
-    return Mailbox(**(given | fields))
 
 
 def test_a_receiver_can_verify_a_webhook() -> None:
@@ -146,26 +130,24 @@ def test_the_host_is_resolved_once_and_that_address_is_used(
 def test_a_mail_arrives_encrypted(tmp_path: Path) -> None:
     context, authority = tls(tmp_path, "localhost")
     with mail_server(context) as (mails, port):
-        deliver(
-            _mailbox(port, ca=authority), failed_run(why="It fell.\nBcc: all@example.org"), PAGE
-        )
+        deliver(mailbox(port, ca=authority), failed_run(why="It fell.\nBcc: all@example.org"), PAGE)
         (mail,) = mails.read
         assert mail["to"] == "lab@example.org, night@example.org"
         assert mail["bcc"] is None
         assert mail["auto-submitted"] == "auto-generated"
         assert f"{PAGE}/runs/r1" in mail.get_content()
         with pytest.raises(NotDelivered, match="certificate is not trusted"):
-            deliver(_mailbox(port), failed_run(), "")
+            deliver(mailbox(port), failed_run(), "")
         mails.refuses = "552 too much"
         with pytest.raises(NotDelivered, match="It answered 552"):
-            deliver(_mailbox(port, ca=authority), failed_run(), "")
+            deliver(mailbox(port, ca=authority), failed_run(), "")
 
 
 def test_a_mail_server_that_does_not_encrypt_gets_nothing() -> None:
     with mail_server() as (mails, port):
         with pytest.raises(NotDelivered, match="does not encrypt"):
-            deliver(_mailbox(port), failed_run(), "")
-        deliver(_mailbox(port, security="none"), failed_run(), "")
+            deliver(mailbox(port), failed_run(), "")
+        deliver(mailbox(port, security="none"), failed_run(), "")
     assert len(mails.raw) == 1
 
 

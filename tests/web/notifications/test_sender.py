@@ -26,7 +26,7 @@ from action_assistant.web.notifications.outbox import RETRIES_S, id_of, row
 from action_assistant.web.notifications.receivers import Receiver
 from action_assistant.web.notifications.sender import Notifications
 from support.doses import examples
-from web.notifications.receiving import http_receiver, webhook
+from web.notifications.receiving import http_receiver, mail_server, mailbox, webhook
 
 HOUR = 3_600_000_000
 RECEIVERS = (webhook("https://a.example/", "a"), webhook("https://b.example/", "b"))
@@ -85,6 +85,10 @@ class Network:
             self._loop.call_soon_threadsafe(self.cut.set)
 
 
+async def _seen_by_all(message: Message) -> bool:
+    return bool(message.id)
+
+
 async def _true(value: object) -> bool:
     return bool(value)
 
@@ -110,6 +114,7 @@ async def _life(journal: Journal, network: Network, clock: Clock, until: float |
         RECEIVERS,
         ["run.ended"],
         "",
+        _seen_by_all,
         clock_us=clock,
         deliver=network.deliver,
         look_s=0,
@@ -195,7 +200,9 @@ async def test_a_test_that_arrives_switches_a_receiver_on_again(tmp_path: Path) 
     journal = await _open(tmp_path)
     with http_receiver() as receiver:
         chat = webhook(f"http://127.0.0.1:{receiver.port}/", "a")
-        sender = Notifications(journal, [chat], ["run.ended"], "", gap_s=0, look_s=0.01)
+        sender = Notifications(
+            journal, [chat], ["run.ended"], "", _seen_by_all, gap_s=0, look_s=0.01
+        )
         receiver.answers = [410]
         await journal.append("run/x", [EVENT])
         async with sender.sending():
@@ -225,7 +232,7 @@ async def test_a_slow_receiver_delays_nothing_else(tmp_path: Path) -> None:
             webhook(f"http://127.0.0.1:{each.port}/", name)
             for each, name in ((slow, "a"), (quick, "b"))
         ]
-        sender = Notifications(journal, both, ["run.ended"], "", gap_s=0, look_s=0.01)
+        sender = Notifications(journal, both, ["run.ended"], "", _seen_by_all, gap_s=0, look_s=0.01)
         async with sender.sending():
             await journal.append("run/x", [EVENT])
             await _until(lambda: _true(slow.got and quick.got))
@@ -246,7 +253,7 @@ async def test_no_message_that_cannot_be_read_or_sent_ends_the_process_or_keeps_
         await journal.derive(lambda c, v=values: c.execute(insert(outbox).values(v)))
     await journal.append("run/x", [EVENT])
     sender = Notifications(
-        *(journal, RECEIVERS[:1], ["run.ended"], ""),
+        *(journal, RECEIVERS[:1], ["run.ended"], "", _seen_by_all),
         deliver=lambda _, message, __: took.update([message.id]),
         gap_s=0,
         look_s=0.01,
@@ -280,7 +287,7 @@ async def test_a_message_on_which_this_program_fails_switches_no_receiver_off(
         took[message.id] += 1
 
     sender = Notifications(
-        *(journal, RECEIVERS[:1], ["run.ended"], ""),
+        *(journal, RECEIVERS[:1], ["run.ended"], "", _seen_by_all),
         clock_us=Clock(),
         deliver=deliver,
         look_s=0,
@@ -297,10 +304,79 @@ async def test_a_message_on_which_this_program_fails_switches_no_receiver_off(
 
 async def test_another_address_of_a_receiver_is_tried_again(tmp_path: Path) -> None:
     journal = await _open(tmp_path)
-    old = Notifications(journal, [webhook("https://a.example/", "a")], ["run.ended"], "")
+    old = Notifications(
+        journal, [webhook("https://a.example/", "a")], ["run.ended"], "", _seen_by_all
+    )
     await old.outbox.switch_off(old.receivers[0], "Gone.", utc_us())
     assert (await old.states())[0].off == "Gone."
-    new = Notifications(journal, [webhook("https://c.example/", "a")], ["run.ended"], "")
+    new = Notifications(
+        journal, [webhook("https://c.example/", "a")], ["run.ended"], "", _seen_by_all
+    )
     await new.outbox.open(new.receivers)
     assert (await new.states())[0].off == ""
+    await journal.close()
+
+
+async def test_where_one_address_refuses_a_mail_only_that_one_gets_it_again(tmp_path: Path) -> None:
+    journal, clock = await _open(tmp_path), Clock()
+    with mail_server() as (mails, port):
+        lab = mailbox(port, name="a", security="none", to=("old@example.org", "lab@example.org"))
+        mails.unknown = {"old@example.org"}
+
+        def sender() -> Notifications:
+            return Notifications(
+                *(journal, [lab], ["run.ended"], "", _seen_by_all),
+                clock_us=clock,
+                look_s=0,
+                gap_s=0,
+            )
+
+        for _ in range(2):
+            await journal.append("run/x", [EVENT])
+        async with sender().sending():
+            await _until(lambda: _true(mails.refused["old@example.org"] > 4))
+        async with sender().sending():  # a restart does not forget it
+            await _until(lambda: _mail_is_over(journal))
+        assert mails.got == {"lab@example.org": 2}
+        assert mails.refused["old@example.org"] >= 2 * (len(RETRIES_S) + 1)
+        (state,) = await sender().states()
+        assert (state.off, state.error) == ("", "It refused old@example.org.")
+        mails.unknown.clear()
+        await journal.append("run/x", [EVENT])
+        async with sender().sending():
+            await _until(lambda: _mail_is_over(journal))
+        assert mails.got == {"lab@example.org": 3, "old@example.org": 1}
+    await journal.close()
+
+
+async def _mail_is_over(journal: Journal) -> bool:
+    return not any(each.due is not None for each in await _rows(journal) if each.receiver == "a")
+
+
+@pytest.mark.parametrize("fails", [False, True])
+async def test_a_graph_that_not_everybody_may_see_is_not_named(tmp_path: Path, fails: bool) -> None:
+    journal, texts = await _open(tmp_path), dict[str, str]()
+    facts = {"run": "r1", "number": 3, "graph": "Secret", "robot": "David", "state": "an error"}
+    for run in ("r1", "r2"):
+        values = row(
+            run, "a", "run.ended", run, utc_us(), {**facts, "run": run, "why": "At Vault."}
+        )
+        await journal.derive(lambda c, v=values: c.execute(insert(outbox).values(v)))
+
+    async def seen_by_all(message: Message) -> bool:
+        if fails:
+            raise NotFound("The run cannot be read.")
+        return message.facts["run"] == "r2"
+
+    sender = Notifications(
+        *(journal, RECEIVERS[:1], ["run.ended"], "", seen_by_all),
+        deliver=lambda _, message, __: texts.update({message.id: message.text}),
+        look_s=0,
+        gap_s=0,
+    )
+    async with sender.sending():
+        await _until(lambda: _true(len(texts) == 2))
+    unnamed = "Run 3 of a graph that not everybody may see on David has failed: an error."
+    named = "Run 3 of Secret on David has failed: an error. At Vault."
+    assert texts == {"r1": unnamed, "r2": unnamed if fails else named}
     await journal.close()

@@ -26,6 +26,7 @@ from action_assistant.runner.runs.sight import (
     Unseen,
 )
 from action_assistant.web.auth.access import identity_of
+from action_assistant.web.auth.identity import ANYBODY
 
 _Connection = ASGIConnection[Any, Any, Any, Any]
 _View = TypeVar("_View", bound=views.RunSummary)
@@ -119,6 +120,16 @@ async def _graphs_of(services: RunnerServices, run: str) -> RunGraphs | None:
         if found is not None:
             services.control.sight.remember(run, found)
     return found
+
+
+async def is_seen_by_all(services: RunnerServices, run: str, graph: str) -> bool:
+    """Return whether everybody may see a run, or a graph where no run is named (""). A run that does not
+    exist is seen by nobody while there are rules."""
+    unseen = services.sight.unseen(ANYBODY)
+    if unseen is None:
+        return True
+    of = await _graphs_of(services, run) if run else RunGraphs("", (graph,))
+    return of is not None and not unseen.hides(of)
 
 
 def shown(services: RunnerServices, connection: _Connection, view: _View, of: RunGraphs) -> _View:

@@ -106,6 +106,10 @@ class Identity(msgspec.Struct, frozen=True):
         return None if self.token is None else self.token.scopes
 
 
+#: Somebody whom no rule names: may see what everybody may see.
+ANYBODY: Final = Identity(Person("", "", "viewer"))
+
+
 class Tokens(Protocol):
     """Knows the tokens of programs."""
 

@@ -38,11 +38,12 @@ _Address = ipaddress.IPv4Address | ipaddress.IPv6Address
 
 class NotDelivered(Exception):
     """The receiver did not take the message; the text says why, for people. `is_final`: it wants no
-    message any more."""
+    message any more; `left`: the mail addresses that refused it, if others took it."""
 
-    def __init__(self, why: str, *, is_final: bool = False) -> None:
+    def __init__(self, why: str, *, is_final: bool = False, left: tuple[str, ...] = ()) -> None:
         super().__init__(why)
         self.is_final: Final = is_final
+        self.left: Final = left
 
 
 def deliver(receiver: Receiver, message: Message, page: str) -> None:
@@ -116,6 +117,9 @@ class _PinnedSmtp(smtplib.SMTP):
 
 
 def _mail(receiver: Mailbox, message: Message, page: str) -> None:
+    to = tuple(each for each in receiver.to if not message.left or each in message.left)
+    if not to:  # the setting does not name those any more who are left
+        return
     text = mail(message, page, utc_us(), sender=receiver.sender, to=receiver.to)
     host, port = receiver.host, receiver.port
     needs_private = receiver.security == "none"
@@ -126,9 +130,9 @@ def _mail(receiver: Mailbox, message: Message, page: str) -> None:
                 connection.starttls(context=_context(receiver.ca))
             if receiver.user:
                 connection.login(receiver.user, receiver.password)
-            refused = connection.sendmail(receiver.sender, receiver.to, text)
+            refused = connection.sendmail(receiver.sender, to, text)
     if refused:
-        raise NotDelivered(f"It refused {', '.join(refused)}.")
+        raise NotDelivered(f"It refused {', '.join(refused)}.", left=tuple(refused))
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 import msgspec
+from msgspec.structs import replace
 
 from action_assistant.kit.moments import moment
 from action_assistant.safe_text import one_line
@@ -20,6 +21,8 @@ from action_assistant.safe_text import one_line
 LATE_US: Final = 24 * 3600 * 1_000_000
 _LONGEST: Final = 500  # characters of one fact
 _SUBJECT: Final = 150
+#: Stands for the name of a graph in messages, which are for many readers.
+_RESTRICTED: Final = "a graph that not everybody may see"
 _BLANKS: Final = re.compile(r"\s+")
 
 
@@ -58,12 +61,21 @@ _TEST: Final = Kind("This is a test of the receiver {receiver}, sent by {person}
 
 class Message(msgspec.Struct, frozen=True, kw_only=True):
     """A message for one receiver. `id`: the same at each try; `at`: when it happened, in
-    microseconds UTC; `facts`: the words of its sentence."""
+    microseconds UTC; `facts`: the words of its sentence; `left`: the mail addresses that have refused
+    it so far while others took it, empty for all."""
 
     id: str
     kind: str
     at: int
     facts: Mapping[str, Any]
+    left: tuple[str, ...] = ()
+
+    @property
+    def unnamed(self) -> "Message":
+        """Return the message without the name of its graph, and without reasons, which name actions."""
+        words = {"graph": _RESTRICTED, "why": ""}
+        shown = {name: words.get(name, value) for name, value in self.facts.items()}
+        return replace(self, facts=shown)
 
     @property
     def text(self) -> str:

@@ -28,6 +28,7 @@ _KEPT_US: Final = 30 * 24 * 3600 * 1_000_000  # after which a finished message i
 #: After which nobody wants to hear of it at all, as after a server was off for long.
 _TOO_OLD_US: Final = 7 * 24 * 3600 * 1_000_000
 _S: Final = 1_000_000
+_LEFT: Final = "left"  # beside the facts of a row: `Message.left`
 
 # The tables are the same for both branches.
 _outbox, _off = editor_tables.outbox, editor_tables.receiver
@@ -125,7 +126,9 @@ class Outbox:
             log.error("the message %s cannot be read: %s", found.id, error)
             await self.give_up(found.id, "It cannot be read.")
             return None
-        message = Message(id=found.id, kind=found.kind, at=found.at, facts=facts)
+        kept = facts.pop(_LEFT, [])
+        left = tuple(map(str, kept)) if isinstance(kept, list) else ()
+        message = Message(id=found.id, kind=found.kind, at=found.at, facts=facts, left=left)
         return DueMessage(message, found.tries)
 
     async def off(self, receiver: str) -> str:
@@ -138,13 +141,26 @@ class Outbox:
         values = {"due": None, "tried_at": now, "sent_at": now, "error": ""}
         await self._change(id_, tries=_c.tries + 1, **values)
 
-    async def failed(self, due: DueMessage, why: str, now: int, *, is_final: bool = False) -> bool:
+    async def failed(
+        self,
+        due: DueMessage,
+        why: str,
+        now: int,
+        *,
+        is_final: bool = False,
+        left: tuple[str, ...] = (),
+    ) -> bool:
         """Record that a try has failed, and when the next one is; return False if there is none,
         since that was the last one (`is_final`: in any case). `why`: a sentence; `now`: microseconds
-        UTC."""
+        UTC; `left`: the mail addresses that have refused it while others took it, and that alone get
+        it again."""
         is_last = is_final or due.tries >= len(RETRIES_S)
         again = None if is_last else now + RETRIES_S[due.tries] * _S
-        await self._change(due.message.id, tries=due.tries + 1, due=again, tried_at=now, error=why)
+        values: dict[str, object] = {"tries": due.tries + 1, "due": again, "tried_at": now}
+        if left:
+            facts = {**due.message.facts, _LEFT: left}
+            values |= {"facts": msgspec.json.encode(facts).decode(), "sent_at": now}
+        await self._change(due.message.id, **values, error=why)
         return not is_last
 
     async def give_up(self, id_: str, why: str) -> None:

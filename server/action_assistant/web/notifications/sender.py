@@ -33,6 +33,8 @@ _PRUNE_S: Final = 6 * 3600.0
 _TRY_S: Final = 40.0  # longer than any try lasts
 _GIVEN_UP: Final = "Its last try has failed, too; nothing is sent any more."
 
+#: Returns whether everybody may see the graph that a message is about.
+SeenByAll = Callable[[Message], Awaitable[bool]]
 #: Sends a message to a receiver; the text is the public URL of the page. Blocks; raises NotDelivered.
 Deliver = Callable[[Receiver, Message, str], None]
 
@@ -43,7 +45,8 @@ class _OwnFault(NotDelivered):
 
 class Notifications:
     """The receivers of one process, and the messages to them. `kinds`: those that this process
-    sends; `page`: the public URL of the page, "" if there is none."""
+    sends; `page`: the public URL of the page, "" if there is none; `seen_by_all`: whether the graph of
+    a message may be named, asked at each try."""
 
     def __init__(
         self,
@@ -51,6 +54,7 @@ class Notifications:
         receivers: Sequence[Receiver],
         kinds: Iterable[str],
         page: str,
+        seen_by_all: SeenByAll,
         *,
         clock_us: ClockUs = utc_us,
         deliver: Deliver = deliver,
@@ -61,6 +65,7 @@ class Notifications:
         self.receivers: Final = tuple(receivers)
         self._kinds = tuple(kinds)
         self._page = page
+        self._seen_by_all = seen_by_all
         self._clock_us = clock_us
         self._deliver = deliver
         self._look_s = look_s
@@ -145,16 +150,30 @@ class Notifications:
         """Try one message, and record the outcome, which is repeated until it is stored. A message
         whose outcome was lost with this process is tried again, under the same id."""
         id_ = due.message.id
-        failure = await self._try(receiver, due.message)
+        failure = await self._try(receiver, await self._named(due.message))
         now = self._clock_us()
         if failure is None:
             await self._until_stored(self.outbox.sent, id_, now)
             return
         log.warning("%s was not sent to %s: %s", id_, receiver.name, failure)
         why, is_final = str(failure), failure.is_final
-        goes_on = await self._until_stored(self.outbox.failed, due, why, now, is_final=is_final)
-        if not goes_on and not isinstance(failure, _OwnFault):
+        goes_on = await self._until_stored(
+            self.outbox.failed, due, why, now, is_final=is_final, left=failure.left
+        )
+        # One address that refuses takes the messages from no other one.
+        others_took_it = bool(failure.left or due.message.left)
+        if not (goes_on or others_took_it or isinstance(failure, _OwnFault)):
             await self._switch_off(receiver, why if is_final else f"{why} {_GIVEN_UP}", now)
+
+    async def _named(self, message: Message) -> Message:
+        """Return a message as it may be sent now: without the name of a graph that not everybody may
+        see, or of which that is not known."""
+        try:
+            seen = await self._seen_by_all(message)
+        except Exception:  # the message is sent in any case
+            log.exception("it is not known who may see the graph of %s", message.id)
+            seen = False
+        return message if seen else message.unnamed
 
     async def _switch_off(self, receiver: Receiver, why: str, now: int) -> None:
         log.error("nothing is sent to %s any more: %s", receiver.name, why)
