@@ -4,7 +4,7 @@ import sqlite3
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import anyio
 import pytest
@@ -16,11 +16,12 @@ from sqlalchemy import Connection, Row, Select, create_engine, insert, select, t
 from action_assistant.journal.databases import database_of
 from action_assistant.journal.journal import Journal
 from action_assistant.journal.migrate import alembic_config
-from action_assistant.runner.analysis import annotations
+from action_assistant.runner.analysis import annotations, statistics
 from action_assistant.runner.review.background_loops import index_words
 from action_assistant.runner.review.stored_runs import numbers_with
 from action_assistant.runner.runs import queries, word_index
 from action_assistant.runner.runs.events import Author
+from action_assistant.runner.runs.sight import Unseen
 from action_assistant.schema.runner_tables import RUNNER, review, run, unindexed_run
 from runner.review.old_runs import DAY_US, LENGTHS, add_run, opened, retention
 from support.doses import examples
@@ -188,3 +189,57 @@ async def test_a_damaged_row_ends_the_looking_for_words_and_nothing_else(
     assert len(await journal.query(select(unindexed_run))) == 1
     assert await journal.health() is None
     await journal.close()
+
+
+class OfGraph(NamedTuple):
+    """A run for the lists: of which graph, under which name, with which graph inside, by whom."""
+
+    graph: str
+    name: str
+    inside: str
+    author: str
+
+
+runs = st.builds(
+    OfGraph,
+    st.sampled_from(["open", "secret"]),
+    st.sampled_from(["Go", "Look"]),
+    st.sampled_from(["", "open", "secret"]),
+    st.sampled_from(["ann", "vic"]),
+)
+
+
+@settings(max_examples=examples(100), deadline=None)
+@given(st.lists(runs, max_size=8), st.integers(1, 4), st.sampled_from(["open", "secret", "Go"]))
+def test_a_run_out_of_sight_takes_the_place_of_no_other_one(
+    told: list[OfGraph], limit: int, wanted: str
+) -> None:
+    unseen = Unseen("vic", frozenset({"secret"}))
+    with empty() as connection:
+        for number, each in enumerate(told, 1):
+            fields = {
+                **{column.name: 0 for column in run.columns if not column.nullable},
+                "id": f"r{number}",
+                "number": number,
+                "request_id": f"q{number}",
+                "graph": each.graph,
+                "graph_name": each.name,
+                "engine": "David",
+                "author_id": each.author,
+                "author_name": each.author,
+                "ended_at": number,
+                "summary": {"inside": [each.inside] if each.inside else []},
+            }
+            connection.execute(insert(run).values({**fields, "state": "finished"}))
+        seen = [
+            number
+            for number, each in enumerate(told, 1)
+            if wanted in (each.graph, each.name)
+            and (each.author == "vic" or "secret" not in (each.graph, each.inside))
+        ][: -limit - 1 : -1]
+        for query in (
+            queries.listed(queries.Filter(graph=wanted), limit, unseen=unseen),
+            queries.listed(queries.Filter(graph=wanted, engine="David"), limit, unseen=unseen),
+            statistics.runs_of(wanted, None, limit, unseen),
+        ):
+            assert [row.number for row in connection.execute(query)] == seen

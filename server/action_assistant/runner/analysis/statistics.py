@@ -10,8 +10,9 @@ from sqlalchemy import Row, Select, select, union_all
 from action_assistant.runner.analysis.annotations import AT_LEAST, SAID
 from action_assistant.runner.analysis.levels import LevelPlace, places
 from action_assistant.runner.runs.durations import DurationBounds, at_rank, duration_bounds
-from action_assistant.runner.runs.queries import on_engine
+from action_assistant.runner.runs.queries import on_engine, seen_by
 from action_assistant.runner.runs.run import Result, State
+from action_assistant.runner.runs.sight import Unseen
 from action_assistant.schema.runner_tables import action_sum, run
 from action_assistant.umrf.model import EXIT, PRECONDITIONS, Graph, Relation
 
@@ -87,12 +88,12 @@ class Statistics(msgspec.Struct, frozen=True, kw_only=True):
     untold: int
 
 
-def runs_of(graph: str, engine: str | None, last: int) -> Select[Any]:
+def runs_of(graph: str, engine: str | None, last: int, unseen: Unseen | None = None) -> Select[Any]:
     """Select the newest runs of a graph (id or name) that are over, at most `last`. `engine`: only
-    runs on it, None for any."""
+    runs on it, None for any; `unseen`: only those that this person may see."""
     newest = [
         select(run.c.id)
-        .where(column == graph, run.c.ended_at.is_not(None), on)
+        .where(column == graph, run.c.ended_at.is_not(None), on, seen_by(unseen))
         .order_by(run.c.number.desc())
         .limit(last)
         .subquery()

@@ -405,7 +405,9 @@ class StoredRuns:
     ) -> statistics.Statistics:
         """Return statistics of the newest runs of a graph, at most `last` runs, without those that the
         person of `unseen` may not see. With `engine`, only runs on that engine count."""
-        rows = await self._journal.query(statistics.runs_of(graph, engine, min(last, _LAST)))
+        rows = await self._journal.query(
+            statistics.runs_of(graph, engine, min(last, _LAST), unseen)
+        )
         hidden = await self._hidden(unseen, rows)
         rows = [row for row in rows if row.id not in hidden]
         ids = [row.id for row in rows]

@@ -112,10 +112,9 @@ def listed(
     `among`: the numbers of the only possible runs, None for any; `unseen`: leave out runs that this
     person may not see, if the filter asks for what these hide. The table does not have the states
     of open runs, so a filter by `states` returns all open ones, too."""
-    query = select(run, review.c.pinned, review.c.note)
+    seen = seen_by(unseen if wanted.asks_for_content else None)
+    query = select(run, review.c.pinned, review.c.note).where(seen)
     query = query.outerjoin(review, review.c.run == run.c.id)
-    if unseen is not None and wanted.asks_for_content:
-        query = query.where(_seen_by(unseen))
     if among is not None:
         numbers = func.json_each(msgspec.json.encode(sorted(among)).decode()).table_valued("value")
         query = query.where(run.c.number.in_(select(numbers.c.value)))
@@ -123,7 +122,8 @@ def listed(
         return _newest(query, wanted, limit)
     if wanted.graph is None and wanted.engine is None:
         return _newest(query, wanted, limit)
-    ids = select(run.c.id).outerjoin(review, review.c.run == run.c.id)
+    # Out of sight is left out before runs are counted: else they would take the places of others.
+    ids = select(run.c.id).outerjoin(review, review.c.run == run.c.id).where(seen)
     # Several queries, each by an index in the order of the numbers: one with OR would read all runs.
     named = union_all(
         *(
@@ -206,13 +206,15 @@ def all_labels(unseen: Unseen | None = None) -> Select[Any]:
     may see."""
     query = select(run_label.c.label).group_by(run_label.c.label)
     if unseen is not None:
-        query = query.join(run, run.c.id == run_label.c.run).where(_seen_by(unseen))
+        query = query.join(run, run.c.id == run_label.c.run).where(seen_by(unseen))
     return query.order_by(func.count().desc(), run_label.c.label).limit(200)
 
 
-def _seen_by(unseen: Unseen) -> ColumnElement[bool]:
-    """Return a condition that holds for runs that a person may see. Rows of earlier versions do not
-    have the graphs inside."""
+def seen_by(unseen: Unseen | None) -> ColumnElement[bool]:
+    """Return a condition that holds for runs that a person may see; None for one who sees all. Rows of
+    earlier versions do not have the graphs inside."""
+    if unseen is None:
+        return true()
     own = run.c.author_id == unseen.person
     if unseen.everything:
         return own
