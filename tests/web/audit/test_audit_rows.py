@@ -15,9 +15,17 @@ from action_assistant.journal.databases import ask_once
 from action_assistant.journal.events import Draft
 from action_assistant.journal.journal import Journal
 from action_assistant.web.audit import rows
-from action_assistant.web.audit.events import STREAM, EditingBegan, SessionEnded, draft_of
+from action_assistant.web.audit.events import (
+    STREAM,
+    EditingBegan,
+    SessionEnded,
+    SignedIn,
+    draft_of,
+    stream_at,
+)
 from action_assistant.web.audit.rows import AuditFilter, AuditPage, AuditRow
 from action_assistant.web.auth.caller import Origin, acting_for
+from action_assistant.web.auth.keys import PersonRef
 
 PEOPLE = ("ada", "ben", "eve")
 #: What a person did: 0 an edit, 1 a sitting, 2 a deletion, 3 an end of a session, 4 a newer kind.
@@ -142,3 +150,16 @@ async def test_a_person_who_has_only_come_in_is_called_by_the_name_of_the_link(
     assert linked.text == "made a personal link for Ben of the lab"
     assert used.person is not None
     assert used.person.name == "Ben of the lab"
+
+
+async def test_a_person_who_has_only_signed_in_is_called_by_the_name_of_their_session(
+    tmp_path: Path,
+) -> None:
+    url = f"sqlite:///{tmp_path / 'editor.db'}"
+    journal = await Journal.open(url, branch="editor", fold=h.fold)
+    with acting_for("p1", Origin("Ann", "s1")):
+        came = draft_of(SignedIn("token", "owner", "Ann", "s1", ""), "p1")
+    await journal.append(stream_at(0), [came])
+    await journal.close()
+    (row,) = await everything(url, AuditFilter())
+    assert row.person == PersonRef("p1", "Ann")

@@ -54,9 +54,9 @@ class _Body(msgspec.Struct, frozen=True):
     """The fields of bodies that stand in sentences."""
 
     author: Author | None = None
-    by: Author | None = None
+    by: Author | int | None = None  # a number in events of the program itself
     at_rest: AtRest | None = None
-    led: _Led | None = None
+    led: _Led | bool | None = None  # of a start; of a registration, whether the robot may be led
     number: int | None = None
     request_id: str = ""
     graph: str | None = None
@@ -237,11 +237,12 @@ class RunnerFacts:
 
 
 def _author(body: _Body) -> Author | None:
-    return body.author or body.by or (body.at_rest.by if body.at_rest is not None else None)
+    by = body.by if isinstance(body.by, Author) else None
+    return body.author or by or (body.at_rest.by if body.at_rest is not None else None)
 
 
 def _started(run: str, body: _Body) -> Fact:
-    led = body.led.robots.values() if body.led is not None else ()
+    led = body.led.robots.values() if isinstance(body.led, _Led) else ()
     robots = tuple(dict.fromkeys(led)) or (body.engine,)
     where = "in the simulator" if body.simulated else f"on {', '.join(robots)}"
     return Fact(

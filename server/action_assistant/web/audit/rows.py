@@ -220,7 +220,9 @@ def _row(branch: Branch, event: Event, wanted: AuditFilter, describe: Describe) 
         return None
     if wanted.graph and wanted.graph not in {fact.graph, fact.graph_name}:
         return None
-    person = None if fact.is_of_program else fact.person or _person(event, origin)
+    # Who has only signed in has no stored name yet: the connection has the one that they gave.
+    named = fact.person if fact.person is not None and fact.person.name else None
+    person = None if fact.is_of_program else named or _person(event, origin)
     found = AuditRow(
         id=f"{branch}:{event.position}",
         position=event.position,
