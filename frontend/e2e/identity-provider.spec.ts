@@ -76,6 +76,6 @@ test("whom no group lets in is told at the button", async ({ browser }) => {
   await page.getByRole("button", { name: "Sign in with Lab login" }).click();
   await logIn(page, "stranger");
   await expect(page.getByRole("alert")).toContainText("none of your groups there may come in here");
-  await expect(page.getByLabel("Link or token")).toBeVisible();
+  await expect(page.getByLabel("Link, code or token")).toBeVisible();
   await context.close();
 });

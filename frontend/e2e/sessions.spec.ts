@@ -105,7 +105,7 @@ test("signing out ends the session everywhere, also for a copy of its cookie", a
   for (const place of places) expect((await asked(place)).status).toBe(200);
   await page.getByRole("button", { name: /^You are Ada/ }).click();
   await page.getByRole("button", { name: "Sign out" }).click();
-  await expect(page.getByLabel("Link or token")).toBeVisible();
+  await expect(page.getByLabel("Link, code or token")).toBeVisible();
   // What tells this browser from others stays: it signs nobody in.
   const names = (await context.cookies()).map(({ name }) => name);
   expect(names.filter((name) => /^aa_\d+$/.test(name))).toEqual([]);

@@ -395,7 +395,7 @@ function FreshLink({ member, link, origin, until }: FreshLinkProps) {
           {copied ? "Copied" : "Copy"}
         </Button>
         <Button size="compact-sm" aria-expanded={code} onClick={() => setCode(!code)}>
-          Code
+          QR code
         </Button>
       </div>
       {code && (

@@ -70,7 +70,7 @@ export function SignIn({ why, providerWhy = "", onOpen }: Props) {
           <PasswordInput
             mt="lg"
             size="sm"
-            label="Link or token"
+            label="Link, code or token"
             placeholder="http://…/#t=…"
             autoFocus
             autoComplete="off"
