@@ -72,3 +72,40 @@ test("a graph is hidden from a person, then shown to look at, by the keyboard", 
   expect(owner.failures).toEqual([]);
   await owner.context.close();
 });
+
+test("of a run of a hidden graph a person sees where, its state, who started it, and stops it", async ({
+  browser,
+}) => {
+  const send = <T>(path: string, body: unknown, method = "POST", base = product.url) => {
+    const headers = { "content-type": "application/json" };
+    return product.ask<T>(path, { method, body: JSON.stringify(body), headers }, base);
+  };
+  const graph = await product.chain(40);
+  const { id } = await send<{ id: string }>(`/api/graphs/${graph}/versions`, {});
+  await send(`/api/graphs/${graph}/rule`, { rule: { readers: [], editors: [] } }, "PUT");
+  const { digest, umrf } = await product.ask<{ digest: string; umrf: object }>(
+    `/api/versions/${id}`,
+  );
+  const sight = await product.ask(`/api/versions/${id}/sight`);
+  const start = { version: id, digest, umrf, graph, sight, engine: "simulator", request_id: "r" };
+  const run = await send<{ id: string }>("/api/runs", start, "POST", product.runnerUrl);
+  const nora = { name: "Nora", role: "viewer" };
+  const { links } = await send<{ links: { path: string }[] }>("/api/members", nora);
+
+  const context = await browser.newContext({ viewport: { width: 390, height: 844 } });
+  const page = await context.newPage();
+  await page.goto(product.url + links[0]?.path);
+  await page.getByRole("button", { name: /^Come in as .*Nora/ }).click();
+  await expect(page.getByRole("button", { name: /^You are .*Nora/ })).toBeVisible();
+  await page.goto(`${product.url}/runs/${run.id}`);
+  const card = page.getByRole("region", { name: /^Run \d/ });
+  await expect(card).toContainText("A run of a graph that you may not see");
+  await expect(card).toContainText(/Running.*Simulator/i);
+  await expect(card).toContainText("Started by");
+  expect(await page.content()).not.toMatch(/chain_40|Wait_\d/);
+  await card.getByRole("button", { name: /^Stop/ }).click();
+  await expect(card).toContainText("proved at");
+  await expect(card).toContainText("Stopped by");
+  expect(await page.content()).not.toMatch(/chain_40|Wait_\d/);
+  await context.close();
+});
