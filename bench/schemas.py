@@ -71,7 +71,8 @@ def _document(url: str) -> bytes:
     import httpx
 
     headers = {"authorization": f"Bearer {TOKEN}"}
-    return httpx.get(f"{url}/schema/openapi.json", headers=headers, trust_env=False).content
+    asked = f"{url}/schema/openapi.json"
+    return httpx.get(asked, headers=headers, trust_env=False, timeout=60).content
 
 
 if __name__ == "__main__":
