@@ -5,20 +5,27 @@ import json
 import os
 import random
 import sqlite3
+import subprocess
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any, Final
 
 import httpx
 import pytest
 
 from action_assistant.cli import main
+from action_assistant.editor.people.provided import provided_id
 from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
+from editor.api.test_provider import told
 from support.product import TOKEN, Product, running
+from support.provider import Provider, provided
 from support.waiting import until
+from web.auth.test_passkeys import Authenticator
+from web.notifications.receiving import SECRET, http_receiver
 
 SEED: Final = int(os.environ.get("TEST_SEED", "1"))
 PEOPLE: Final = 20
@@ -31,17 +38,64 @@ GRAPH: Final[dict[str, Any]] = {
     "graph_exit": [{"name": "Go", "instance_id": 0}],
     "actions": [{"name": "Go", "instance_id": 0, "type": "sync"}],
 }
-#: These let somebody in, so they stand before the session; what they hold says the address and browser.
-BEFORE_A_SESSION: Final = {"link.used.v1", "device.added.v1"}
+#: A robot for drills, where the dose is large and rclpy is there.
+DRILLED: Final = "David"
+PYTHON: Final = Path(__file__).parents[1] / ".venv-ros" / "bin" / "python"
+HAS_ROBOT: Final = "TEST_DEEDS" in os.environ and PYTHON.exists()
+DOMAIN: Final = 60 + os.getpid() % 40
+#: Who is let in by no group of the provider has no session there, and so ends theirs without one.
+WITHOUT_A_SESSION: Final = {"member.refused.v1", "audit.session_ended.v1"}
 #: A fact as the test knows it: who, which event, of what.
 Fact = tuple[str, str, str]
 
 
 @pytest.fixture(scope="module")
-def product(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Product]:
-    """A server for the module."""
-    with running(tmp_path_factory.mktemp("audit") / "data") as found:
+def provider() -> Iterator[Provider]:
+    """An identity provider."""
+    with provided() as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def product(tmp_path_factory: pytest.TempPathFactory, provider: Provider) -> Iterator[Product]:
+    """A server for the module, with an identity provider and a receiver of messages."""
+    folder = tmp_path_factory.mktemp("audit")
+    with (
+        http_receiver() as receiver,
+        pytest.MonkeyPatch.context() as environ,
+        emulated_robot(folder),
+    ):
+        (folder / "secret").write_text(SECRET)
+        settings = folder / "notifications.toml"
+        settings.write_text(
+            f'[webhooks.chat]\nurl = "http://127.0.0.1:{receiver.port}/"\n'
+            f'secret_file = "{folder / "secret"}"\nallow = ["127.0.0.1/32"]\n'
+        )
+        environ.setenv("ACTION_ASSISTANT_NOTIFICATIONS", str(settings))
+        environ.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+        told(environ, provider, limits=True)
+        with running(folder / "data") as found:
+            yield found
+
+
+@contextlib.contextmanager
+def emulated_robot(folder: Path) -> Iterator[None]:
+    """A context with a robot over rclpy that moves until it is stopped, if there may be one."""
+    if not HAS_ROBOT:
+        yield
+        return
+    script = folder / "script.json"
+    script.write_text(json.dumps({"behaviours": {"*": [{"never": True}]}}))
+    command = [PYTHON, "-m", "action_assistant", "simulate-robot", DRILLED]
+    environ = {**os.environ, "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    robot = subprocess.Popen(
+        [*command, "--domain", str(DOMAIN), "--script", str(script)], env=environ
+    )
+    try:
+        yield
+    finally:
+        robot.terminate()
+        robot.wait(20)
 
 
 def start_of(request: str, engine: str) -> dict[str, Any]:
@@ -59,7 +113,7 @@ def start_of(request: str, engine: str) -> dict[str, Any]:
 class Guest:
     """A browser of a person, who came in by a link."""
 
-    def __init__(self, product: Product, name: str, link: dict[str, Any]) -> None:
+    def __init__(self, product: Product, name: str, link: Mapping[str, Any]) -> None:
         self.product = product
         self.name = name
         self.role: str = link["role"]
@@ -81,7 +135,9 @@ class Guest:
 class Week:
     """People who do things, and the facts that this makes."""
 
-    def __init__(self, product: Product, seed: int, browsers: contextlib.ExitStack) -> None:
+    def __init__(
+        self, product: Product, provider: Provider, seed: int, browsers: contextlib.ExitStack
+    ) -> None:
         self._browsers = browsers
         self.random = random.Random(seed)
         self.product = product
@@ -99,7 +155,13 @@ class Week:
         self.fact("local", "robot.registered.v1")
         self._set_rights()
         self.holder = ""  # of the baton
-        self.invited = 0
+        self.invited = self.provided = self.confirmed = 0
+        self.provider = provider
+        self.sessions: Counter[str] = Counter()  # of people of the provider, by their names there
+        self.lets_in: dict[str, bool] = {}  # the last word of the provider, by the same
+        self.desk, self.phone = self._on_two_browsers()
+        if HAS_ROBOT:
+            self._reach_robot()
 
     def fact(self, who: str, event: str, of: str = "") -> None:
         self.facts[who, event, of] += 1
@@ -129,7 +191,9 @@ class Week:
             *(self._make, self._rename, self._publish, self._delete, self._start, self._stop),
             *(self._idle, self._leave, self._approve, self._look),
             *(self._file, self._rule, self._release, self._show_by_link, self._baton, self._lock),
-            *(self._token, self._invite),
+            *(self._token, self._invite, self._provide, self._confirm, self._passkey),
+            self._test_receiver,
+            *((self._drill,) if HAS_ROBOT else ()),
         ]
         for _ in range(deeds):
             self.random.choice(choices)(self.random.choice(self.guests))
@@ -335,6 +399,144 @@ class Week:
         assert self.own("POST", f"/api/members/{person.id}/end").is_success
         self.fact("local", "member.ended.v1")
 
+    def _on_two_browsers(self) -> tuple[Guest, Guest]:
+        """Let a person come in by two personal links, on two browsers."""
+        body = {"name": "Nora", "role": "operator"}
+        member = self.own("POST", "/api/members", json=body).json()
+        self.fact("local", "member.added.v1")
+        found = []
+        for _ in range(2):
+            self.fact("local", "link.made.v1")
+            link = next(each for each in member["links"] if each.get("path"))
+            guest = Guest(self.product, "Nora", {**link, "role": "operator"})
+            self._browsers.callback(guest.http.close)
+            self.fact(guest.id, "link.used.v1")
+            self.fact(guest.id, "audit.signed_in.v1")
+            found.append(guest)
+            if len(found) == 1:
+                path = f"/api/members/{guest.id}/link"
+                member = self.own("POST", path, json={"hours": 1}).json()
+        return found[0], found[1]
+
+    def _confirm(self, guest: Guest) -> None:
+        """Somebody confirms on their other browser that it is they, or says that it is not. A few do:
+        who asks too often waits for a minute."""
+        self.confirmed += 1
+        if self.confirmed > 4:
+            return
+        asked = self.desk.runner("POST", "/api/confirmations", json={})
+        assert asked.is_success, asked.text
+        path = f"/api/confirmations/{asked.json()['id']}/answer"
+        yes = {"yes": self.random.random() < 0.5}
+        assert guest.runner("POST", path, json=yes).status_code == 404
+        assert self.phone.runner("POST", path, json=yes).status_code == 204
+        self.fact(self.phone.id, "audit.confirmed.v1")
+
+    def _passkey(self, guest: Guest) -> None:
+        """Register a passkey, and confirm by it where it counts at once; then remove it."""
+        host = f"localhost:{self.product.port}"
+        own = {"host": host, "origin": f"http://{host}"}
+        key = Authenticator()
+
+        def send(path: str, **body: Any) -> httpx.Response:
+            return self.phone.editor("POST", f"/api/passkeys{path}", headers=own, **body)
+
+        options = send("/challenge").json()["options"]
+        credential = key.create(options, own["origin"])
+        body = {"name": "key", "credential": credential}
+        assert guest.editor("POST", "/api/passkeys", json=body, headers=own).is_client_error
+        made = send("", json=body)
+        assert made.is_success, made.text
+        self.fact(self.phone.id, "audit.passkey_changed.v1")
+        challenge = send("/confirm/challenge")
+        if challenge.is_success:
+            answer = key.get(challenge.json()["options"], own["origin"])
+            assert send("/confirm", json={"credential": answer}).is_success
+            self.fact(self.phone.id, "audit.confirmed.v1")
+        path = f"/api/passkeys/{made.json()['id']}"
+        assert self.phone.editor("DELETE", path, headers=own).status_code == 204
+        self.fact(self.phone.id, "audit.passkey_changed.v1")
+
+    def _provide(self, guest: Guest) -> None:
+        """Somebody comes by the identity provider, which lets them in or not. A few do."""
+        assert guest.editor("GET", "/api/session/provider").is_success
+        self.provided += 1
+        if self.provided > 10:
+            return
+        name, comes_in = self.random.choice(("mari", "jan")), self.random.random() < 0.7
+        self.provider.subject = name
+        self.provider.claims = {"name": name, "groups": ["lab" if comes_in else "guests"]}
+        came = until("the provider has spoken", self._visit_provider)
+        assert came.status_code == (200 if comes_in else 403), came.text
+        person, knew = provided_id(self.provider.issuer, name), name in self.lets_in
+        if comes_in:
+            if not knew or not self.lets_in[name]:  # else nothing about them is new
+                self.fact(person, "member.renewed.v1" if knew else "member.came.v1")
+            self.fact(person, "audit.signed_in.v1")
+            self.sessions[name] += 1
+        else:
+            if self.lets_in.get(name):
+                self.fact(person, "member.refused.v1")
+            for _ in range(self.sessions.pop(name, 0)):
+                self.fact(person, "audit.session_ended.v1")
+        if comes_in or knew:
+            self.lets_in[name] = comes_in
+
+    def _visit_provider(self) -> httpx.Response | None:
+        """Return the answer to a sign-in by the provider; None where one has to try again."""
+        url, origin = self.product.url, {"origin": self.product.url}
+        with httpx.Client(base_url=url, headers=origin, trust_env=False, timeout=30) as browser:
+            asked = browser.post("/api/session/provider", json={"goal": "/", "again": False})
+            if not asked.is_success:
+                assert asked.status_code in {429, 503}, asked.text
+                return None
+            answer = self.provider.authorize(asked.json()["url"])
+            came = browser.post("/api/session/provider/answer", json=answer)
+        return None if came.status_code in {429, 503} else came
+
+    def _test_receiver(self, guest: Guest) -> None:
+        """An owner sends a test to the receiver of messages, by one of the processes."""
+        path, base = "/api/notifications/chat/test", self.random.choice(("editor", "runner"))
+        assert getattr(guest, base)("POST", path).status_code == 403
+        url = self.product.url if base == "editor" else self.product.runner_url
+        tested = self.own("POST", f"{url}{path}")
+        assert (tested.status_code, tested.json()["error"]) == (200, "")
+        self.fact("local", "audit.owner_did.v1")
+
+    def _reach_robot(self) -> None:
+        robots = f"{self.product.runner_url}/api/robots"
+        body = {"name": DRILLED, "domain": DOMAIN}
+        assert self.own("POST", robots, json=body).is_success
+        self.fact("local", "robot.registered.v1")
+
+        def is_there() -> bool:
+            known = {each["name"]: each for each in self.own("GET", robots).json()}
+            return bool(known[DRILLED]["state"] == "answering")
+
+        until("the robot answers", is_there)
+
+    def _drill(self, guest: Guest) -> None:
+        """Make a Stop drill: start, Stop, and the word of who saw it."""
+        if guest.role != "operator":
+            return
+        self.number += 1
+        start = start_of(f"r{self.number}", DRILLED)
+        start.pop("script")
+        begun = guest.runner("POST", "/api/runs", json=start)
+        assert begun.status_code == 201, begun.text
+        run = begun.json()["id"]
+        self.fact(guest.id, "run.requested.v1", run)
+        path = f"/api/runs/{run}"
+        until("it moves", lambda: guest.runner("GET", path).json()["state"] == "running")
+        assert guest.runner("POST", f"{path}/stop").status_code == 202
+        self.fact(guest.id, "run.stop_requested.v1", run)
+        until("its rest is proven", lambda: guest.runner("GET", path).json()["proof_at"])
+        self._until_over(guest, run)
+        saw = {"run": run, "saw_it_stop": True, "hardware_stop": self.random.random() < 0.5}
+        done = guest.runner("POST", f"/api/robots/{DRILLED}/drills", json=saw)
+        assert done.is_success, done.text
+        self.fact(guest.id, "robot.drilled.v1", run)
+
     def _look(self, guest: Guest) -> None:
         """Only look: that is no fact of the audit."""
         assert guest.editor("GET", "/api/graphs").is_success
@@ -347,24 +549,30 @@ def audit(product: Product, *words: str, capfd: pytest.CaptureFixture[str]) -> l
 
 
 def test_all_that_20_people_did_is_in_the_audit_and_nothing_else(
-    product: Product, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+    product: Product,
+    provider: Provider,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setenv("ACTION_ASSISTANT_URL", product.url)
     monkeypatch.setenv("ACTION_ASSISTANT_TOKEN", TOKEN)
     with contextlib.ExitStack() as browsers:
-        week = Week(product, SEED, browsers)
+        week = Week(product, provider, SEED, browsers)
         week.live(DEEDS)
 
     assert product.end() == 0  # which stores what is counted
     product.start()
     told: Counter[Fact] = Counter()
     for row in audit(product, capfd=capfd):
+        assert "cannot be read" not in row["text"], row
         who = row.get("person")
         if who is None:
             assert row["kind"] in {"strangers", "other"}
             continue
         whence = row.get("from", {})
-        if row["event"] not in BEFORE_A_SESSION:
+        if row["event"] in WITHOUT_A_SESSION:
+            assert whence, row
+        else:
             assert whence.get("session") or whence.get("token") == "server", row
         if row["event"] != "person.named.v1":  # with the first change that a person makes
             of = row.get("run") or row.get("graph", "")

@@ -27,8 +27,8 @@ def provider() -> Iterator[Provider]:
         yield provider
 
 
-def told(environ: pytest.MonkeyPatch, provider: Provider) -> None:
-    """Set the environment of an editor with that provider."""
+def told(environ: pytest.MonkeyPatch, provider: Provider, *, limits: bool = False) -> None:
+    """Set the environment of an editor with that provider, without limits unless `limits`."""
     given = {
         "ISSUER": provider.issuer,
         "CLIENT_ID": CLIENT,
@@ -38,7 +38,8 @@ def told(environ: pytest.MonkeyPatch, provider: Provider) -> None:
     }
     for name, value in given.items():
         environ.setenv(f"ACTION_ASSISTANT_OIDC_{name}", value)
-    environ.setenv("ACTION_ASSISTANT_LIMITS", "off")
+    if not limits:
+        environ.setenv("ACTION_ASSISTANT_LIMITS", "off")
 
 
 @pytest.fixture(scope="module")
