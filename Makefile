@@ -60,6 +60,8 @@ check: check-server check-page ## formatting, lint, types, layers and what is un
 # Alarms of size, circles, what documents refer to, and language: seconds, so before each commit.
 STRUCTURE := tests/test_tree.py tests/test_references.py tests/test_glossary.py tests/test_language.py
 
+PAGE_STRUCTURE := src/tree.test.ts
+
 .PHONY: check-server
 check-server: .venv/.done ## the server's half of check
 	@echo "» ruff, mypy, layers, dependencies"
@@ -73,7 +75,7 @@ check-server: .venv/.done ## the server's half of check
 check-page: frontend/node_modules/.done ## the page's half of check
 	@echo "» Biome, tsc, knip"
 	@$(NPM) run --silent check
-	@cd frontend && ../$(NODE) node_modules/.bin/vitest run --reporter=dot src/tree.test.ts
+	@cd frontend && ../$(NODE) node_modules/.bin/vitest run --reporter=dot $(PAGE_STRUCTURE)
 
 .PHONY: fix
 fix: .venv/.done frontend/node_modules/.done ## mend what the formatters and linters can
@@ -112,7 +114,7 @@ unit-server: setup ## the tests of the server
 .PHONY: unit-page
 unit-page: setup ## the tests of the pure parts of the page
 	@echo "» vitest"
-	@$(NPM) run --silent test
+	@$(NPM) run --silent test -- --exclude $(PAGE_STRUCTURE)
 
 # They mostly wait for robots, so two processes share the files, by their first letters.
 ROS_HALVES := ros-test-a-l ros-test-m-z

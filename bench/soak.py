@@ -23,6 +23,18 @@ PLAYWRIGHT: Final = (
 )
 
 
+VITEST: Final = (
+    "scripts/with-node",
+    "npm",
+    "--prefix",
+    "frontend",
+    "run",
+    "--silent",
+    "test",
+    "--",
+)
+
+
 class Part(NamedTuple):
     """One part of the soak: a description, the doses as environment variables, and the tests."""
 
@@ -197,6 +209,18 @@ PARTS: Final[dict[str, Part]] = {
         "every command of the documents that takes seconds",
         {"TEST_LONG": "1"},
         ("tests/docs",),
+    ),
+    "lines": Part(
+        "25 times as many generated scenes and layouts for lines of the canvas, and plays of undo",
+        {"TEST_EXAMPLES": "5"},
+        (
+            "--testTimeout=0",
+            "src/canvas/arrows",
+            "src/canvas/geometry",
+            "src/canvas/laid-out-lines",
+            "src/graph/edit/undo-history",
+        ),
+        VITEST,
     ),
     "browser": Part(
         "browser tests that CI has no time for",

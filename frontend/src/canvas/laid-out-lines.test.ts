@@ -3,6 +3,7 @@ import ELK from "elkjs/lib/elk.bundled.js";
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import { type Graph, PRECONDITIONS, RESPONSES, type Relation } from "../graph/model";
+import { examples } from "../testing/doses";
 import { graphs } from "../testing/graphs";
 import { faultsOf, looksOf } from "../testing/line-faults";
 import { routed } from "./arrows/routes";
@@ -66,7 +67,7 @@ test("after Tidy no line passes a card, and no pill lies on anything", async () 
         crowded.shared += shared;
       }
     }),
-    { numRuns: 60 },
+    { numRuns: examples(60) },
   );
   expect(crowded.hidden).toBeLessThanOrEqual(0.08 * crowded.lines + 4);
   expect(crowded.shared).toBeLessThanOrEqual(4);

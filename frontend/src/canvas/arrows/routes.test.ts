@@ -1,6 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { Direction } from "../../graph/model";
+import { examples } from "../../testing/doses";
 import { faultsOf, looksOf, pillsOf } from "../../testing/line-faults";
 import { layeredScene, seeded, thrownScene } from "../../testing/scenes";
 import { routed } from "./routes";
@@ -43,7 +44,7 @@ test("in a graph that is laid out no line passes a card, lies on another, or mee
         expect(looksOf(given, lines)).toMatchObject({ simple: 0, hidden: 0 });
       },
     ),
-    { numRuns: 30 },
+    { numRuns: examples(30) },
   );
   expect(sharing).toBeLessThanOrEqual(1);
 });
@@ -66,7 +67,7 @@ test("cards anywhere, 32 px apart: no line passes one, no pill lies on a card, p
         walledIn += lines.size - found.size;
       },
     ),
-    { numRuns: 60 },
+    { numRuns: examples(60) },
   );
   expect(walledIn).toBeLessThanOrEqual(2);
 });
@@ -77,7 +78,7 @@ test("the same scene has the same lines", () => {
       const given = thrownScene(10, seeded(seed), direction);
       expect(routed(given).lines).toEqual(routed(structuredClone(given)).lines);
     }),
-    { numRuns: 15 },
+    { numRuns: examples(15) },
   );
 });
 
@@ -102,7 +103,7 @@ test("after a move, lines that are routed again are as good, and the others stay
       }
       expect(lines.size).toBe(given.lines.length);
     }),
-    { numRuns: 12 },
+    { numRuns: examples(12) },
   );
 });
 
@@ -193,7 +194,7 @@ test("simple lines have the same ends and pills as routed lines", () => {
       }
       expect(faultsOf(given, simple).slanted).toBe(0);
     }),
-    { numRuns: 20 },
+    { numRuns: examples(20) },
   );
 });
 

@@ -1,6 +1,7 @@
 import fc from "fast-check";
 import { expect, test } from "vitest";
 import type { Direction } from "../../graph/model";
+import { examples } from "../../testing/doses";
 import { faultsOf } from "../../testing/line-faults";
 import { layeredScene, type Random, seeded, thrownScene } from "../../testing/scenes";
 import { routed } from "./routes";
@@ -77,7 +78,7 @@ test("a bent line passes its waypoints in their order, level or upright, and no 
         expect([id, near]).toEqual([id, true]);
       }
     }),
-    { numRuns: 25 },
+    { numRuns: examples(25) },
   );
 });
 
@@ -88,7 +89,7 @@ test("bending some lines adds no fault to the other lines", () => {
       const given = bent(layeredScene(14, random, direction), random);
       expect(faultsOf(given, routed(given).lines)).toMatchObject({ ...NONE, onLines: 0 });
     }),
-    { numRuns: 12 },
+    { numRuns: examples(12) },
   );
 });
 
@@ -102,7 +103,7 @@ test("the same scene gives the same bent lines, and they are kept while nothing 
       expect(routed(given, first.ways).lines).toEqual(first.lines);
     }),
     // Of these some lines lie on others, since there is no more room.
-    { numRuns: 8, examples: [[363461999, "right"] as const] },
+    { numRuns: examples(8), examples: [[363461999, "right"] as const] },
   );
 });
 
@@ -155,6 +156,6 @@ test("simple lines pass their waypoints, too", () => {
       const lines = simpleLines(given);
       expect(faultsOf(given, lines).slanted).toBe(0);
     }),
-    { numRuns: 30 },
+    { numRuns: examples(30) },
   );
 });

@@ -10,6 +10,7 @@ import {
   type Graph,
   type Key,
 } from "../../graph/model";
+import { examples } from "../../testing/doses";
 import { anyAction, anyRelation, graphs } from "../../testing/graphs";
 import { arrange, estimatedSizes, positionsOf, ranksOf } from "./arrange";
 import { layoutRequest, placesIn } from "./layout-graph";
@@ -66,7 +67,7 @@ test("cards that are laid out are at least 32 px apart for any arrows", async ()
       );
       expect(nearest(graph, places)).toBeGreaterThanOrEqual(32);
     }),
-    { numRuns: 60 },
+    { numRuns: examples(60) },
   );
 });
 
@@ -134,7 +135,7 @@ test("actions are placed in the direction of the graph, the entry first and the 
         if (key !== EXIT) expect(to(key)).toBeLessThan(from(EXIT));
       }
     }),
-    { numRuns: 40 },
+    { numRuns: examples(40) },
   );
 });
 
@@ -174,6 +175,6 @@ test("equal graphs are laid out equally, whatever their keys are", async () => {
       const [one, other] = [await laidOut(graph), await laidOut(twin)];
       for (const [key, at] of one) expect(other.get(renamed(key))).toEqual(at);
     }),
-    { numRuns: 20 },
+    { numRuns: examples(20) },
   );
 });

@@ -1,6 +1,7 @@
 import fc from "fast-check";
 import { describe, expect, test, vi } from "vitest";
 import * as Y from "yjs";
+import { examples } from "../../testing/doses";
 import { actionIn, arrows, copyOf, docWith, graphIn } from "../../testing/edited-graph";
 import { mapsOf, ROOTS, type Root, rootOf } from "../document-keys";
 import { fullName, type Key } from "../model";
@@ -424,10 +425,9 @@ function judge(
 test.each([1, 2, 3])(
   "whatever %i people do at once, no undo takes away or writes over what it did not make",
   (count) => {
-    const numRuns = 150 * Number(process.env.TEST_EXAMPLES ?? 0.2);
     fc.assert(
       fc.property(plays, (script) => play(count, script)),
-      { numRuns },
+      { numRuns: examples(150) },
     );
   },
 );
