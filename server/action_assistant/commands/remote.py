@@ -4,7 +4,7 @@ import argparse
 import sys
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
@@ -24,6 +24,7 @@ from action_assistant.safe_text import one_line, told
 
 if TYPE_CHECKING:  # slow to load, and Stop needs none of them
     from action_assistant.runner.runs.views import RunShown
+    from action_assistant.umrf.start_values import AskedInput
 
 _ENDED: Final = frozenset({"finished", "halted", "stopped", "error", "refused", "lost"})
 _TIME: Final = "%Y-%m-%dT%H:%M:%S"
@@ -92,10 +93,57 @@ def _add_run(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--drill", action="store_true", help="it is for a Stop drill: press Stop while it moves"
     )
+    run.add_argument(
+        "--set",
+        dest="values",
+        type=_setting,
+        action="append",
+        default=[],
+        metavar="[ACTION.]INPUT=VALUE",
+        help="the value of an input for which the graph asks; again for each. Lists are JSON",
+    )
     run.add_argument("--script", type=Path, metavar="S.json", help="what simulated actions do")
     run.add_argument("--label", default="", help="of the version")
     run.add_argument("--no-wait", action="store_true", help="print the run's id and return")
     run.set_defaults(handler=_run)
+
+
+def _setting(text: str) -> tuple[str, str]:
+    """Return the input and the value in `place=valve_8`. Raise ArgumentTypeError for another text."""
+    name, equals, value = text.partition("=")
+    if not equals or not name:
+        raise argparse.ArgumentTypeError(f"{text!r} is not of the form [ACTION.]INPUT=VALUE")
+    return name, value
+
+
+def values_of(
+    settings: Sequence[tuple[str, str]], asked: Sequence["AskedInput"]
+) -> dict[str, dict[str, Any]]:
+    """Return the values of a start by action and input. `settings`: names of inputs, with or without
+    that of their action, and texts; `asked`: what the graph asks for. Raise CannotStart for a name
+    that means no one input, and for a text that is no value of its type."""
+    found: dict[str, dict[str, Any]] = {}
+    for name, text in settings:
+        named = [each for each in asked if name in {each.name, f"{each.action}.{each.name}"}]
+        if len(named) != 1:
+            every = ", ".join(f"{each.action}.{each.name}" for each in named or asked)
+            why = "is asked of several actions" if named else "is not asked for"
+            raise CannotStart(f"--set {name}: it {why}. One of: {every or 'nothing is asked for'}.")
+        (one,) = named
+        given = found.setdefault(one.action, {})
+        if one.name in given:
+            raise CannotStart(f"--set {name}: it is set twice.")
+        given[one.name] = _value_of(one, text)
+    return found
+
+
+def _value_of(one: "AskedInput", text: str) -> Any:
+    if one.type == "string":
+        return text
+    try:
+        return msgspec.json.decode(text)
+    except (msgspec.DecodeError, RecursionError):
+        raise CannotStart(f"--set {one.action}.{one.name}: {text!r} is no {one.type}.") from None
 
 
 def _break(text: str) -> dict[str, Any]:
@@ -236,6 +284,8 @@ def _run(options: argparse.Namespace) -> int:
             order["breakpoints"] = options.breaks
         if options.watching:
             order["watching"] = dict.fromkeys(options.watching, True)
+        if options.values:
+            order["values"] = _values(server, version["umrf"], options.values)
         if options.drill:
             order["drill"] = True
         if options.accept is not None:
@@ -246,6 +296,13 @@ def _run(options: argparse.Namespace) -> int:
         run = decoded(server.runner("POST", "/api/runs", json=order), RunShown)
         print(run.id, flush=True)
         return 0 if options.no_wait else _watch(server, run.id)
+
+
+def _values(server: Server, umrf: Any, settings: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    from action_assistant.umrf.start_values import AskedInput
+
+    asked = server.runner("POST", "/api/asked_inputs", json={"umrf": umrf})
+    return values_of(settings, decoded(asked, list[AskedInput]))
 
 
 def _watch(server: Server, run: str) -> int:

@@ -151,6 +151,8 @@ def _first_summary(asked: Requested) -> dict[str, object]:
         summary["batons"] = asked.batons
     if asked.watching:
         summary["watching"] = asked.watching
+    if asked.values:
+        summary |= {"values": asked.values, "sent_digest": asked.sent_digest}
     return summary
 
 

@@ -192,6 +192,7 @@ def _action_says(action: Action) -> dict[str, Any]:
     }
     says |= {f"in/{p.path}": p.text for p in action.inputs}
     says |= {f"out/{p.path}": p.text for p in action.outputs}
+    says |= {f"ask/{path}": mark for path, mark in action.asks}
     return says | dict(action.extra)
 
 

@@ -70,7 +70,8 @@ class Action(msgspec.Struct, frozen=True, kw_only=True):
     `missing`: relations name it and the file has no such action (it is drawn as a ghost and never
     written). `twin`: it has the full name of an earlier action of its file, and keeps it. `extra`:
     fields that this model does not know, and known ones whose value does not fit; the latter
-    replace the field when the graph is written.
+    replace the field when the graph is written. `asks`: the inputs, by path, that a start asks for
+    because the author marks them, each with its mark as JSON text.
     """
 
     key: Key
@@ -85,6 +86,7 @@ class Action(msgspec.Struct, frozen=True, kw_only=True):
     missing: bool = False
     twin: bool = False
     extra: tuple[tuple[str, JsonText], ...] = ()
+    asks: tuple[tuple[str, JsonText], ...] = ()
 
     @property
     def full_name(self) -> str:

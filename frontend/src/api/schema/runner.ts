@@ -197,6 +197,40 @@ export interface RunnerApi {
         why: string;
     };
     /**
+     * AskedInput
+     * @description An input for which a start asks. `action`, `name`: its full and flat name; `aid`: the key of the
+     *     action; `open`: the graph has no value for it and cannot run without; `value`: the one that it has
+     *     otherwise; `allowed`: the values that it can have, if not all; `least`, `most`: the bounds that its
+     *     author set.
+     */
+    AskedInput: {
+        action: string;
+        name: string;
+        aid: string;
+        type: string;
+        open: boolean;
+        value?: boolean | number | string | (boolean | number | string)[];
+        example?: boolean | number | string | (boolean | number | string)[];
+        /** @default [] */
+        allowed?: (boolean | number | string | (boolean | number | string)[])[];
+        least?: number;
+        most?: number;
+        /** @default  */
+        description?: string;
+        /** @default  */
+        unit?: string;
+    };
+    /**
+     * AskedInputsRequest
+     * @description A graph, of which the inputs are wanted for which a start asks.
+     */
+    AskedInputsRequest: {
+        /** @description The UMRF graph itself, as approved, or a string that holds its JSON text */
+        umrf: {
+            [key: string]: unknown;
+        } | string;
+    };
+    /**
      * AskedOthers
      * @description The number of receivers to which the question is sent.
      */
@@ -766,6 +800,12 @@ export interface RunnerApi {
         sight?: RunnerApi["Sight"] | null;
         /** @default [] */
         breakpoints?: RunnerApi["Breakpoint"][];
+        /** @default {} */
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
     };
     /**
      * GroupShown
@@ -1012,6 +1052,12 @@ export interface RunnerApi {
         batons?: string[];
         watching?: string[];
         hidden?: boolean;
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
+        sent_digest?: string;
         cause: string;
         pinned: boolean;
         note: string;
@@ -1294,7 +1340,8 @@ export interface RunnerApi {
      * Preflight
      * @description The pre-flight of a graph on one engine. `override`: the codes that a person would have to
      *     answer for; `never`: some item cannot be overridden; `digest`: of the graph that was checked,
-     *     `tree_digest`: of it together with the graphs inside.
+     *     `tree_digest`: of it together with the graphs inside; `order_digest`: of all that a second person
+     *     says yes to, "" where nobody has to.
      */
     Preflight: {
         engine: string;
@@ -1303,6 +1350,7 @@ export interface RunnerApi {
         items: RunnerApi["Item"][];
         override: string[];
         never: boolean;
+        order_digest: string;
     };
     /**
      * Problem
@@ -1929,6 +1977,12 @@ export interface RunnerApi {
         batons?: string[];
         watching?: string[];
         hidden?: boolean;
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
+        sent_digest?: string;
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -1944,7 +1998,9 @@ export interface RunnerApi {
      *     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
      *     further; `breakpoints`: where it waits; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
      *     held at the start; `watching`: those that they said to watch. `hidden`: the
-     *     reader may not see its graph, so that little else is given.
+     *     reader may not see its graph, so that little else is given. `values`: those that were given at the
+     *     start, by action and input; `digest` is that of the version, `sent_digest` that of the graph with
+     *     them, which was sent.
      */
     RunSummary: {
         id: string;
@@ -1985,6 +2041,12 @@ export interface RunnerApi {
         batons?: string[];
         watching?: string[];
         hidden?: boolean;
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
+        sent_digest?: string;
     };
     /**
      * RunWhole
@@ -2031,6 +2093,12 @@ export interface RunnerApi {
         batons?: string[];
         watching?: string[];
         hidden?: boolean;
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
+        sent_digest?: string;
         like: string | null;
         behaviours: boolean;
         actions: {
@@ -2245,7 +2313,7 @@ export interface RunnerApi {
      *     which the person says that they watch it, with its hardware stop within reach. `drill`: the start is
      *     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
      *     version, as the editor seals them; without it, where there are rules, the run is for its starter
-     *     and owners.
+     *     and owners. `values`: those of inputs for which the graph asks; its digest stays that without them.
      */
     StartRequest: {
         version: string;
@@ -2288,6 +2356,12 @@ export interface RunnerApi {
         sight?: RunnerApi["Sight"] | null;
         /** @default [] */
         breakpoints?: RunnerApi["Breakpoint"][];
+        /** @default {} */
+        values?: {
+            [key: string]: {
+                [key: string]: boolean | number | string | (boolean | number | string)[];
+            };
+        };
     };
     /**
      * StartShown
@@ -2703,6 +2777,9 @@ export interface RunnerPaths {
     };
     "/api/preflight": {
         post: RunnerOperations["runPreflight"];
+    };
+    "/api/asked_inputs": {
+        post: RunnerOperations["findAskedInputs"];
     };
     "/api/groups": {
         post: RunnerOperations["startGroup"];
@@ -3405,6 +3482,20 @@ interface RunnerOperations {
             200: {
                 content: {
                     "application/json": RunnerApi["Preflight"][];
+                };
+            };
+        };
+    };
+    findAskedInputs: {
+        requestBody: {
+            content: {
+                "application/json": RunnerApi["AskedInputsRequest"];
+            };
+        };
+        responses: {
+            200: {
+                content: {
+                    "application/json": RunnerApi["AskedInput"][];
                 };
             };
         };

@@ -557,7 +557,7 @@ export function SecondPerson({ graph, label, looks }: SecondPersonProps) {
   const { person } = usePerson();
   const may = useMay("operate");
   const client = useQueryClient();
-  const digest = demands(looks)?.tree_digest ?? "";
+  const digest = demands(looks)?.order_digest ?? "";
   const key = ["approvals", digest];
   const given = useQuery({
     queryKey: key,

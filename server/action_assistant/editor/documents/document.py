@@ -151,6 +151,7 @@ def _action(key: Key, name: str, own: Fields, position: object) -> Action:
         missing=own.get("missing") is True,
         twin=own.get("twin") is True,
         extra=_extra(own, "x"),
+        asks=_under(own, "ask/"),
     )
 
 
@@ -395,6 +396,7 @@ def _action_fields(action: Action, order: float) -> dict[str, object]:
     for side, parameters in (("in", action.inputs), ("out", action.outputs)):
         fields.update(_parameter_fields(f"{key}|{side}", parameters))
     fields.update(_extra_fields(f"{key}|x", action.extra))
+    fields.update({f"{key}|ask/{path}": mark for path, mark in action.asks})
     return fields
 
 

@@ -41,8 +41,14 @@ from action_assistant.runner.robots.robot_events import (
     StopWasProven,
 )
 from action_assistant.runner.runs import views
+from action_assistant.runner.runs.sent_graphs import SentGraph
 from action_assistant.runner.runs.sight import HIDDEN_NAME, names_seen, run_graphs
-from action_assistant.runner.start.admission import GroupRequest, read_group
+from action_assistant.runner.start.admission import (
+    GroupRequest,
+    asked_for,
+    decoded,
+    read_group,
+)
 from action_assistant.runner.start.index_writer import (
     IndexWriteAnswer,
     IndexWriteRequest,
@@ -55,6 +61,7 @@ from action_assistant.umrf.files import codec
 from action_assistant.umrf.files.action_files import write_action
 from action_assistant.umrf.json.text import JsonObject, UmrfGraph
 from action_assistant.umrf.model import Signature
+from action_assistant.umrf.start_values import AskedInput
 from action_assistant.web.auth.access import Needs, identity_of, require
 from action_assistant.web.server.openapi import MOST_NUMBER, FileBytes, answer, reads
 
@@ -70,6 +77,12 @@ class ReachStatus(msgspec.Struct, frozen=True):
     engines: list[Robot]
     no_reach: str
     behaviours: BehaviourList | None = None
+
+
+class AskedInputsRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A graph, of which the inputs are wanted for which a start asks."""
+
+    umrf: SentGraph
 
 
 class RobotChange(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
@@ -396,6 +409,20 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
             return await services.control.look(group, me.person.id, me)
 
     @post(
+        "/api/asked_inputs",
+        operation_id="findAskedInputs",
+        status_code=200,
+        summary="The inputs for which a start of a graph asks",
+        opt=reads(AskedInputsRequest) | COUNTED,
+        guards=[Needs("simulate")],
+        request_max_body_size=GRAPH_BODY,
+    )
+    async def asked(request: _Asking) -> list[AskedInput]:
+        async with body_of(request, services.body_limit) as body:
+            wanted = decoded(body, AskedInputsRequest)
+            return list(await services.run_in_worker(asked_for, bytes(wanted.umrf)))
+
+    @post(
         "/api/groups",
         summary="Start a version on several robots",
         operation_id="startGroup",
@@ -417,7 +444,7 @@ def _starts(services: RunnerServices) -> list[ControllerRouterHandler]:
         started = GroupShown(id=grouped.group, runs=runs, failed=grouped.failed)
         return Response(started, status_code=201 if grouped.fresh else 200)
 
-    return [look, start]
+    return [look, asked, start]
 
 
 def _index(services: RunnerServices) -> ControllerRouterHandler:

@@ -36,7 +36,13 @@ ANSWERING_ALL: Final = frozenset({"/api/runs/{run:str}", "/api/runs/{run:str}/st
 #: Routes that leave out what the caller may not see, or refuse by the graphs in what they are sent.
 FILTERED: Final = frozenset(
     {
-        *("/api/runs", "/api/groups", "/api/preflight", "/api/starts/{request_id:str}"),
+        *(
+            "/api/runs",
+            "/api/groups",
+            "/api/preflight",
+            "/api/asked_inputs",
+            "/api/starts/{request_id:str}",
+        ),
         *("/api/stop", "/api/robots/{name:str}/stop", "/api/live", "/api/labels"),
         *("/api/comparison", "/api/statistics", "/api/approvals", "/api/approvals/asked"),
         *("/api/expectations", "/api/expectations/{name:str}", "/api/expectations/check"),

@@ -101,6 +101,11 @@ async def modify(
     it cannot be known whether the engine has made the change."""
     run = opened.run
     _require_moving(run)
+    if run.values:
+        raise Conflict(
+            "The run was started with values, which another version may not have: stop it, and start the "
+            "new version."
+        )
     if not opened.pauses:
         raise Conflict(
             f"A running graph is paused to be changed, and pausing is not safe on {run.engine}; "

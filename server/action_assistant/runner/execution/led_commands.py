@@ -257,7 +257,10 @@ def claim_of(run: Run, watching: tuple[str, ...]) -> Claim:
     """Return what a run brings to the rules of its robots when a person who watches these robots lets
     it go on."""
     return Claim(
-        digest=run.tree_digest or run.digest, watching=frozenset(watching), is_drill=run.drill
+        digest=run.tree_digest or run.digest,
+        watching=frozenset(watching),
+        is_drill=run.drill,
+        beyond=run.beyond,
     )
 
 

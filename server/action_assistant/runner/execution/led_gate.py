@@ -60,7 +60,9 @@ class LedGate(Gate):
         self.person = person
         #: What the rules of the robots ask about the run, with who watches them since the last start.
         self.claim = Claim(
-            digest=first.tree_digest or first.digest, watching=frozenset(first.watching)
+            digest=first.tree_digest or first.digest,
+            watching=frozenset(first.watching),
+            beyond=first.beyond,
         )
         #: The robots that play actions of the run.
         self.robots: Final = frozenset(first.led.players.values())

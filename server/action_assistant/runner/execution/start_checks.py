@@ -35,6 +35,8 @@ from action_assistant.runner.start.admission import (
     PreparedPieces,
     StartRequest,
     claim_of,
+    order_of,
+    overridden_in,
     prepared,
     prepared_pieces,
     watched_in,
@@ -99,7 +101,7 @@ class AcceptedStart(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def overridden(self) -> tuple[str, ...]:
         """The codes of the problems that the starter has chosen to override."""
-        return self.request.override.codes if self.request.override else ()
+        return overridden_in(self.request)
 
     @property
     def breakpoints(self) -> tuple[Breakpoint, ...]:
@@ -195,7 +197,8 @@ class StartChecks:
         robot = self._robots.reachable(request.engine)
         _require_plain(request)
         ready = await self._run_in_worker(prepared, request, robot.facts, random_id())
-        return await self._accept_on(robot, request, ready, starter)
+        order = order_of(request, ready.tree_digest, overridden_in(request))
+        return await self._accept_on(robot, request, ready, starter, order=order)
 
     def leads(self, engine: str, robots: Mapping[str, str]) -> bool:
         """Return whether a start on `engine` is that of a led run. `robots`: the robots that
@@ -218,12 +221,14 @@ class StartChecks:
         ready: Prepared,
         starter: Identity,
         *,
+        order: str,
         is_led: bool = False,
     ) -> AcceptedStart:
         """Take a prepared start through the checks that concern its robot, and wait for its answer.
-        `starter`: the id of the person; `is_led`: it is the part of a led run on this robot.
+        `starter`: the id of the person; `order`: the digest of the whole order; `is_led`: it is the part
+        of a led run on this robot.
         Raise Unavailable if the robot does not answer, Conflict if a check fails."""
-        await self._check(request, ready, robot, starter)
+        await self._check(request, ready, robot, starter, order)
         try:
             view = await self._ask(robot)
         except NoAnswer as nothing:
@@ -241,7 +246,8 @@ class StartChecks:
         watched_in(request.watching, engines_of(request))
         ready = await self._run_in_worker(prepared_pieces, request, CONDUCTED_FACTS, random_id())
         items = led_items(ready)
-        overridden = request.override.codes if request.override else ()
+        overridden = overridden_in(request)
+        order = order_of(request, ready.whole.tree_digest, overridden)
         preflight.require_clear(items, overridden)
         parts = [
             msgspec.structs.replace(request, engine=name, robots={}) for name in engines_of(request)
@@ -251,7 +257,7 @@ class StartChecks:
             robot = self._robots.reachable(part.engine)
             require_led(robot)
             own = ready.by_robot[part.engine]
-            return await self._accept_on(robot, part, own, starter, is_led=True)
+            return await self._accept_on(robot, part, own, starter, order=order, is_led=True)
 
         accepted = await _all_accepted(parts, accept)
         led = frozenset(ready.players)
@@ -293,13 +299,19 @@ class StartChecks:
         )
 
     async def _check(
-        self, request: StartRequest, ready: Prepared, robot: KnownEngine, starter: Identity
+        self,
+        request: StartRequest,
+        ready: Prepared,
+        robot: KnownEngine,
+        starter: Identity,
+        order: str,
     ) -> None:
         """Make the checks that need no answer of the engine: the rights of the robot, the yes of a second person, whether a
-        run keeps the robot, and whether anything is being stopped there. `starter`: the person. Raise Conflict or Forbidden if one fails."""
+        run keeps the robot, and whether anything is being stopped there. `starter`: the person; `order`: the digest of the whole order. Raise Conflict or Forbidden if one fails."""
         self._rights.require([request.engine], starter, claim_of(request, ready))
-        await self._approvals.require(robot.registration, ready.tree_digest, starter.person.id)
-        overridden = request.override.codes if request.override else ()
+        what = _named(order, ready)
+        await self._approvals.require(robot.registration, order, starter.person.id, what)
+        overridden = overridden_in(request)
         preflight.require_clear([self._free_item(request.engine, ready.name)], overridden)
         if self._foreign_stops.is_stopping(request.engine):
             raise Conflict(
@@ -452,7 +464,8 @@ class StartChecks:
             tasks.start_soon(check_courses)
             for engine in group.engines:
                 tasks.start_soon(look, engine)
-        return [preflight.with_items(found[engine], courses) for engine in group.engines]
+        looks = [preflight.with_items(found[engine], courses) for engine in group.engines]
+        return await self._approved(looks, group.for_engine(group.engines[0]), starter)
 
     async def _look_conducted(self, request: StartRequest, starter: Identity) -> list[Preflight]:
         """Return the pre-flight of a led run: first that of the whole graph, then that of
@@ -482,9 +495,8 @@ class StartChecks:
                 self._free_item(name, own.name),
                 *await self._engine_items(robot, own, starter, led=request),
             ]
-            listed += await self._approval_items(robot, own, starter)
             found.append(preflight.with_verdict(name, listed, whole.digest, whole.tree_digest))
-        return found
+        return await self._approved(found, request, starter)
 
     async def _look(self, request: StartRequest, starter: Identity) -> Preflight:
         """Return the pre-flight of one engine. `starter`: the person who would start. A
@@ -512,7 +524,6 @@ class StartChecks:
             items.append(self._free_item(request.engine, ready.name if ready is not None else ""))
             items += self._rights.items(request.engine, starter, claim_of(request, ready))
             items += await self._engine_items(robot, ready, starter)
-            items += await self._approval_items(robot, ready, starter)
         digests = (ready.digest, ready.tree_digest) if ready is not None else ("", "")
         return preflight.with_verdict(request.engine, items, *digests)
 
@@ -538,13 +549,21 @@ class StartChecks:
         claim = claim_of(led, ready)
         return [*items, *await self._look_led.items(robot, view.answer, starter, claim)]
 
-    async def _approval_items(
-        self, robot: KnownEngine, ready: Prepared | None, starter: Identity
-    ) -> list[Item]:
-        if ready is None:
-            return []
-        item = await self._approvals.item(robot.registration, ready.tree_digest, starter.person.id)
-        return [] if item is None else [item]
+    async def _approved(
+        self, looks: Sequence[Preflight], request: StartRequest, starter: Identity
+    ) -> list[Preflight]:
+        """Return the pre-flights of a start with the items about a second person, who says yes also to
+        what all of them would override."""
+        codes = {code for each in looks for code in each.override}
+        found: list[Preflight] = []
+        for look in looks:
+            is_robot = look.engine not in {SIMULATOR, CONDUCTED} and look.tree_digest
+            robot = self._robots.registration(look.engine) if is_robot else None
+            order = order_of(request, look.tree_digest, codes)
+            what = "this graph" if order == look.tree_digest else "this start"
+            item = robot and await self._approvals.item(robot, order, starter.person.id, what)
+            found.append(look if not item else preflight.with_order(look, item, order))
+        return found
 
     async def _course_items(self, group: GroupRequest, starter: Identity) -> Sequence[Item]:
         """Return the items that say whether the graph takes its expected courses (recorded runs
@@ -574,6 +593,11 @@ def _code_of(refused: Refused) -> str:
         each["code"] == "subgraph-across" for each in obstacles
     )
     return "subgraph-across" if is_shared else "graph"
+
+
+def _named(order: str, ready: Prepared) -> str:
+    """Return in words what a second person says yes to."""
+    return "this graph" if order == ready.tree_digest else "this start"
 
 
 def _require_plain(request: StartRequest) -> None:

@@ -244,6 +244,9 @@ def _to_store(
         led=_led_of(accepted),
         breakpoints=accepted.breakpoints,
         drill=request.drill,
+        values=request.values,
+        sent_digest=ready.sent_digest if request.values else "",
+        beyond=ready.beyond,
     )
     targets = () if accepted.is_simulated or accepted.led else (request.engine,)
     graph = GraphOutline(ready.name, ready.actions)

@@ -23,6 +23,8 @@ from action_assistant.runner.runs.events import Requested
 from action_assistant.runner.runs.views import time
 from action_assistant.safe_text import one_line
 from action_assistant.schema.runner_tables import run
+from action_assistant.umrf.kept_values import as_json
+from action_assistant.umrf.start_values import StartValues
 from action_assistant.version import VERSION, commit
 from action_assistant.web.audit.rows import AuditRow
 
@@ -96,7 +98,7 @@ class Software(msgspec.Struct, frozen=True):
 
 class Incident(msgspec.Struct, frozen=True, kw_only=True):
     """The title of the file. Times are in UTC. `graphs`: name and digest of each graph, in the order
-    of the files in `graphs/`."""
+    of the files in `graphs/`; `values`: those that were given at the start."""
 
     run: str
     number: int
@@ -112,6 +114,7 @@ class Incident(msgspec.Struct, frozen=True, kw_only=True):
     graphs: tuple[tuple[str, str], ...]
     streams: tuple[StreamProof, ...]
     software: Software
+    values: StartValues = {}
 
 
 def window(requested_at: int, ended_at: int | None, now: int) -> tuple[int, int]:
@@ -221,6 +224,11 @@ def _readme(incident: Incident) -> str:
         f"made at {incident.made_at} by {incident.made_by}; the run is "
         + ("over" if incident.is_over else "NOT over"),
         f"reason: {incident.reason or 'none was given'}",
+        *(
+            f"set at the start: {action} {name} = {as_json(value)}"
+            for action, given in incident.values.items()
+            for name, value in given.items()
+        ),
         f"check of the logs: {verdict}",
     )
     names = (

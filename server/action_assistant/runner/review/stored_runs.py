@@ -329,6 +329,7 @@ class StoredRuns:
                 graph_name=first.graph_name,
                 version=first.version,
                 digest=first.digest,
+                values=first.values,
                 engine=first.engine,
                 robots=tuple(found.robots),
                 graphs=tuple((name, digest) for name, digest, _ in graphs),

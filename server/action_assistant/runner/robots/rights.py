@@ -59,11 +59,13 @@ class Rules(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
 class Claim(msgspec.Struct, frozen=True, kw_only=True):
     """The part of a start that the rules of robots ask about, apart from its person. `digest`: of the
     graph that is sent together with those inside; `watching`: the robots that a person has said to
-    watch; `is_drill`: the start is for a Stop drill, which may be due."""
+    watch; `is_drill`: the start is for a Stop drill, which may be due; `beyond`: it gives values to
+    inputs that the graph does not leave open."""
 
     digest: str
     watching: frozenset[str] = frozenset()
     is_drill: bool = False
+    beyond: bool = False
 
 
 class Holder(msgspec.Struct, frozen=True):

@@ -17,6 +17,7 @@ from action_assistant.runner.runs.visits import Visit
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.laps import Laps
 from action_assistant.umrf.model import Precondition
+from action_assistant.umrf.start_values import StartValues
 from action_assistant.web.auth.caller import stamped
 from action_assistant.web.auth.graph_seals import Sight
 
@@ -124,6 +125,9 @@ class Requested(msgspec.Struct, frozen=True, omit_defaults=True, kw_only=True):
     drill: bool = False  # the start was for a Stop drill
     sight: Sight | None = None  # the rules of its graphs at the start, if the client sent them
     unsighted: bool = False  # there were rules, and it did not: only its author and owners see it
+    values: StartValues = {}  # given at the start; `umrf` has them, the version does not
+    sent_digest: str = ""  # of `umrf` with them; "" if there are none
+    beyond: bool = False  # some are of inputs that the version does not leave open
 
 
 class Published(msgspec.Struct, frozen=True, omit_defaults=True):

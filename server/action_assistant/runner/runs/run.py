@@ -21,6 +21,7 @@ from action_assistant.runner.runs.visits import ActionRun, Message
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.kept_values import NOTHING_KEPT, KeptValues
 from action_assistant.umrf.laps import Laps
+from action_assistant.umrf.start_values import StartValues
 
 State: TypeAlias = Literal[
     "requested",
@@ -147,6 +148,9 @@ class Run(msgspec.Struct, frozen=True, kw_only=True):
     drill: bool = False  # it was started for a Stop drill
     inside: tuple[str, ...] = ()  # the ids of further graphs whose rules say who may see it
     unsighted: bool = False  # as in its request
+    values: StartValues = {}  # given at the start
+    sent_digest: str = ""  # of the graph with them; "" if there are none
+    beyond: bool = False  # some are of inputs that the version does not leave open
     #: Of a led run, by piece: those that may go on, and the newest one of each robot.
     rests: dict[str, PieceRest] = {}
     said: dict[str, tuple[Said, ...]] = {}  # by the action of a led run

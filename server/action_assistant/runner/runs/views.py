@@ -26,6 +26,7 @@ from action_assistant.runner.runs.visits import ActionRun, How, Outcome, Visit
 from action_assistant.safe_text import hold_names
 from action_assistant.umrf.breakpoints import Breakpoint
 from action_assistant.umrf.json.text import UmrfGraph
+from action_assistant.umrf.start_values import StartValues
 
 _LIVE: Final = 3_000  # visits in one live message, over all actions
 _WHOLE: Final = 20_000
@@ -65,6 +66,8 @@ _BLANK: Final[dict[str, Any]] = {
     "breakpoints": msgspec.UNSET,
     "lead": msgspec.UNSET,
     "batons": msgspec.UNSET,
+    "values": msgspec.UNSET,
+    "sent_digest": msgspec.UNSET,
     "cause": "",
     "pinned": False,
     "note": "",
@@ -220,7 +223,9 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     engine of each actor, "" being the actor of actions that name none; `held`: why it begins nothing
     further; `breakpoints`: where it waits; `lead`: who let it go on last, or was handed it. `batons`: the robots whose baton `author`
     held at the start; `watching`: those that they said to watch. `hidden`: the
-    reader may not see its graph, so that little else is given."""
+    reader may not see its graph, so that little else is given. `values`: those that were given at the
+    start, by action and input; `digest` is that of the version, `sent_digest` that of the graph with
+    them, which was sent."""
 
     id: str
     number: int
@@ -255,6 +260,8 @@ class RunSummary(msgspec.Struct, frozen=True, kw_only=True):
     batons: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     watching: tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
     hidden: bool | msgspec.UnsetType = msgspec.UNSET
+    values: StartValues | msgspec.UnsetType = msgspec.UNSET
+    sent_digest: str | msgspec.UnsetType = msgspec.UNSET
 
     def __post_init__(self) -> None:
         hold_names(self, "unconfirmed", "detail")
@@ -438,6 +445,8 @@ def summary_of_row(row: Row[Any]) -> RunSummary:
         robots=more.get("robots"),
         batons=tuple(more["batons"]) if "batons" in more else msgspec.UNSET,
         watching=tuple(more["watching"]) if "watching" in more else msgspec.UNSET,
+        values=msgspec.convert(more["values"], StartValues) if "values" in more else msgspec.UNSET,
+        sent_digest=more.get("sent_digest") or msgspec.UNSET,
     )
 
 
@@ -528,6 +537,8 @@ def _fields(run: Run, recorded: bool) -> dict[str, Any]:
         "lead": run.lead or msgspec.UNSET,
         "batons": run.batons or msgspec.UNSET,
         "watching": run.watching or msgspec.UNSET,
+        "values": run.values or msgspec.UNSET,
+        "sent_digest": run.sent_digest or msgspec.UNSET,
     }
 
 

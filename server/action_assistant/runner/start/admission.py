@@ -1,12 +1,14 @@
 """The requests of starts, and the rules that a start has to satisfy before it is stored or sent.
 Pure."""
 
+import hashlib
 import re
 from collections.abc import Collection, Mapping, Sequence
 from datetime import datetime
-from typing import Annotated, Final, Literal, TypeAlias, TypeVar
+from typing import Annotated, Any, Final, Literal, TypeAlias, TypeVar
 
 import msgspec
+import rfc8785
 
 from action_assistant.errors import BadInput, Conflict, TooLarge
 from action_assistant.runner.links.port import CONDUCTED, SIMULATOR
@@ -43,6 +45,13 @@ from action_assistant.umrf.model import Action, Graph, Problem
 from action_assistant.umrf.pieces import Obstacle, handed_by, obstacles, piece_name
 from action_assistant.umrf.run_size import RunSize, excess
 from action_assistant.umrf.semantics import SCRIPT, Script, script_from
+from action_assistant.umrf.start_values import (
+    AskedInput,
+    StartValues,
+    WrongValue,
+    asked_inputs,
+    with_values,
+)
 from action_assistant.web.auth.graph_seals import Sight
 from action_assistant.web.http.plain_texts import require_plain
 
@@ -75,7 +84,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     which the person says that they watch it, with its hardware stop within reach. `drill`: the start is
     for a Stop drill of its robot, and so needs no earlier one. `sight`: the rules of the
     version, as the editor seals them; without it, where there are rules, the run is for its starter
-    and owners.
+    and owners. `values`: those of inputs for which the graph asks; its digest stays that without them.
     """
 
     version: str
@@ -96,6 +105,7 @@ class StartRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     drill: bool = False
     sight: Sight | None = None
     breakpoints: Breakpoints = ()
+    values: StartValues = {}
 
 
 class GoOnRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -176,6 +186,7 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     drill: bool = False
     sight: Sight | None = None
     breakpoints: Breakpoints = ()
+    values: StartValues = {}
 
     def for_engine(self, engine: str) -> StartRequest:
         """Return the start on one of these engines; its `request_id` is made of this one and the engine."""
@@ -199,12 +210,14 @@ class GroupRequest(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
             drill=self.drill,
             sight=self.sight,
             breakpoints=self.breakpoints,
+            values=self.values,
         )
 
 
 class Admitted(msgspec.Struct, frozen=True, kw_only=True):
-    """A start whose graph passed all checks. `problems`: warnings, and those that forbid a start
-    and are overridden."""
+    """A start whose graph passed all checks. `graph`: with the values of the start, `sent_digest` its
+    digest; `digest`: that of the version. `problems`: warnings, and those that forbid a start and are
+    overridden. `beyond`: values change what the version itself gives."""
 
     graph: Graph
     graph_id: str | None
@@ -214,6 +227,8 @@ class Admitted(msgspec.Struct, frozen=True, kw_only=True):
     problems: tuple[Problem, ...] = ()
     subgraphs: tuple[RunSubgraph, ...] = ()
     inside: dict[str, Graph] = {}
+    sent_digest: str = ""
+    beyond: bool = False
 
 
 class Prepared(msgspec.Struct, frozen=True, kw_only=True):
@@ -221,7 +236,8 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     of each action by full name, and the text that will be sent, with the identity of the run in it.
     `problems`: at most as many as anybody is shown. `inner`: the names of actions inside of
     `subgraphs`. `is_led`: these are the actions of one robot, which gets them one by one; `handing`:
-    the arrows by which these hand values to others."""
+    the arrows by which these hand values to others. `digest`, `tree_digest`: of the version;
+    `sent_digest`, `beyond`: as of `Admitted`."""
 
     run: str
     name: str
@@ -238,6 +254,8 @@ class Prepared(msgspec.Struct, frozen=True, kw_only=True):
     tree_digest: str
     is_led: bool = False
     handing: tuple[Obstacle, ...] = ()
+    sent_digest: str = ""
+    beyond: bool = False
 
 
 def watched_in(watching: Watching, robots: Collection[str]) -> tuple[str, ...]:
@@ -295,16 +313,19 @@ def admit(request: StartRequest, facts: EngineFacts, *, approved: bool = True) -
         request.subgraphs, found, request.tree_digest, approved=approved
     )
     _check_size(text, reading.graph, subgraphs, inside)
-    graph_problems = check(reading.graph, None, facts, inside)
+    graph = _given(reading.graph, request.values)
+    graph_problems = check(graph, None, facts, inside)
     problems = [*reading.problems, *reading.placed(graph_problems)]
     _check_problems(problems, request.override)
     script, script_text = _script(request)
     return Admitted(
-        graph=reading.graph,
+        graph=graph,
         graph_id=request.graph or stamp.graph,
         script=script,
         script_text=script_text,
         digest=found,
+        sent_digest=digest(graph) if request.values else found,
+        beyond=_is_beyond(reading.graph, request.values),
         problems=tuple(problems),
         subgraphs=subgraphs,
         inside=inside,
@@ -335,7 +356,33 @@ def prepared(
         subgraphs=admitted.subgraphs,
         inner=tuple(sorted({each.name for each in inside if not each.missing})),
         tree_digest=tree_of(admitted.digest, admitted.subgraphs),
+        sent_digest=admitted.sent_digest,
+        beyond=admitted.beyond,
     )
+
+
+def asked_for(umrf: bytes) -> tuple[AskedInput, ...]:
+    """Return the inputs for which a start of a sent graph asks. For workers. Raise what `read_sent`
+    raises."""
+    return asked_inputs(read_sent(umrf)[1].graph)
+
+
+def _given(graph: Graph, values: StartValues) -> Graph:
+    """Return the graph with the values of a start. Raise BadInput, with the place, for a wrong one."""
+    try:
+        return with_values(graph, values)
+    except WrongValue as why:
+        steps = (each for each in (why.action, why.name) if each)
+        raise BadInput(str(why), where={"path": pointer("values", *steps)}) from why
+
+
+def _is_beyond(graph: Graph, values: StartValues) -> bool:
+    """Return whether values are given to inputs that the graph does not leave open. The marks of its
+    author, which allow that, are none of its digest."""
+    if not values:
+        return False
+    left_open = {(each.action, each.name) for each in asked_inputs(graph) if each.open}
+    return any((name, each) not in left_open for name, given in values.items() for each in given)
 
 
 def _check_size(text: bytes, graph: Graph, subgraphs: Sequence[RunSubgraph], inside: Inner) -> None:
@@ -419,7 +466,29 @@ def claim_of(request: StartRequest, ready: Prepared | None) -> Claim:
         digest="" if ready is None else ready.tree_digest,
         watching=frozenset(name for name, is_watched in request.watching.items() if is_watched),
         is_drill=request.drill,
+        beyond=ready is not None and ready.beyond,
     )
+
+
+def order_of(request: StartRequest, tree_digest: str, codes: Collection[str]) -> str:
+    """Return the digest of everything that a second person says yes to: the version (`tree_digest`), and
+    where there are any, the values, the robots of a led run with what happens when one is lost, and
+    the overridden `codes`. That of a start with nothing besides its graph is the tree digest."""
+    more: dict[str, Any] = {}
+    if request.values:
+        more["values"] = msgspec.to_builtins(request.values)
+    if request.engine == CONDUCTED:
+        more |= {"robots": request.robots, "lost": request.lost}
+    if codes:
+        more["override"] = sorted(set(codes))
+    if not more:
+        return tree_digest
+    return hashlib.sha256(rfc8785.dumps([tree_digest, more])).hexdigest()
+
+
+def overridden_in(request: StartRequest) -> tuple[str, ...]:
+    """Return the codes of the problems that a start overrides."""
+    return request.override.codes if request.override is not None else ()
 
 
 def prepared_pieces(

@@ -161,11 +161,13 @@ class Approvals:
                 self._seq = events[-1].seq
         return tuple(self._by_digest.get(digest, ()))
 
-    async def item(self, robot: Registration, digest: str, starter: str) -> Item | None:
+    async def item(
+        self, robot: Registration, digest: str, starter: str, what: str = "this graph"
+    ) -> Item | None:
         """Return the pre-flight item about approval; None where the robot asks for none. It passes
         when somebody else than the starter has approved the graph with another browser than the one
         of this request. Of a link for several people nobody knows how many use it: who came by one
-        is no second person (decision 126)."""
+        is no second person (decision 126). `what`: the thing with this digest, in words."""
         if robot.profile.get(SECOND_PERSON) is not True:
             return None
         given = [each for each in await self.given_for(digest) if each.author.id != starter]
@@ -173,7 +175,7 @@ class Approvals:
         here = caller.device()
         others = [each.author for each in named if not here or each.device != here]
         if not others:
-            why = "nobody else has said yes to exactly this graph"
+            why = f"nobody else has said yes to exactly {what}"
             if named:
                 who = named[0].author.name or "somebody"
                 why += f": the yes of {who} came from the browser that you use"
@@ -186,13 +188,13 @@ class Approvals:
             text = f"{robot.name} takes only what a second person has said yes to, and {why}."
             return Item(code="approved", verdict="blocked", text=text)
         names = ", ".join(dict.fromkeys(each.name or "somebody" for each in others[:3]))
-        return Item(
-            code="approved", verdict="passed", text=f"{names} said yes to exactly this graph."
-        )
+        return Item(code="approved", verdict="passed", text=f"{names} said yes to exactly {what}.")
 
-    async def require(self, robot: Registration, digest: str, starter: str) -> None:
-        """Raise Conflict if the robot needs an approval of this graph and nobody but the starter
-        has given one."""
-        item = await self.item(robot, digest, starter)
+    async def require(
+        self, robot: Registration, digest: str, starter: str, what: str = "this graph"
+    ) -> None:
+        """Raise Conflict if the robot needs an approval of this graph, or order, and nobody but the
+        starter has given one. `what`: as of `item`."""
+        item = await self.item(robot, digest, starter, what)
         if item is not None and item.verdict == "blocked":
             raise Conflict(item.text, where={"path": "/engine", "item": item.code})

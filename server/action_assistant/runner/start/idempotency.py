@@ -5,6 +5,7 @@ from contextlib import asynccontextmanager
 from weakref import WeakValueDictionary
 
 import anyio
+import msgspec
 
 from action_assistant.errors import Conflict, Refused, Unavailable
 from action_assistant.kit.clock import ClockUs
@@ -15,6 +16,7 @@ from action_assistant.runner.runs.history import RunnerJournal
 from action_assistant.runner.runs.recorder import stream_of
 from action_assistant.runner.runs.run import Run
 from action_assistant.runner.start.admission import StartRequest
+from action_assistant.umrf.start_values import StartValues
 from action_assistant.web.auth.caller import BackgroundTasks
 
 
@@ -77,7 +79,8 @@ class IdempotentStarts:
             row.summary.get("lost", request.lost),
         )
         other = (row.digest, row.engine) != (request.digest, request.engine)
-        if other or other_tree or other_robots:
+        other_values = request.values != msgspec.convert(row.summary.get("values", {}), StartValues)
+        if other or other_tree or other_robots or other_values:
             raise Conflict(
                 "This request_id belongs to another start.", where={"path": "/request_id"}
             )

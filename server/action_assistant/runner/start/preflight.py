@@ -74,7 +74,8 @@ class Item(msgspec.Struct, frozen=True, kw_only=True):
 class Preflight(msgspec.Struct, frozen=True):
     """The pre-flight of a graph on one engine. `override`: the codes that a person would have to
     answer for; `never`: some item cannot be overridden; `digest`: of the graph that was checked,
-    `tree_digest`: of it together with the graphs inside."""
+    `tree_digest`: of it together with the graphs inside; `order_digest`: of all that a second person
+    says yes to, "" where nobody has to."""
 
     engine: str
     digest: str
@@ -82,6 +83,7 @@ class Preflight(msgspec.Struct, frozen=True):
     items: tuple[Item, ...]
     override: tuple[str, ...]
     never: bool
+    order_digest: str = ""
 
 
 class Settled(msgspec.Struct, frozen=True):
@@ -128,6 +130,14 @@ def with_verdict(engine: str, items: Sequence[Item], digest: str = "", tree: str
 def with_items(look: Preflight, more: Sequence[Item]) -> Preflight:
     """Return a pre-flight with more items, which only warn."""
     return msgspec.structs.replace(look, items=(*look.items, *more))
+
+
+def with_order(look: Preflight, approval: Item, order: str) -> Preflight:
+    """Return a pre-flight with the item about the yes of a second person to the whole order, which has
+    this digest."""
+    items = (*look.items, approval)
+    never = look.never or approval.verdict == "blocked"
+    return msgspec.structs.replace(look, items=items, never=never, order_digest=order)
 
 
 def refusal_item(code: str, refused: Refused) -> Item:

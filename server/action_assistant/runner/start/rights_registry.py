@@ -160,11 +160,11 @@ class RightsRegistry:
         """Return why a robot that takes released versions only takes no graph with this digest; empty
         if one was released."""
         try:
-            if self._release_of(claim.digest) is not None:
+            is_released = self._release_of(claim.digest) is not None
+            if is_released and not claim.beyond:
                 return ()
-            why = (
-                f"{robot} takes only versions that an owner has released, and this is none of them."
-            )
+            what = "this changes values in one" if is_released else "this is none of them"
+            why = f"{robot} takes only versions that an owner has released, and {what}."
         except Unavailable as unread:
             why = f"{robot} takes only versions that an owner has released. {unread.detail}"
         return (Refusal("released", why),)

@@ -1,7 +1,7 @@
 """Reads single fields of files without losing values that do not fit."""
 
 import re
-from typing import Final, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from action_assistant.umrf.json.text import Json, Number, dump
 from action_assistant.umrf.model import Direction, Parameter, Position
@@ -69,17 +69,27 @@ def graph_attributes(file: dict[str, Json]) -> tuple[dict[str, Json], str | None
     return ours, dump(rest) if rest else None
 
 
-def action_attributes(
-    item: dict[str, Json],
-) -> tuple[Position | None, str | None, str | None]:
-    """Return the position and the identity (aid) in an action's `gui_attributes`, and the remainder
-    of the attributes as JSON text. Each is None if it is missing or invalid; an invalid position
-    stays in the remainder."""
+#: The member of an action's `gui_attributes` that names the inputs for which a start asks.
+ASKS: Final = "ask_at_start"
+
+
+class ActionAttributes(NamedTuple):
+    """The attributes of an action in a file that this program knows: its position, its identity
+    (aid), the marks of inputs that are asked for at a start, and the remainder as JSON text."""
+
+    position: Position | None = None
+    aid: str | None = None
+    asks: tuple[tuple[str, str], ...] = ()
+    rest: str | None = None
+
+
+def action_attributes(item: dict[str, Json]) -> ActionAttributes:
+    """Return what an action's `gui_attributes` say. What is invalid stays in the remainder."""
     if "gui_attributes" not in item:
-        return None, None, None
+        return ActionAttributes()
     value = item["gui_attributes"]
     if not isinstance(value, dict):
-        return None, None, dump(value)
+        return ActionAttributes(rest=dump(value))
     ours, point = value.get("action_assistant"), value.get("position")
     aid = ours.get("aid") if isinstance(ours, dict) else None
     position = position_of(point)
@@ -90,8 +100,13 @@ def action_attributes(
         rest["position"] = {key: member for key, member in point.items() if key not in ("x", "y")}
         if not rest["position"]:
             del rest["position"]
+    marks = rest.get(ASKS)
+    asks: tuple[tuple[str, str], ...] = ()
+    if isinstance(marks, dict) and marks and all(isinstance(each, dict) for each in marks.values()):
+        asks = tuple(sorted((path, dump(mark)) for path, mark in marks.items()))
+        del rest[ASKS]
     known = aid if isinstance(aid, str) and AID.fullmatch(aid) else None
-    return position, known, dump(rest) if rest or not value else None
+    return ActionAttributes(position, known, asks, dump(rest) if rest or not value else None)
 
 
 def direction_of(value: Json) -> Direction:

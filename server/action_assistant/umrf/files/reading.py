@@ -213,7 +213,7 @@ class _Reader:
         extra: Extra = []
         index = len(self.actions)
         self._came_from(pointer("actions", index), path)
-        position, key, rest = action_attributes(item)
+        position, key, asks, rest = action_attributes(item)
         if rest is not None:
             extra.append(("gui_attributes", rest))
         if key is None or key in used:
@@ -236,6 +236,7 @@ class _Reader:
             outputs=parameters_of(item, "output_parameters", extra),
             position=position,
             twin=bool(twins),
+            asks=asks,
         )
         twins.append(index)
         self._read_run_state(item, key, path)

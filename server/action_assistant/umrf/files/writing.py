@@ -7,6 +7,7 @@ from typing import Final
 
 import msgspec
 
+from action_assistant.umrf.files.fields import ASKS
 from action_assistant.umrf.files.waypoints import waypoints_json
 from action_assistant.umrf.json.text import Json, Number, dump_indented, number, parse_small
 from action_assistant.umrf.model import ENTRY, EXIT, Action, Graph, Key, Position, Relation
@@ -122,6 +123,8 @@ class _Writer:
         if self.stamp is not None:
             named = {"aid": action.key, "version": self.stamp.version, "run": self.stamp.run}
             ours["action_assistant"] = {k: v for k, v in named.items() if v is not None}
+        if action.asks:
+            ours[ASKS] = {path: parse_small(mark) for path, mark in action.asks}
         return ours
 
     def _parent(self, relation: Relation) -> dict[str, Json]:
