@@ -120,7 +120,7 @@ def _text(origins: list[str], link: ShareLink) -> str:
 
 
 def may_of(role: str) -> str:
-    """Return in words the things that a role may do."""
+    """Return in words what a role may do; for an unknown role, that only a newer version knows it."""
     match role:
         case "viewer" | "editor" | "operator" | "owner":
             return role_words(role)

@@ -158,7 +158,8 @@ def _made(server: Server, name: str, parent: str | None) -> str:
 
 
 def _chosen(server: Server, asked: str) -> str:
-    """Return the id of the folder with this path or id. Raise RequestRefused for `/`."""
+    """Return the id of the folder whose path or id is `asked`. Raise RequestRefused for `/`, which
+    is the list of all graphs and no folder."""
     folder = folder_id(known_folders(server), asked)
     if folder is None:
         raise RequestRefused("Name a folder; / stands for none.")

@@ -203,8 +203,9 @@ def _identity(
 
 
 def _log(process: str, options: argparse.Namespace, *secrets: str) -> None:
-    """Set up the log of this process by the options, which hold for the processes that it starts
-    too. The `secrets` are never written to it. Raise CannotStart if an option is malformed."""
+    """Set up the log of this process by the options, and hand the settings on to the processes
+    that it starts. The `secrets` are never written to the log of this process. Raise CannotStart
+    if an option is malformed."""
     chosen = log_settings(options.log_format, options.log_level)
     hand_on(chosen)
     set_up(process, chosen, *secrets)

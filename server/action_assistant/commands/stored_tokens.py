@@ -75,7 +75,8 @@ def stored_token(url: str) -> StoredToken | None:
 
 
 def every_stored_token() -> Iterator[StoredToken]:
-    """Yield the tokens that are kept, by server. Raise CannotStart as `stored_token` does."""
+    """Yield the stored tokens, sorted by server. Raise CannotStart if the file of a token cannot
+    be read."""
     for path in sorted((paths.config() / "tokens").glob("*.json")):
         try:
             yield read_json(path, StoredToken)

@@ -54,9 +54,9 @@ def ask_once(url: str, question: Callable[[Connection], T]) -> T:
 
 
 def ask_from_worker(url: str, question: Callable[[Connection], T]) -> T:
-    """Call `question`, in a worker process, with a connection to the database `url` that reads one
-    consistent snapshot while another process writes, and return its result. Raise Unavailable if it
-    cannot be read."""
+    """Call `question` in a worker process, and return its result. Its connection to the database
+    `url` shows one consistent snapshot, whatever another process writes meanwhile. Raise
+    Unavailable if the database cannot be read."""
     database = database_of(url)
     try:
         return asyncio.run(_asked_once(database, question))

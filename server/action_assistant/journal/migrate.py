@@ -119,9 +119,9 @@ def run_scripts(connection: Connection, branch: str, revision: str) -> str:
 
 
 def recognize(connection: Connection) -> set[str]:
-    """Return the stored revisions of a database of this program; an empty set for an empty
-    database. Change nothing. Raise a subclass of CannotStart: AnothersDatabase for a database of
-    another program, NewerSchema for one of a newer version."""
+    """Return the schema revisions that are stored in a database of this program; an empty set for
+    an empty database. Change nothing. Raise a subclass of CannotStart: AnothersDatabase for a
+    database of another program, NewerSchema for one of a newer version of this program."""
     name = _name_of(connection)
     current = _current(connection)
     if _is_foreign(connection, current):

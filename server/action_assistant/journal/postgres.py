@@ -284,8 +284,9 @@ class Postgres:
 
 
 def weakness(connection: Connection) -> str:
-    """Return the sentence why nothing may be written to a database, by the settings of its server;
-    "" if nothing is wrong. It only reads."""
+    """Return a sentence about the first server setting that forbids writing to a database (an
+    event could be lost, or the server is a read-only copy); "" if all settings are right. It only
+    reads."""
     for name, (allowed, why) in _SETTINGS.items():
         if name == _READ_ONLY:  # as whoever only looks has it
             value = "on" if connection.execute(select(func.pg_is_in_recovery())).scalar() else "off"

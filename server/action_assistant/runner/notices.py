@@ -121,8 +121,10 @@ def _statements(
     facts: Mapping[str, str],
     chosen: Any,
 ) -> list[Executable]:
-    """Return one statement for each receiver. `chosen`: the condition for the run that the message
-    is about, whose name, number and robots are added; None for no run."""
+    """Return one statement for each receiver of messages of `kind`; it inserts the message about
+    `event` into the outbox. `at`: the time of the event (µs UTC). `chosen`: the SQL condition that
+    selects the run of the message, whose name, number and robots are added; None for a message
+    about no run."""
     found: list[Executable] = []
     for each in receivers:
         if kind not in each.kinds:

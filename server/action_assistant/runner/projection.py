@@ -135,8 +135,8 @@ def _run(asked: Requested) -> Executable:
 
 
 def _first_summary(asked: Requested) -> dict[str, object]:
-    """Return the summary of a run right after its request: without alarms, with the ids of the
-    graphs inside, and with its group and robots if it has any."""
+    """Return the summary of a run right after its request: no alarms, the ids of the graphs inside
+    of the started one, and what else the request says. Members without a value are left out."""
     summary: dict[str, object] = {
         "alarms": [],
         "inside": graphs_inside(asked.sight, asked.subgraphs),

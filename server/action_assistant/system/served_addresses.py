@@ -86,7 +86,8 @@ def _is_same(descriptor: int, path: Path) -> bool:
 
 
 def _place() -> str:
-    """Return a text that is the same in all processes of one computer that share its network."""
+    """Return a text that is the same in all processes of one computer, since its last boot, with
+    the same network namespace (so that 127.0.0.1 means the same to them)."""
     try:
         return f"{_BOOT.read_text().strip()}/{_NETWORK.stat().st_ino}"
     except OSError:  # macOS

@@ -11,7 +11,8 @@ from action_assistant.umrf.parameters import flat_name, without_value
 
 
 def signature_of(action: Action) -> Signature:
-    """Return the signature of an action as its own file describes it."""
+    """Return the types of the parameters and outputs of `action`, as they stand in the action
+    itself. No catalogue and no file is read."""
     inputs, optional = _types(action.inputs)
     outputs, _ = _types(action.outputs)
     return Signature(inputs=inputs, outputs=outputs, optional=optional)

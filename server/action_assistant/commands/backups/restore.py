@@ -144,7 +144,7 @@ def _put(
         aside = aside_folder(data)
     kept = [name for name in about.files if not _placed(folder, name, data)]
     for name in old:
-        _exchange(folder / name, data / name, aside)
+        _replace_database(folder / name, data / name, aside)
     if has_graphs:
         (data / epochs.MARK).unlink(missing_ok=True)
         database_location.remember(data, url)
@@ -263,9 +263,10 @@ def _locked(data: Path, branch: Branch) -> int:
         raise CannotStart(f"{error} End action-assistant first.") from error
 
 
-def _exchange(new: Path, old: Path, aside: Path | None) -> None:
-    """Replace the file `old` by `new` atomically; first link `old` into the folder `aside` (None:
-    do not)."""
+def _replace_database(new: Path, old: Path, aside: Path | None) -> None:
+    """Replace the database file `old` by `new` atomically, and remove the SQLite side files of
+    `old`. First make hard links to `old` and its write-ahead log in the folder `aside`, except
+    under names that it has already; None keeps nothing of the old database."""
     for path in (old, old.with_name(f"{old.name}-wal")):
         if aside is not None and path.exists() and not (aside / path.name).exists():
             os.link(path, aside / path.name)

@@ -131,14 +131,14 @@ def _put_file(data: Path, copy: UpgradeCopy, path: Path, progress: Progress) -> 
             # Links lead to no other disk.
             is_here = path.parent.stat().st_dev == data.stat().st_dev
             aside = aside_folder(data if is_here else path.parent)
-            _exchange(part, path, aside)
+            _replace_database(part, path, aside)
         finally:
             part.unlink(missing_ok=True)
     progress.end()
     _tell(copy, str(path), inspected(path)[0], now, aside)
 
 
-def _exchange(part: Path, path: Path, aside: Path) -> None:
+def _replace_database(part: Path, path: Path, aside: Path) -> None:
     """Put the file `part` in the place of `path`. Before that, link the old file and its SQLite
     side files (-wal, -shm, -journal) into the folder `aside`, and remove the side files."""
     beside = [path.with_name(f"{path.name}{suffix}") for suffix in ("-wal", "-shm", "-journal")]

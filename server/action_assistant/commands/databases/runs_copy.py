@@ -155,9 +155,10 @@ class RunsCopier:
             return await connection.run_sync(work, *values)
 
     async def _check(self, last: int) -> None:
-        """Raise CannotStart unless the copy, which goes up to the position `last`, is of this very
-        log. Events of archived runs are removed from the log, so the newest event that it still has
-        must be equal in both."""
+        """Raise CannotStart unless the copy, whose last event has the position `last`, is a copy
+        of this log, or if the log ends before `last`. Events of archived runs are removed from the
+        log, so only the newest event up to `last` that the log still has is compared; if it has
+        none, nothing is."""
         chosen = select(runner_event.c.position, runner_event.c.chain)
         chosen = chosen.where(runner_event.c.position <= last)
         rows = await self._log.query(chosen.order_by(runner_event.c.position.desc()).limit(1))

@@ -289,8 +289,9 @@ def _in_file(what: str, file: Path) -> Iterator[Diagnostic]:
 
 
 def _examine(database: Database, connection: Connection, seen: _DatabaseFindings) -> None:
-    """Examine a database of this version or an earlier one by a connection, and add the results to
-    `seen`. Raise CannotStart for any other database."""
+    """Look for damage and for the newest event in the database behind `connection`, and write both
+    into `seen`; an empty database leaves `seen` as it is. Raise CannotStart for a database of
+    another program or of a newer version."""
     if recognize(connection):
         seen.damage = first_damage(database, connection)
         seen.newest = newest_at(connection)

@@ -230,8 +230,9 @@ def robots_answer(place: Installation) -> Iterator[Diagnostic]:
 
 
 def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
-    """Yield a warning for each engine, on this computer, of a registered robot that indexes its
-    folders again while it runs: such an engine may crash at a get or start (hazard H15)."""
+    """Yield a warning for each engine process on this computer that belongs to a registered robot
+    and, by its command line, reads its folders again and again: it may crash at a get or a start
+    (hazard H15, docs/umrf-and-the-engine.md 3)."""
     robots = {each.name: each for each in _registered(place.data)}
     for pid, words in _engines() if robots else ():
         name = argument(words, "--actor-name")
@@ -248,8 +249,8 @@ def engines_index_once(place: Installation) -> Iterator[Diagnostic]:
 
 
 def robots_have_names(place: Installation) -> Iterator[Diagnostic]:
-    """Yield a warning for a robot that was registered under the name that now stands for led
-    runs."""
+    """Yield a warning if a robot is registered under the name `CONDUCTED`, which since a later
+    version stands for led runs (one run on several robots)."""
     if any(each.name == CONDUCTED for each in _registered(place.data)):
         yield found(
             "robot-name",

@@ -120,8 +120,9 @@ _OTHER_NAME: Final = (62, 64)  # X509_V_ERR_HOSTNAME_MISMATCH, …IP_ADDRESS_MIS
 
 
 def certificate_fits(where: str, url: str, trust: ssl.SSLContext) -> Iterator[Diagnostic]:
-    """Yield the faults of the certificate of the server at `url`; none if no server answers.
-    `where`: the address for the message; `trust`: the certificates to accept."""
+    """Yield a fault if the certificate of the server at `url` is not valid for the host in `url`
+    or not signed by a certificate in `trust`; nothing if no server answers. `where`: the address
+    as the message names it."""
     host, port = urlsplit(url).hostname or "", urlsplit(url).port or 443
     try:
         _certificate_of(host, port, trust)

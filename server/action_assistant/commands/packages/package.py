@@ -265,9 +265,9 @@ def _chosen(
 def _packages(
     actions: Sequence[Action], together: str | None
 ) -> tuple[dict[str, dict[str, bytes]], tuple[NameRefusal, ...]]:
-    """Return the files of all packages, by folder and path, and the reasons why they must not be
-    written (empty if they may). `together`: the name of one package for all actions; None for one
-    package for each action."""
+    """Return the files of all packages (folder, then path inside the folder, to content), and the
+    reasons why no package may be written. If there are reasons, the files are incomplete.
+    `together`: the name of one package for all actions; None for one package for each action."""
     if together is not None:
         try:
             return {together: bundle_files(together, actions)}, ()

@@ -178,8 +178,9 @@ def _status(options: argparse.Namespace) -> int:
 
 
 def _plan(options: argparse.Namespace, systemd: Systemd) -> ServicePlan:
-    """Return the service that the options describe. `systemd`: the manager it is for. Raise
-    CannotStart if an option cannot be used in a unit file."""
+    """Return the service that the options describe, for `systemd` (the manager of this computer or
+    of one person). Raise CannotStart if an option cannot be used, such as a password, which a unit
+    file would show to everybody."""
     settings.check_environment()  # files of secrets stay named, and are read by the service
     if options.database and ("@" in options.database or "password" in options.database):
         raise CannotStart(

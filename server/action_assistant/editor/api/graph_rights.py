@@ -32,7 +32,8 @@ class RuleView(msgspec.Struct, frozen=True):
 
 
 def routes(app_state: EditorState) -> list[ControllerRouterHandler]:
-    """Return the routes that read and change rules. They are for owners."""
+    """Return the routes that read and change the rules of graphs and folders (who may see and edit
+    them). Only people with the right "share", who are owners, may call them."""
 
     @get(
         "/api/graphs/{graph_id:str}/rule",

@@ -313,7 +313,8 @@ class GraphRights:
         return all(self.sees_folder(folder, identity) for folder in self._folders)
 
     def caller_sees_folder(self, folder: str) -> bool:
-        """Return whether the client for whom this task works may see a folder."""
+        """Return whether the client whose request is being answered may see a folder. True where
+        the work is for no client, or for one without an identity."""
         asking = caller()
         return (
             asking is None or asking.identity is None or self.sees_folder(folder, asking.identity)
@@ -357,7 +358,8 @@ class GraphRights:
         await self.carry_out(partial(self._journal.append, stream, [ruled]))
 
     async def _rule_of(self, kind: Kind, thing: str) -> Rules | None:
-        """Return the rules of a thing; None if it does not exist."""
+        """Return the rules of a graph, folder or version (which has those of its graph) with the
+        id `thing`: its own one and those that it inherits. Return None if there is no such thing."""
         if kind == "folder":
             found = self._folders.get(thing)
             if found is None:

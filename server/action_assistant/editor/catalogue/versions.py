@@ -163,9 +163,13 @@ class Versions:
         return row.tree_digest or row.digest, tuple(dict.fromkeys((row.graph, *inside)))
 
     async def release(self, version: str, author: PersonRef) -> VersionView:
-        """Release a version in the name of an owner. Doing it again writes its file again. Raise
-        NotFound if there is none with this id, Conflict if it is one of a draft, Unavailable if that
-        cannot be stored, or no runner can read it yet."""
+        """Release the version with the id `version` in the name of the owner `author`, whose role
+        the caller has checked. For a released version, only write the file again that runners
+        read.
+
+        Raise NotFound if there is no such version, Conflict if its graph is a draft. Raise
+        Unavailable if the release cannot be stored, or if the file cannot be written: then the
+        version is released, and no runner knows of it yet."""
         async with self._releasing:
             row = await self._row(version)
             graph = editor_tables.graph.c

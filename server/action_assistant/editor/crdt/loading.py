@@ -68,10 +68,10 @@ def _sent_back(replica: Replica, seq: int, damaged: StreamDamage | None = None) 
 
 
 def fold_sound(document: bytes, events: EventColumns) -> Folded | None:
-    """Apply stored events to a document, with the result of `fold` with `learn` (which also
-    collects what only editing needs), but faster, since not every event is read completely. All
-    events must have been accepted by rooms (checked when they came): others could crash the
-    process. Return None if `document` is not readable as a snapshot."""
+    """Apply stored events to a snapshot, and return what `fold` with `learn=True` returns. This is
+    faster: events are not read completely. All events must have been accepted by rooms; others
+    could crash the process. If a fault shows all the same, `fold` is used. Return None if
+    `document` cannot be read as a snapshot; an empty one is a new document."""
     replica = ReplicaState.replica(document) if document else Replica()
     if replica is None:
         return None

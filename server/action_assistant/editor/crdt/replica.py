@@ -215,9 +215,10 @@ class Replica:
     def _take(
         self, update: bytes, author: str, read: UpdateOutline, new: list[int], *, is_applied: bool
     ) -> UpdateEffect:
-        """Apply an update that `_check` has accepted, unless its pieces were applied already
-        (`is_applied`), or hold it back if it needs an earlier one. `new`: the clients that `_check`
-        returned."""
+        """Take an update that `_check` has accepted. If it needs updates that have not come yet,
+        hold it back; else apply it, and those that waited for it. `is_applied`: the document has
+        its contents already, so only the rest is done. `new`: the Yjs clients that nobody owned
+        before; they now belong to `author`."""
         if read.ready(self._known):
             brought = self._grew(update, read, is_applied=is_applied)
             check_whole(self.doc, read)

@@ -175,7 +175,8 @@ class _Past:
         return len(self._courses)
 
     def is_same(self, moment: int) -> bool:
-        """Return whether the course of the state with the number `moment` equals that of state 0."""
+        """Return whether the course (the simulated steps) of the state with the number `moment`
+        equals that of state 0. Each state is simulated only once."""
         return self._course(moment) == self._reference
 
     def parting(self, left: int, right: int) -> CourseParting:

@@ -157,8 +157,9 @@ def fitting(found: codec.Reading) -> codec.Reading:
 
 
 def read(body: bytes) -> codec.Reading:
-    """Read a UMRF file, of a graph or of one action. Raise BadInput, NotUmrf or TooLarge, with the
-    place, for any other file."""
+    """Read the file of a UMRF graph, or of one UMRF action. Raise NotUmrf if the JSON is no UMRF,
+    TooLarge if a limit is exceeded, BadInput for other faults; the error has the place of the
+    fault (line, column, JSON pointer) where it is known."""
     try:
         return codec.read(body)
     except codec.Unreadable as error:

@@ -133,8 +133,9 @@ def unpacking_look(
     sight: GraphAtSeq, action: Key, at: Position | None, inside: GraphAtSeq
 ) -> bytes:
     """Preview replacing the action with the key `action` by the actions of the graph `inside`;
-    return the JSON of an `UnpackingLook`. `sight`: the graph with the action; `at`: where the
-    action is drawn if it has no stored position."""
+    return the JSON of an `UnpackingLook`, which has only `reasons` if that is impossible. `sight`:
+    the graph with the action; `at`: where the page draws the action, used if the action has no
+    stored position."""
     moment = read(sight).moment
     drawn = tuple(
         replace(a, position=a.position or at) if a.key == action else a

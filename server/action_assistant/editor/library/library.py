@@ -283,9 +283,9 @@ class LibraryEdits:
             ]
 
     async def take(self, action: str, graph: str, aid: str | None, author: str) -> GraphView:
-        """Give an action of the library the parameters that its use in a graph has (`aid`: the key
-        of that action; None: the first use that differs), and return it. Raise NotFound if the
-        action, the graph or the use does not exist."""
+        """Give an action of the library the parameters that one of its uses in a graph has; return
+        the view of the library's action. `aid`: the key of that use; None: the first use whose
+        parameters differ. Raise NotFound if the action, the graph or the use does not exist."""
         await self._catalogue.require(action, "action")
         await self._catalogue.require(graph, "graph")
         source = await self._graph_reader.now(graph)

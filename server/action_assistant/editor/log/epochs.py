@@ -90,8 +90,8 @@ async def _epoch(journal: Journal, mark: Path) -> str:
 
 
 async def _follows(journal: Journal, mark: EpochMark | None) -> bool:
-    """Return whether the log still has the event of the mark, with the same hash chain; True
-    without a mark."""
+    """Return whether the log still has the event of `mark`, with the same hash chain, and so
+    continues it; True if `mark` is None."""
     return mark is None or await _chain(journal, mark.position) == mark.chain
 
 
@@ -101,8 +101,8 @@ async def _chain(journal: Journal, position: int) -> str:
 
 
 def marked(mark: Path) -> EpochMark | None:
-    """Return the last event that a data folder has seen, from the file `mark`; None if the file is
-    missing or unreadable."""
+    """Read the file `mark` of a data folder: the last event that this program stored while it used
+    the folder. Return None if the file is missing, unreadable or damaged."""
     try:
         return read_json(mark, EpochMark)
     except (OSError, DamagedFile):  # a new folder, or one of an older version

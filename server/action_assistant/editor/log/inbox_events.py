@@ -25,7 +25,7 @@ class InboxRead(msgspec.Struct, frozen=True):
 
 
 def inbox_stream(person: str) -> str:
-    """Return the name of the stream of the inbox of a person."""
+    """Return the name of the stream with the inbox of the person with the id `person`."""
     return f"inbox/{person}"
 
 

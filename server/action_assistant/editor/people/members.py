@@ -253,7 +253,8 @@ class Members:
             raise Conflict(f"There are {_MOST} persons already; end some.")
 
     def has_name(self, name: str, *, but: str) -> bool:
-        """Return whether somebody who is not ended has this name, other than the person `but`."""
+        """Return whether a person who is not ended has this name, in upper or lower case. The
+        person with the id `but` does not count."""
         return any(
             each.ended_at is None and each.id != but and each.name.casefold() == name.casefold()
             for each in self._members.values()

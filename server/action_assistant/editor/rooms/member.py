@@ -139,7 +139,8 @@ class Member:
         return True
 
     def post_answer(self, frame: bytes) -> None:
-        """Append the message with the requested document to the send queue, whatever its size."""
+        """Append the answer with the requested document to the send queue. No limit of the queue
+        applies to `frame`."""
         self._answer = _SyncState.WAITS
         self._frames.append(frame)
         self.on_news()

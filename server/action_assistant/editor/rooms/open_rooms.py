@@ -87,8 +87,9 @@ class Rooms:
         return room is not None and bool(room.members) and room.graph_exists
 
     def check_existence(self, stream: str) -> None:
-        """Have the database asked, from now on, whether the graph of this stream exists: it may be
-        deleted soon."""
+        """Forget that the graph of this stream exists, because it may be deleted soon: from now
+        on, `is_joined` returns False for it, and its callers ask the database. Nothing is asked
+        here."""
         room = self._rooms.get(stream)
         if room is not None:
             room.graph_exists = False

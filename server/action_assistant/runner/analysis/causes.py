@@ -236,8 +236,9 @@ def _stop(run: Run, asked: Intervention) -> OperatorStop:
 
 
 def _ran(run: Run, asked: Intervention) -> tuple[RunningAction, ...]:
-    """Return the actions that ran when a person gave a command (`asked`), the ones that were
-    certainly running first. An action around another one that ran is not listed."""
+    """Return the actions that ran, or perhaps ran, when a person gave the command `asked`; those
+    that certainly ran come first. Of an action of a sub-graph and the action that stands for the
+    sub-graph, only the first is returned."""
     found: list[RunningAction] = []
     for name in asked.active:
         visit = _at(run.actions.get(name, ActionRun()), asked.at)

@@ -59,7 +59,8 @@ def places(graph: str, own: Collection[str], names: Iterable[str]) -> dict[str, 
 
 
 def places_of(run: Run) -> dict[str, LevelPlace]:
-    """Return the places of all actions of a run."""
+    """Return the place of each action of a run among the levels of its hierarchy, by the name of
+    the action in the run."""
     own = {name for name, action in run.actions.items() if action.aid is not None}
     return places(run.graph_name, own, run.actions)
 

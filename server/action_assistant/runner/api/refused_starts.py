@@ -74,7 +74,8 @@ def noted(
 
 
 def refusal_of(asked: StartRequest | GroupRequest) -> StartRefused:
-    """Return the event of a start that is refused, without its reason."""
+    """Return the event of a start that is refused. Its reason `why` is empty; the caller fills it
+    in."""
     if isinstance(asked, GroupRequest):
         engines = asked.engines
     else:

@@ -357,7 +357,8 @@ class EmulatedEngine:
         self._plan_work(self.quirks.reaction_ms)
 
     def ask(self, ticket: int, at_ms: float) -> None:
-        """Receive a get at `at_ms`; the answer, if any, carries the number `ticket`."""
+        """Receive the get with the number `ticket` at `at_ms` (ms on the clock of the emulator).
+        The answer, if any, carries the same number."""
         self._pass(at_ms)
         if not self._deaf and not self.gone:
             self._inbox.put_get(ticket)

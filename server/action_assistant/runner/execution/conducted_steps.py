@@ -248,7 +248,8 @@ class Gate:
         return self.held is None and not self.is_final and not self.is_waiting
 
     def close(self) -> None:
-        """Close the gate for good: no piece is sent any more."""
+        """Close the gate for good: from now on it lets no piece through. Nothing that waits is
+        woken."""
         self.is_final = True
 
     def hold(self, held: Held) -> None:

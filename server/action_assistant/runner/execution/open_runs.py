@@ -147,10 +147,10 @@ class OpenRuns:
         }
 
     def occupying(self, engine: str, graph_name: str = "", *, apart_from: str = "") -> Run | None:
-        """Return the run that keeps an engine occupied; None if the engine is free. Of several
-        runs, a moving one comes before one that may only be loading, then one of the graph
-        `graph_name` before others. `apart_from`: the id of a led run that does not count, nor
-        do its pieces."""
+        """Return the open run that keeps an engine occupied; None if the engine is free. Of
+        several runs, one that has begun comes before one that is only loading, then one of the
+        graph `graph_name` before others. `apart_from`: the id of a led run; this run and its
+        pieces do not count."""
         runs = [
             each.run
             for each in self.on(engine).values()

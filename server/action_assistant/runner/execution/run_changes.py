@@ -98,8 +98,9 @@ class RunChanges:
             self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why} {LOOK_AT_IT}")
 
     def doubt(self, why: str) -> None:
-        """Record, with an alarm, that the code of an action may go on and that the engine will
-        never report its end. `why`: the reason, without a full stop."""
+        """Record, with an alarm, that the Stop of the run is unconfirmed: code of its actions may
+        still be executing, and the engine will never report the end. `why`: the reason, without a
+        full stop."""
         self.tell(Unconfirmed(self._clock_us(), why))
         self.alarm("stop_unconfirmed", f"STOP UNCONFIRMED: {why}. {LOOK_AT_IT}")
 

@@ -169,8 +169,9 @@ class StartChecks:
     def with_sight(
         self, requested: Requested, request: StartRequest, starter: Identity
     ) -> Requested:
-        """Return the first event of a run with the facts that say who may see it. Raise Forbidden if
-        the starter may not see the graph that its text names."""
+        """Return the first event of a run with the sight of the request (the sealed rules of its
+        graphs), or the note that it has none though rules exist. Raise Forbidden if the starter
+        may not see the graph that the event names."""
         sight = self._sources.sight
         sight.require_graphs(starter, requested.graph)
         unsighted = request.sight is None and sight.has_rules

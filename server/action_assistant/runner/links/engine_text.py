@@ -135,7 +135,8 @@ def snapshot(
 
 
 def _keeps(action: _Action) -> bool:
-    """Return whether an action is a keeper, which never runs."""
+    """Return whether an action of an engine's text is a keeper: it holds the outputs of the action
+    of a piece, and never runs."""
     idle = action.name == KEEPER and action.state == "UNINITIALIZED"
     return idle and not is_given(bytes(action.input_parameters))
 

@@ -35,8 +35,8 @@ def values_of(slots: Iterable[Slot]) -> Values:
 
 
 def reported(text: bytes) -> Values | None:
-    """Return the values in `input_parameters`, the JSON text of an engine, as `values_of` does;
-    None if it cannot be read."""
+    """Return the values in `text`, the JSON text that an engine reports as `input_parameters`, in
+    the form of `values_of`; None if the text is unreadable or no JSON object."""
     try:
         group = parse(text)
     except Unreadable:

@@ -163,8 +163,8 @@ class Recordings:
 
 
 def hours(since: int, until: int) -> tuple[str, str]:
-    """Return the names, without ending, of the first and the last hour (UTC) between two
-    moments."""
+    """Return the file names, without ending, of the first and the last hour (UTC) of the time from
+    `since` to `until` (µs UTC)."""
     first, last = (datetime.fromtimestamp(each / 1e6, UTC) for each in (since, until))
     return f"{first:%Y-%m-%dT%H}", f"{last:%Y-%m-%dT%H}"
 

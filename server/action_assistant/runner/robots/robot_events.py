@@ -180,8 +180,9 @@ _ALARMS: Final[Mapping[Command, str]] = {
 
 
 def alarm_of(command: ForeignCommand, robot: str, graph: str) -> tuple[str, str] | None:
-    """Return code and text of the alarm that a command of somebody else raises for a run of
-    `graph`. Return None if the command does not concern the run."""
+    """Return the code and text of the alarm that a command from outside of this program raises for
+    a run of `graph` on `robot`: any command to that graph, and the start of another one. None for
+    other commands, which do not concern the run."""
     if command.graph == graph:
         text = _ALARMS[command.command].format(graph=graph, robot=robot)
         return f"foreign_{command.command}", text

@@ -591,8 +591,9 @@ def _known_of(run: Run, graph: str) -> Iterator[str]:
 
 
 def key_of(run: Run, graph: str, node: str) -> str:
-    """Return the name of an action in a run: its full name (`node`), after the running name of its
-    sub-graph and a "/" if it is in one."""
+    """Return the name of an action in a run. `graph`: the name under which the engine runs the
+    graph of the action; `node`: the action's full name. For an action of a sub-graph the result is
+    `graph/node`, else just `node`."""
     return node if graph == run.graph_name else f"{graph}/{node}"
 
 

@@ -202,8 +202,8 @@ def labels_of(runs: Sequence[str]) -> Select[Any]:
 
 
 def all_labels(unseen: Unseen | None = None) -> Select[Any]:
-    """Select up to 200 labels of runs, the most used first. `unseen`: only of runs that this person
-    may see."""
+    """Select up to 200 labels of runs, the most used first. `unseen`: the graphs that a person may
+    not see; only runs that this person may see are then counted. None counts all runs."""
     query = select(run_label.c.label).group_by(run_label.c.label)
     if unseen is not None:
         query = query.join(run, run.c.id == run_label.c.run).where(seen_by(unseen))

@@ -52,7 +52,8 @@ def will_be_indexed(run_id: str, number: int) -> Executable:
 
 def index_some(connection: Connection, most: int) -> bool:
     """Index the words of at most `most` runs that are marked as not indexed, the newest first, in
-    the transaction of `connection`; return whether there were any."""
+    the transaction of `connection`. Return whether any run was indexed; False means that none is
+    left."""
     texts = (run.c.graph_name, run.c.engine, run.c.author_name, review.c.words, review.c.note)
     chosen = (
         select(unindexed_run.c.number, run.c.id, *texts)

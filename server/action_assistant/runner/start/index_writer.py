@@ -145,8 +145,9 @@ def _require_sound(
 
 
 def _require_free(states: Mapping[str, FileState], replace: Sequence[str], folder: Path) -> None:
-    """Refuse a write that existing files stand in the way of. Raise Conflict with all of those
-    files; `replace` names the graphs whose files may be replaced."""
+    """Raise Conflict, with all files concerned, if a graph cannot be written to its file in
+    `folder`, or if a file with other contents would be replaced without its graph being named in
+    `replace`. `states`: by the names of the graphs."""
     hindered = {name: each.why for name, each in states.items() if isinstance(each, Hindered)}
     others = {
         name: each.file.display_path

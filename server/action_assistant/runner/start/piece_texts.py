@@ -47,7 +47,9 @@ class PieceText(msgspec.Struct, frozen=True, kw_only=True):
     taken_on_false: bool = False
 
     def kept_parts(self) -> tuple[str, ...]:
-        """Return the parts of the text with keepers of all outputs, as `with_keepers` adds them."""
+        """Return the parts of the text in which keepers (actions that hold values and never run)
+        are added for all outputs of `action`. The id of the run stands between the parts, as in
+        `parts`."""
         kept = with_keepers(self.piece, self.action, taken_on_false=self.taken_on_false)
         return _split(codec.write(kept, self.stamp), self.stamp)
 

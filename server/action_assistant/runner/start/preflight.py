@@ -361,10 +361,13 @@ def _again(view: EngineView, graph: Graph) -> Item:
 def not_matched(
     graph: Graph, facts: EngineFacts, index: EngineIndex, held: Collection[str]
 ) -> tuple[str, ...]:
-    """Return the full names of actions that an engine cannot build in a graph that it takes without
-    its index: a start of a name that it holds, or a modify. These are sub-graphs and unknown
-    actions. For an engine that names no index, only sub-graphs that it `held` are known. Empty
-    where the engine looks actions up."""
+    """Return the full names of the actions in `graph` that an engine cannot build.
+
+    Some engines (`facts.restart_matches` is false) do not look actions up in their index when a
+    graph is modified, or started under a name that they hold. Such an engine cannot build
+    sub-graphs and actions that are not in `index`. If `index` is empty, return only the actions
+    that stand for a graph in `held`, the running names that the engine holds. Empty for all other
+    engines."""
     if facts.restart_matches:
         return ()
     silent = not index.actions and not index.graphs

@@ -129,8 +129,9 @@ class ForeignStopLoop:
         return stopped
 
     def _stop_graph(self, engine: KnownEngine, graph: str, author: Author) -> None:
-        """Begin to stop a graph on a robot, and return at once. If it is being stopped already,
-        only wait longer for the proof. `author`: who pressed Stop."""
+        """Begin to stop a graph on a robot, and return at once; the Stop goes on in the
+        background. If the graph is being stopped already, only extend the time until its Stop
+        counts as unconfirmed. `author`: the person who pressed Stop."""
         robot = engine.registration.name
         known = self._going.get((robot, graph))
         if known is not None:

@@ -375,9 +375,9 @@ def _begun(subject: Subject, key: Key, outcome: Precondition) -> set[Key]:
 
 
 def _comes_after(subject: Subject, key: Key, others: list[Key]) -> bool:
-    """Return whether at least one of the actions `others` cannot be reached from the entry except
-    through the action `key`. The graph's exit waits for all of `others`, so it is then reached only
-    after `key`."""
+    """Return whether the graph's exit is reached only after the action `key`: the exit waits for
+    all of the actions `others`, and at least one of these cannot be reached from the entry except
+    through `key`. False without `others`."""
     if not others:
         return False
     seen, stack = {ENTRY}, [ENTRY]

@@ -65,7 +65,9 @@ class _ArrowMeaning(NamedTuple):
 
 
 def behaviour_differences(graph: Graph, other: Graph) -> Iterator[BehaviourDifference]:
-    """Yield the differences of `other` from `graph`. Both have the same keys."""
+    """Yield each way in which `other` would behave differently from `graph`: changed actions,
+    arrows and ends. Positions and descriptions do not count. The same action has the same key in
+    both."""
     names = {a.key: a.full_name for a in graph.actions} | _NAMES
     mine, theirs = ({a.key: _action(a) for a in each.actions} for each in (graph, other))
     for key in sorted(mine.keys() | theirs.keys()):

@@ -221,8 +221,9 @@ def _got(parts: Iterator[_Part], against: list[JoinRefused]) -> Iterator[_Part]:
 
 
 def _lets_through(inside: Graph, outcome: Precondition) -> bool:
-    """Return whether a bypass of the sub-graph with this outcome passes from its entry to its exit
-    by bypasses alone."""
+    """Return whether the actions in `inside` would hand a bypass on like the sub-graph does: if
+    its first action is bypassed with `outcome`, a single chain of bypasses leads to the exit, and
+    no action runs. False if several actions begin it, or its exit waits for several."""
     entries, exits = ends_of(inside)
     if len(entries) != 1 or (len(exits) > 1 and any(r.required for r in exits)):
         return False

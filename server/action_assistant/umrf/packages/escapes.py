@@ -174,8 +174,8 @@ def xml(text: str) -> XmlText:
 
 
 def markdown(text: str) -> MarkdownText:
-    """Return the text as one paragraph of Markdown, also if it has several: no line can begin a
-    list, a heading or a fence."""
+    """Return the text as one line of Markdown: white space and line breaks become single spaces,
+    and special characters are escaped, so that no list, heading or fence can begin."""
     return MarkdownText(" ".join(visible(text).split()).translate(_MARKDOWN_ESCAPES))
 
 

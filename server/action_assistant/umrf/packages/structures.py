@@ -210,7 +210,8 @@ def _default(leaf: dict[str, Json]) -> Initial:
 
 
 def _spelled(value: Json) -> Initial:
-    """Return a value that has a C++ literal, else None."""
+    """Return `value` as an initial value that C++ can write as a literal: a single value, or a
+    tuple for a list of single values. None for any other value."""
     if not isinstance(value, list):
         return _scalar(value)
     members = tuple(each for member in value if (each := _scalar(member)) is not None)

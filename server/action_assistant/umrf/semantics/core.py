@@ -249,8 +249,8 @@ class Core(Clock):
             self._begin(graph, node)
 
     def _loaded(self, graph: Running, node: Node) -> None:
-        """Begin an action that has finished loading, even if its graph has ended meanwhile; do
-        nothing if another graph has taken the name of its graph."""
+        """Begin an action (`node`) that has finished loading, also if `graph` has ended meanwhile;
+        do nothing if the engine no longer holds this graph, or holds another one by the same name."""
         node.loading = False
         graph.loading -= 1
         if self.graphs.get(graph.name) is graph and not node.loaded and self._load(graph, node):

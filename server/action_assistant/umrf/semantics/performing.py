@@ -91,7 +91,8 @@ class PerformedCalls:
 
     @property
     def takes_graphs(self) -> bool:
-        """True if an action that stands for a graph is performed as one call."""
+        """True if there is a performer and it carries out an action that stands for a graph as one
+        call, instead of its actions one by one."""
         return self._performer is not None and self._performer.takes_graphs
 
     def begin(self, graph: Running, node: Node) -> None:

@@ -58,8 +58,9 @@ _EVENTS: Final = {
 
 
 def described(event: Event, graph_name: Callable[[str], str] = str) -> Fact | None:
-    """Return an event of the streams of the audit in words; None for a kind of a newer version. Raise
-    msgspec.DecodeError for a body that cannot be read."""
+    """Return an event of an audit stream in words, None for a kind that only a newer version
+    knows. `graph_name` returns the name for the id of a graph. Raise msgspec.DecodeError for a
+    body that cannot be read."""
     known = _EVENTS.get(event.kind)
     found = None if known is None else msgspec.json.decode(event.body, type=known)
     match found:

@@ -173,8 +173,8 @@ class RepeatCounts:
         return True
 
     def over(self, *, all_of_them: bool = False) -> list[Draft]:
-        """Forget the facts of minutes that are over, or all. Return the events of those that were
-        repeated, with the number of their repetitions."""
+        """Forget the facts whose minute is over, or all facts with `all_of_them`. For each that
+        was repeated, return one event with the number of repetitions after the first time."""
         at = self._clock_us()
         repeated: list[Draft] = []
         for key, (minute, times) in list(self._seen.items()):

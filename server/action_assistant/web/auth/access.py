@@ -357,7 +357,9 @@ class Access:
                 await send(last)
 
     def _admit(self, scope: HTTPScope | WebSocketScope, headers: dict[str, str]) -> bool:
-        """Raise a refusal, or return whether this is a preflight that needs no route."""
+        """Authenticate a request, and let it pass. Return True if it is a CORS preflight (an
+        OPTIONS request of a browser) that is answered here without a session, False for any other
+        request that may pass. Raise WrongHost, WrongOrigin or another refusal for the rest."""
         if not self._addresses.allows_host(headers.get("host")):
             raise WrongHost(f"This server is not called {headers.get('host', '')!r}.")
         origin = headers.get("origin")

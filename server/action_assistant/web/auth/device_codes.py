@@ -98,8 +98,10 @@ class DeviceCodes:
         return DeviceCode(made.id, f"{made.code[:4]}-{made.code[4:]}", CODE_SECONDS)
 
     def claim(self, text: str, browser: str, address: str) -> WaitingDevice:
-        """Use a code up for another browser. Of several who send it at once, one has it. Raise
-        Unauthenticated for a code that is not valid, TooMany if too many codes were tried."""
+        """Take the code `text` for the new device `browser` at `address`, and return what that
+        device waits with for the confirmation. A code can be taken once, also if several devices
+        send it at the same time. Raise Unauthenticated for an unknown, old or used code, TooMany
+        if all devices together have tried too many codes just now."""
         self._forget_old()
         if self._guesses is not None and not self._guesses.take():
             raise TooMany("Too many codes are tried just now; wait a minute, or ask for a link.")

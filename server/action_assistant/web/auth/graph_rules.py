@@ -74,7 +74,8 @@ def combined(rules: Iterable[Rule]) -> Rule:
 
 
 def with_person(rule: Rule, person: str) -> Rule:
-    """Return a rule by which this person may edit, too."""
+    """Return a rule by which the person with the id `person` may edit, besides all who may edit by
+    `rule`; `rule` itself if it allows that already."""
     named = Identity(Person(person, "", "editor"))
     if may_edit(rule, named) or rule.editors == "all" == rule.readers:
         return rule

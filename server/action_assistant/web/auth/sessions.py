@@ -126,7 +126,8 @@ class InvitationRegistry(Protocol):
     """Knows the links, and the people who came in by them."""
 
     async def look(self, proof: str) -> Invited:
-        """Return the invitation that a link proves. Raise Unauthenticated if the link is not valid."""
+        """Return the invitation of a link, without using it. `proof`: the secret part of the link.
+        Raise Unauthenticated if it is unknown, or the invitation has expired or was revoked."""
 
     async def come_in(self, link: str, session: str, browser: str, address: str) -> PersonFile:
         """Use a personal link for the session with this id, and return its person. Of several who use
@@ -158,7 +159,9 @@ class ToldAudit(SessionAudit, Protocol):
     """Keeps what people told a process without people of its own."""
 
     def ended_here(self, what: EndableKind, id_: str, author: str) -> None:
-        """Keep that a person told this process of the end of something."""
+        """Record that the person `author` notified this process of the end of an invitation,
+        session, person or token (`what`) with the id `id_`, which has ended in the process that
+        has people."""
 
     def person_stored(self, person: PersonFile, author: str) -> None:
         """Keep that a person told this process the state of somebody."""

@@ -30,7 +30,8 @@ class Adopted(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 async def _untold(record: TokenRecord, person: str) -> None:
-    """Tell nobody that a token was revoked: the editor stores it."""
+    """Do nothing: the default for a process in which nobody has to be notified that a token was
+    revoked."""
 
 
 def shared_token_routes(

@@ -132,7 +132,8 @@ def mail(message: Message, page: str, now: int, *, sender: str, to: tuple[str, .
 
 
 def _in_time(message: Message, now: int) -> str:
-    """Return the sentence of a message; of one that is no news any more, with its time before it."""
+    """Return the sentence of a message. If the message is older than `LATE_US` at `now` (µs UTC),
+    the sentence begins with the time at which it happened."""
     if now - message.at <= LATE_US:
         return message.text
     happened = moment(message.at).astimezone(UTC).strftime("%Y-%m-%d %H:%M UTC")

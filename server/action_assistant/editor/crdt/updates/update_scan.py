@@ -187,9 +187,11 @@ class Scan:
             self._needs[other] = max(end, self._needs.get(other, 0))
 
     def _one(self, client: int, start: int, info: int, needs: dict[int, int]) -> int:
-        """Read one struct of a client, whose first clock (item number) is `start`; return the clock
-        after it. `info`: its first byte; `needs`: is increased to the clocks that it needs. Raise
-        Malformed if it breaks a rule."""
+        """Read one struct of `client`; return the clock (item number) that follows the struct.
+        `start`: the first clock of the struct; `info`: its first byte. Raise the entries of
+        `needs` (client to the number of that client's items that must be there before) for all
+        items that the struct names. Raise Malformed if the struct is cut off or breaks the Yjs
+        format or its order."""
         size, reference, fresh = self._struct(info, needs)
         if needs.get(client, 0) > start and not self._stored:
             raise Malformed("a struct that stands on itself or on a later one")

@@ -83,7 +83,8 @@ class DraftMerge(msgspec.Struct, frozen=True):
 
     @property
     def target(self) -> GraphAtSeq:
-        """Return the side of the draft that is merged into."""
+        """Return the present state of the graph that receives the changes: the draft or its
+        origin, as `into` says."""
         return self.sides.of(self.into)
 
     @property

@@ -144,8 +144,8 @@ class Outlets:
             await self.start.send(leaving)
 
     def shown(self, graphs: Iterable[Snapshot]) -> None:
-        """Take note of the graphs that engines show: a start whose run is among them was received,
-        so that the next one may be sent."""
+        """Take note of the graphs that engines report. If the run of the last start is among them,
+        the engine has received that start, and the next start may be sent."""
         last = self._untaken
         if last is not None and any(each.run == last.run for each in graphs):
             last.taken.set()
