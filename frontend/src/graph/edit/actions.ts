@@ -33,9 +33,9 @@ import {
   numbersOf,
   writeKey,
 } from "./document-writes";
-import { keepingEnds } from "./ends";
 import { writeParameters } from "./parameters";
 import { draw } from "./relations";
+import { keepingWaits } from "./waits";
 
 /** An action to be added, usually one of the library. */
 export interface NewAction {
@@ -104,7 +104,7 @@ export function removeActions(
   const gone = new Set([...keys].filter((key) => key !== ENTRY && key !== EXIT));
   asOneEdit(doc, () => {
     numberGhosts(doc);
-    if (options.heal) keepingEnds(doc, () => healAndRemove(doc, gone));
+    if (options.heal) keepingWaits(doc, () => healAndRemove(doc, gone));
     else remove(doc, gone);
   });
 }

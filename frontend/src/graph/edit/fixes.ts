@@ -12,9 +12,9 @@ import type { JsonText, Key } from "../model";
 import { asJsonText } from "../values";
 import { removeActions, setField } from "./actions";
 import { asOneEdit, graphNow, numbersOf } from "./document-writes";
-import { setOutputsOptional } from "./ends";
 import { setParameter } from "./parameters";
 import { mirrorRelation, removeRelation, setRequired } from "./relations";
+import { setOutputsOptional } from "./waits";
 
 export const FIXES = [
   "mirror-relation",

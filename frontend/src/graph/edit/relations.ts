@@ -17,11 +17,11 @@ import {
   relationNow,
   writeKey,
 } from "./document-writes";
-import { keepingEnds } from "./ends";
+import { keepingWaits } from "./waits";
 
 /**
  * Draws an arrow that says what was drawn: after `outcome` the child runs. Between two that are
- * connected already it adds that response. What the end of the graph waits for follows (`ends.ts`).
+ * connected already it adds that response. What the end of the graph waits for follows (`waits.ts`).
  * Returns the relation's id, or null when the ends do not fit: nothing leads into the entry or out
  * of the exit, nor from one to the other.
  */
@@ -32,7 +32,7 @@ export function connect(
   outcome: Precondition = "on_true",
   response: Response = "run",
 ): string | null {
-  return asOneEdit(doc, () => keepingEnds(doc, () => draw(doc, parent, child, outcome, response)));
+  return asOneEdit(doc, () => keepingWaits(doc, () => draw(doc, parent, child, outcome, response)));
 }
 
 /** The arrow alone, as a part of an edit that keeps the ends itself. */
@@ -120,7 +120,7 @@ export function setResponse(
   response: Response,
 ): boolean {
   if (endsOf(id)?.parent === ENTRY) return false;
-  return asOneEdit(doc, () => keepingEnds(doc, () => answer(doc, id, outcome, response)));
+  return asOneEdit(doc, () => keepingWaits(doc, () => answer(doc, id, outcome, response)));
 }
 
 function answer(doc: Y.Doc, id: string, outcome: Precondition, response: Response): boolean {
@@ -172,7 +172,7 @@ export function moveRelation(
   id: string,
   ends: { readonly parent?: Key; readonly child?: Key },
 ): string | null {
-  return asOneEdit(doc, () => keepingEnds(doc, () => move(doc, id, ends)));
+  return asOneEdit(doc, () => keepingWaits(doc, () => move(doc, id, ends)));
 }
 
 function move(
@@ -211,7 +211,7 @@ export function retarget(
   outcome: Precondition,
   to: { readonly parent?: Key; readonly child?: Key; readonly outcome?: Precondition },
 ): string | null {
-  return asOneEdit(doc, () => keepingEnds(doc, () => led(doc, id, outcome, to)));
+  return asOneEdit(doc, () => keepingWaits(doc, () => led(doc, id, outcome, to)));
 }
 
 function led(
@@ -262,7 +262,7 @@ export function swapOrder(doc: Y.Doc, ids: readonly string[], one: number, other
 
 /** Puts an action into an arrow: it takes over what the arrow said, and its success leads on. */
 export function insertInto(doc: Y.Doc, id: string, key: Key): boolean {
-  return asOneEdit(doc, () => keepingEnds(doc, () => putBetween(doc, id, key)));
+  return asOneEdit(doc, () => keepingWaits(doc, () => putBetween(doc, id, key)));
 }
 
 function putBetween(doc: Y.Doc, id: string, key: Key): boolean {
