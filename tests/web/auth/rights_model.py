@@ -82,8 +82,7 @@ HIDDEN_RUN: Final = "a run of a graph that you may not see"
 
 
 class Client(NamedTuple):
-    """A person's browser or program: `headers` let it in; `scopes` of a program, None for a browser.
-    `other`: a second browser of the person, where there is one."""
+    """A person's browser or program: `headers` let it in; `scopes` of a program, None for a browser."""
 
     headers: dict[str, str]
     person: str
@@ -91,7 +90,6 @@ class Client(NamedTuple):
     role: Role
     scopes: frozenset[str] | None
     in_group: bool
-    other: dict[str, str] | None = None
 
 
 class State(NamedTuple):

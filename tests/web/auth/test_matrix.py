@@ -76,6 +76,7 @@ class Lab:
         self.product = product
         self.owner = product.editor()
         self.robots = product.runner()
+        self.owner.timeout = self.robots.timeout = httpx.Timeout(90)
         self.random = random.Random(DOSE if EVERY else datetime.now(UTC).date().toordinal())
         self.number = 0
         for robot in ROBOTS:
@@ -193,10 +194,6 @@ class Lab:
         devices = self._as(headers, "get", "/api/devices").json()
         session = link["id"] if kind == "link_revoked" else devices["this"]
         in_group = kind != "link_revoked"
-        other = None
-        if kind == "device_ended":
-            other, headers = headers, self._device(headers)
-            session = self._as(headers, "get", "/api/devices").json()["this"]
         if program is not None:
             wanted = {"name": "program", "scopes": [program]}
             made = self._as(headers, "post", "/api/tokens", json=wanted)
@@ -205,7 +202,7 @@ class Lab:
             if kind == "token_revoked":
                 session = made.json()["record"]["id"]
         scopes = None if program is None else frozenset(PROGRAMS[program].split())
-        return Client(headers, person, session, role, scopes, in_group, other)
+        return Client(headers, person, session, role, scopes, in_group)
 
     def _device(self, headers: dict[str, str]) -> dict[str, str]:
         """Return the headers of a further browser of a person, which the first has confirmed."""
@@ -221,7 +218,7 @@ class Lab:
 
     def _as(self, headers: dict[str, str], method: str, path: str, **more: Any) -> httpx.Response:
         return httpx.request(
-            method, self.product.url + path, headers=headers, trust_env=False, timeout=20, **more
+            method, self.product.url + path, headers=headers, trust_env=False, timeout=90, **more
         )
 
     def revoke(self, kind: Kind, client: Client) -> None:
@@ -232,9 +229,9 @@ class Lab:
             case "session_ended":
                 self.owner.post(f"/api/sessions/{client.session}/end").raise_for_status()
             case "device_ended":
-                assert client.other is not None
+                other = self._device(client.headers)  # now: whoever asks each route ends others
                 path = f"/api/devices/{client.session}/end"
-                assert self._as(client.other, "post", path).is_success
+                assert self._as(other, "post", path).is_success
             case "person_ended":
                 self.owner.post(f"{path}/end").raise_for_status()
             case "link_revoked":
