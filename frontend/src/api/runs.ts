@@ -1,6 +1,7 @@
 /** Runs as the runner tells them. */
 
 import { useQuery } from "@tanstack/react-query";
+import type { RunBreakpoint } from "../graph/breakpoints";
 import { newAid } from "../graph/document-keys";
 import { isolated } from "../words/isolated";
 import { editor, runnerAt } from "./client";
@@ -81,6 +82,8 @@ export interface StartOrder {
   watching?: Watching;
   /** Set for a start by which a Stop drill is made. */
   drill?: boolean;
+  /** Where a led run waits. */
+  breakpoints?: readonly RunBreakpoint[];
 }
 
 /** True for each robot that a person says to watch. */
@@ -105,6 +108,11 @@ async function sightOf(version: string): Promise<{ sight?: RunnerApi["Sight"] }>
   }
 }
 
+const asBreakpoints = (
+  given: readonly RunBreakpoint[] = [],
+): { breakpoints?: RunnerApi["Breakpoint"][] } =>
+  given.length === 0 ? {} : { breakpoints: given as RunnerApi["Breakpoint"][] };
+
 /** Starts a version by value. The same `request` never starts twice. */
 export async function startRun(order: StartOrder): Promise<Started> {
   const [engine = "", ...others] = order.engines;
@@ -121,6 +129,7 @@ export async function startRun(order: StartOrder): Promise<Started> {
     ...(await sightOf(order.version)),
     ...(order.watching === undefined ? {} : { watching: order.watching }),
     ...(order.drill === true ? { drill: true } : {}),
+    ...asBreakpoints(order.breakpoints),
     umrf: order.umrf,
     ...order.inside,
   };

@@ -1,4 +1,6 @@
 /** Before a start: what is looked at, and who has said yes. */
+
+import type { RunBreakpoint } from "../graph/breakpoints";
 import { editor, runnerAt } from "./client";
 import type { LedOrder } from "./led-runs";
 import type { Preflight } from "./robots";
@@ -39,10 +41,12 @@ export function runPreflight(
   engines: readonly string[],
   behaviours: boolean,
   led: LedOrder | null,
-  said: { watching: Watching; drill: boolean },
+  said: { watching: Watching; drill: boolean; breakpoints: readonly RunBreakpoint[] },
   signal: AbortSignal,
 ): Promise<Preflight[]> {
-  const body = { engines, ...(behaviours ? { behaviours } : {}), ...led, ...said, ...what };
+  const breakpoints = [...said.breakpoints] as RunnerApi["Breakpoint"][];
+  const way = { ...(behaviours ? { behaviours } : {}), ...led };
+  const body = { engines, ...way, ...said, breakpoints, ...what };
   return runnerAt(runner).post("/api/preflight", { body, signal });
 }
 

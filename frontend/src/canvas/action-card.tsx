@@ -26,6 +26,7 @@ import {
 } from "./editor-store";
 import type { CardNode } from "./elements";
 import { CARD_LINES, cardSize } from "./geometry/arrange";
+import { BreakpointMark } from "./marks/breakpoint-mark";
 import { ChangeTag, useChangeMark } from "./marks/change-marks";
 import { ProblemBadge } from "./marks/problem-marks";
 import { OUTCOMES, OutcomeSign, outcomeColor, outcomeWord } from "./outcome";
@@ -155,6 +156,7 @@ export const ActionCard = memo(function ActionCard({
         role="img"
         aria-label={`Input of ${isolated(action.name)} ${action.instanceId}`}
       />
+      <BreakpointMark of={action.key} on="card" />
       {robot !== "" && <RobotTag name={robot} />}
       {change && <ChangeTag mark={change} beside={robot !== ""} />}
       {never && <span className={style.never}>never run</span>}

@@ -187,6 +187,8 @@ export class EditorStore {
   readonly openThreads = new Watched<ReadonlyMap<Key, number>>(new Map());
   /** Null while coverage by expected courses is not shown. */
   readonly untaken = new Watched<UntakenPlaces | null>(null);
+  /** Where the run on the canvas waits, else where a led run would: words by action key or relation id. */
+  readonly breakpoints = new Watched<ReadonlyMap<string, string>>(new Map());
   /** The actions that the focused parameter connects; null while no parameter is focused. */
   readonly touched = new Watched<TouchedActions | null>(null);
 }
@@ -263,6 +265,11 @@ export function useDataRole(key: Key): "gives" | "takes" | undefined {
 /** Return the number of open comment threads about an action. */
 export function useOpenThreadCount(key: Key): number {
   return useWatched(useEditorStore().openThreads, (threads) => threads.get(key) ?? 0);
+}
+
+/** Return what the breakpoint of an action or arrow does, in words; undefined if it has none. */
+export function useBreakpointWords(of: string): string | undefined {
+  return useWatched(useEditorStore().breakpoints, (now) => now.get(of));
 }
 
 const NONE: readonly Precondition[] = [];

@@ -290,7 +290,8 @@ function cardWords(action: Action, named: string, { progress, marks }: NodeOptio
   const robot = named === "" ? "" : `, robot ${isolated(named)}`;
   const state = progress.get(action.key)?.word;
   const now = state === undefined ? "" : `, ${state}`;
-  return `${isolated(action.name)} ${action.instanceId}${robot}${now}${problemMarkWords(marks.get(action.key))}`;
+  const waits = action.breakpoint === undefined ? "" : ", breakpoint";
+  return `${isolated(action.name)} ${action.instanceId}${robot}${now}${waits}${problemMarkWords(marks.get(action.key))}`;
 }
 
 type Names = ReadonlyMap<Key, string>;
@@ -314,7 +315,8 @@ function arrowWords(
   const [from, to] = [names.get(relation.parent) ?? "", names.get(relation.child) ?? ""];
   if (relation.parent === ENTRY) return `Arrow from entry to ${to}`;
   const robots = hand === null ? "" : `; ${handOverLabel(hand)}`;
-  return `Arrow from ${from}, when ${outcomeWord[outcome]}: ${relation.conditions[outcome]} ${to}${robots}`;
+  const waits = relation.breakpoint === undefined ? "" : ", breakpoint";
+  return `Arrow from ${from}, when ${outcomeWord[outcome]}: ${relation.conditions[outcome]} ${to}${robots}${waits}`;
 }
 
 /** Names and robots of the cards, which arrows show. Unchanged ones keep the identical object. */

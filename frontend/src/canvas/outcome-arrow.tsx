@@ -13,6 +13,7 @@ import type { Point } from "./arrows/scene";
 import type { RoutedLine } from "./arrows/simple-lines";
 import { SinceSpot, useUntakenOutcomes } from "./editor-store";
 import type { Arrow } from "./elements";
+import { BreakpointMark } from "./marks/breakpoint-mark";
 import { ChangeSign, useChangeMark } from "./marks/change-marks";
 import { HandMark } from "./marks/hand-mark";
 import { ProblemBadge } from "./marks/problem-marks";
@@ -169,6 +170,7 @@ function Pill({ id, data, pill: [x, y], selected }: BundleProps & { pill: Point 
         >
           {change && <ChangeSign mark={change} />}
           <SinceSpot of={data.relation} on="arrow" />
+          {(data.answers ?? data.entry) && <BreakpointMark of={data.relation} on="arrow" />}
           {data.mark && (
             // biome-ignore lint/a11y/noStaticElementInteractions: chosen by keys like every arrow
             // biome-ignore lint/a11y/useKeyWithClickEvents: the arrow itself is chosen by keys

@@ -1,5 +1,6 @@
 /** Every edit action, in the order in which menus and help list them. */
 import { ALIGN, DISTRIBUTE, NUDGE, snap, tidy, tidySelection, turn } from "./arrange";
+import * as breakpoints from "./breakpoints";
 import * as draw from "./draw";
 import { DRY_RUN } from "./dry-run-actions";
 import type { EditAction } from "./edit-action";
@@ -9,6 +10,7 @@ import * as graph from "./share";
 import * as look from "./view";
 
 export * from "./arrange";
+export * from "./breakpoints";
 export * from "./draw";
 export * from "./folding";
 export * from "./notes";
@@ -21,6 +23,7 @@ export const EDIT_ACTIONS: readonly EditAction[] = [
   draw.retargetArrow,
   draw.straightenLine,
   notes.insert,
+  breakpoints.breakpoint,
   draw.entry,
   draw.exit,
   notes.note,

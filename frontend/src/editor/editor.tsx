@@ -48,6 +48,7 @@ import { blockWords, ProblemCount, useProblemGroups } from "./problem-count";
 import { RoomNotices } from "./room-notices";
 import { SaveStatus } from "./save-status";
 import { useRemoteEditAnnouncements, useRunAnnouncements } from "./use-announcements";
+import { useBreakpointMarks } from "./use-breakpoint-marks";
 import { useEditor } from "./use-editor";
 import { type Past, usePast } from "./use-past";
 
@@ -58,6 +59,7 @@ interface ProviderProps {
 
 function EditorContextProvider({ context, children }: ProviderProps) {
   const { graph, select, view } = context;
+  useBreakpointMarks(context.store, graph);
   const links = useMemo<NoteLinks>(
     () => ({
       target(link) {

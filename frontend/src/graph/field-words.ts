@@ -13,6 +13,7 @@ const WORDS: Readonly<Record<string, string>> = {
   instance_id: "number",
   position: "place",
   required: "waits for it",
+  breakpoint: "breakpoint",
   on_true: "when true",
   on_false: "when false",
   on_error: "when error",

@@ -69,6 +69,8 @@ export interface Action {
   readonly twin: boolean;
   /** Fields that this model does not know, or known ones whose value does not fit. */
   readonly extra: Extra;
+  /** Where a led run waits, as JSON text; absent: nowhere. No file has it. */
+  readonly breakpoint?: JsonText;
 }
 
 /** An output of the parent that reaches the child under another name. */
@@ -94,6 +96,8 @@ export interface Relation {
   readonly childrenExtra: Extra;
   /** By response: through which places people have led its line, as JSON text. */
   readonly waypoints: readonly (readonly [response: Response, text: JsonText])[];
+  /** As of an action. */
+  readonly breakpoint?: JsonText;
 }
 
 export interface Graph {

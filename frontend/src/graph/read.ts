@@ -272,6 +272,7 @@ function readAction(key: Key, fields: OwnerFields, position: unknown): RawAction
     missing: fields.get("missing") === true,
     twin: fields.get("twin") === true,
     extra: extraOf(fields, "x"),
+    ...breakpointOf(fields),
   };
   return { action, order: asNumber(fields.get("order")) ?? 0 };
 }
@@ -321,7 +322,13 @@ function readRelation(id: string, fields: OwnerFields, positions: OwnerFields): 
     parentsExtra: extraOf(fields, "x/parents"),
     childrenExtra: extraOf(fields, "x/children"),
     waypoints: readWaypoints(id, positions),
+    ...breakpointOf(fields),
   };
+}
+
+function breakpointOf(fields: OwnerFields): Pick<Action, "breakpoint"> {
+  const text = asJsonText(fields.get("breakpoint"));
+  return text === undefined ? {} : { breakpoint: text };
 }
 
 const NONE: Relation["waypoints"] = [];

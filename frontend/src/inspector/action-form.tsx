@@ -7,6 +7,7 @@ import { adoptGhost, rename, renameDocument, setField } from "../graph/edit";
 import type { Action } from "../graph/model";
 import { DraftInput } from "../ui/draft-input";
 import { ArrowList } from "./arrow-list";
+import { ActionBreakpoint } from "./breakpoint-field";
 import { DescriptionField, NameField, TypeField } from "./fields/action-fields";
 import { type CheckedGroup, ProblemsContext } from "./fields/field-problems";
 import { SharedField } from "./fields/shared-field";
@@ -70,6 +71,7 @@ export function ActionForm({ action }: { action: Action }) {
       <RunConditions of={action.key} title="When" />
       <ArrowList action={action} />
       <ParameterList action={action} side="out" />
+      <ActionBreakpoint action={action} />
       <section className={style.section}>
         <TypeField action={action} />
         <Button

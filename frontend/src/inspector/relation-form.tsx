@@ -9,6 +9,7 @@ import { ENTRY, EXIT, RESPONSES, type Relation, type Response } from "../graph/m
 import { endName, handOverWords, ignoredWords, relationWords } from "../graph/relation-words";
 import { handOverLabel, handOverOf, robotOf } from "../graph/robots";
 import { isolated } from "../words/isolated";
+import { ArrowBreakpoint } from "./breakpoint-field";
 import { SharedField } from "./fields/shared-field";
 import style from "./inspector.module.css";
 import { RemapList } from "./parameters/remap-list";
@@ -110,6 +111,7 @@ export function RelationForm({ relation }: { relation: Relation }) {
               <RemapList relation={relation} />
             </SharedField>
           )}
+          <ArrowBreakpoint relation={relation} />
         </>
       )}
       <Button

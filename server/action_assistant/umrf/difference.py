@@ -193,7 +193,7 @@ def _action_says(action: Action) -> dict[str, Any]:
     says |= {f"in/{p.path}": p.text for p in action.inputs}
     says |= {f"out/{p.path}": p.text for p in action.outputs}
     says |= {f"ask/{path}": mark for path, mark in action.asks}
-    return says | dict(action.extra)
+    return says | _breakpoint_of(action) | dict(action.extra)
 
 
 def _relation_says(relation: Relation) -> dict[str, Any]:
@@ -202,4 +202,9 @@ def _relation_says(relation: Relation) -> dict[str, Any]:
     waypoints = {f"waypoints/{response}": text for response, text in relation.waypoints}
     extra = {f"parents/{field}": text for field, text in relation.parents_extra}
     extra |= {f"children/{field}": text for field, text in relation.children_extra}
-    return conditions | {"required": relation.required} | remaps | waypoints | extra
+    held = _breakpoint_of(relation)
+    return conditions | {"required": relation.required} | remaps | waypoints | held | extra
+
+
+def _breakpoint_of(thing: Action | Relation) -> dict[str, Any]:
+    return {"breakpoint": thing.breakpoint} if thing.breakpoint else {}

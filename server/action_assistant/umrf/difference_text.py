@@ -18,7 +18,7 @@ from action_assistant.umrf.json.text import dump, parse_small
 from action_assistant.umrf.model import PRECONDITIONS, Graph, Key
 
 _SIGNS: Final[dict[Change, str]] = {"added": "+", "removed": "-", "changed": "~"}
-_LOOKS: Final = ("position", "direction", "waypoints/", "gui_attributes")
+_LOOKS: Final = ("position", "direction", "waypoints/", "gui_attributes", "breakpoint")
 
 
 def by_name(graph: Graph) -> Graph:
@@ -49,7 +49,7 @@ def by_name(graph: Graph) -> Graph:
 
 def without_looks(found: Difference) -> Difference:
     """Return the part of a difference that can change what a robot does: without positions,
-    waypoints, and notes and frames on the canvas."""
+    waypoints, breakpoints, and notes and frames on the canvas."""
     actions = (replace(a, fields=_meant(a.fields)) for a in found.actions)
     relations = (replace(r, fields=_meant(r.fields)) for r in found.relations)
     return replace(

@@ -72,6 +72,7 @@ class Action(msgspec.Struct, frozen=True, kw_only=True):
     fields that this model does not know, and known ones whose value does not fit; the latter
     replace the field when the graph is written. `asks`: the inputs, by path, that a start asks for
     because the author marks them, each with its mark as JSON text.
+    `breakpoint`: JSON text, "" for none; no file has it.
     """
 
     key: Key
@@ -87,6 +88,7 @@ class Action(msgspec.Struct, frozen=True, kw_only=True):
     twin: bool = False
     extra: tuple[tuple[str, JsonText], ...] = ()
     asks: tuple[tuple[str, JsonText], ...] = ()
+    breakpoint: JsonText = ""
 
     @property
     def full_name(self) -> str:
@@ -109,7 +111,7 @@ class Relation(msgspec.Struct, frozen=True, kw_only=True):
     `parent_order` is its position in the parent's `children`, `child_order` in the child's
     `parents` (for the ends: in `graph_entry` and `graph_exit`); ties are ordered by key.
     `waypoints`: by response, in the order of `RESPONSES`, the JSON text of the points through which
-    people have led its line.
+    people have led its line. `breakpoint`: as of an action.
     """
 
     parent: Key
@@ -124,6 +126,7 @@ class Relation(msgspec.Struct, frozen=True, kw_only=True):
     parents_extra: tuple[tuple[str, JsonText], ...] = ()
     children_extra: tuple[tuple[str, JsonText], ...] = ()
     waypoints: tuple[tuple[Response, JsonText], ...] = ()
+    breakpoint: JsonText = ""
 
 
 class Graph(msgspec.Struct, frozen=True, kw_only=True):

@@ -7,6 +7,7 @@ import httpx
 import pytest
 from hypothesis import given
 from msgspec import UNSET
+from msgspec.structs import replace
 from pycrdt import Doc
 
 from action_assistant.editor.documents import document
@@ -15,6 +16,9 @@ from action_assistant.editor.documents.document import Maps
 from action_assistant.editor.documents.values import relation_id
 from action_assistant.editor.interchange.edited_text import TextEdit, text_edit
 from action_assistant.errors import BadInput, NotUmrf
+from action_assistant.umrf.difference import difference
+from action_assistant.umrf.difference_text import is_same, without_looks
+from action_assistant.umrf.digest import digest
 from action_assistant.umrf.files import codec
 from action_assistant.umrf.model import Graph
 from editor.api.test_api import NAV, assert_problem, imported
@@ -173,3 +177,28 @@ def test_the_route_stores_nothing_and_names_the_line(http: httpx.Client) -> None
     assert problem["where"]["line"] >= 4
     assert_problem(http.post(route, params={"seq": 7}, content=text), 409)
     assert http.get(f"/api/graphs/{made['id']}").json()["seq"] == 1
+
+
+def test_an_edited_text_leaves_breakpoints_where_they_are() -> None:
+    moment, file = nav()
+    go, back = (action.key for action in moment.graph.actions[:2])
+    moment.maps["actions"][f"{go}|breakpoint"] = '{"visit":2}'
+    moment.maps["actions"][f"{back}|breakpoint"] = "{}"
+    marked = ReadGraph(2, moment.maps, document.read_maps(moment.maps))
+    file["actions"][0]["name"] = "Move"
+    file["graph_exit"] = []
+    del file["actions"][1], file["actions"][0]["children"]
+    left = applied(marked.maps, text_edit(marked, json.dumps(file).encode()))
+    assert [(each.name, each.breakpoint) for each in left.actions] == [("Move", '{"visit":2}')]
+    assert codec.write(marked.graph) == codec.write(nav()[0].graph)
+
+
+def test_a_breakpoint_is_in_no_file_and_no_digest_and_changes_nothing_that_a_robot_does() -> None:
+    plain = nav()[0].graph
+    action, *others = plain.actions
+    marked = replace(plain, actions=(replace(action, breakpoint="{}"), *others))
+    assert codec.write(marked) == codec.write(plain)
+    assert digest(marked) == digest(plain)
+    found = difference((1, plain), (2, marked))
+    assert [field.field for field in found.actions[0].fields] == ["breakpoint"]
+    assert is_same(without_looks(found))

@@ -6,6 +6,7 @@ import { type ReactNode, useMemo, useState } from "react";
 import { Link } from "wouter";
 import { renewing } from "../../api/client";
 import { identifiedText } from "../../api/courses";
+import { fetchDocument } from "../../api/history";
 import { errorText, unconfirmed } from "../../api/http";
 import { fetchInside } from "../../api/inside";
 import { CONDUCTED, type LedOrder } from "../../api/led-runs";
@@ -21,6 +22,9 @@ import {
   fetchApprovals,
   runPreflight,
 } from "../../api/starts";
+import { type RunBreakpoint, startBreakpoints } from "../../graph/breakpoints";
+import { mapsFrom } from "../../graph/document-keys";
+import { readGraph } from "../../graph/read";
 import { HelpLink } from "../../status/help-link";
 import { batonWords } from "../../status/robot-rights";
 import { EngineLabel } from "../../status/state-label";
@@ -67,13 +71,25 @@ function useInside(graph: string, seq: number) {
   });
 }
 
+/** Query where a led run of this moment waits, as it was drawn then. */
+function useBreakpoints(graph: string, seq: number) {
+  return useQuery({
+    queryKey: ["breakpoints", graph, seq],
+    queryFn: async ({ signal }) => {
+      const document = await fetchDocument(graph, seq, signal);
+      return startBreakpoints(readGraph(mapsFrom(document)));
+    },
+    staleTime: Number.POSITIVE_INFINITY,
+  });
+}
+
 /** Query the state of the chosen engines, as the runner sees it now. */
 function useLook(
   { graph, seq, umrf }: { graph: string; seq: number; umrf: string | undefined },
   engines: readonly string[],
   behaviours: boolean,
   led: LedOrder | null,
-  said: { watching: Watching; drill: boolean },
+  said: { watching: Watching; drill: boolean; breakpoints: readonly RunBreakpoint[] | undefined },
 ) {
   const { runner } = useLive();
   const look = useQuery({
@@ -81,9 +97,15 @@ function useLook(
     queryFn: async ({ signal }) => {
       const inside = await fetchInside(graph, seq, signal);
       const what = { graph, umrf: umrf ?? "", ...inside };
-      return runPreflight(runner ?? "", what, engines, behaviours, led, said, signal);
+      const { breakpoints = [] } = said;
+      const all = { ...said, breakpoints };
+      return runPreflight(runner ?? "", what, engines, behaviours, led, all, signal);
     },
-    enabled: umrf !== undefined && runner !== undefined && engines.length > 0,
+    enabled:
+      umrf !== undefined &&
+      runner !== undefined &&
+      engines.length > 0 &&
+      said.breakpoints !== undefined,
     refetchInterval: LOOK_AGAIN,
     gcTime: 0,
     staleTime: 0,
@@ -272,6 +294,7 @@ function useWay({ graph, seq, chosen, robots }: Props) {
   const may = useMay("operate");
   const text = useText(graph, seq);
   const inside = useInside(graph, seq);
+  const marks = useBreakpoints(graph, seq);
   // Without an answer only the actors of the graph itself are known; the look says what is missing.
   const graphs = inside.isPending ? null : inside.data?.subgraphs;
   const actors = useMemo(() => actorsIn(text.data, graphs), [text.data, graphs]);
@@ -280,11 +303,14 @@ function useWay({ graph, seq, chosen, robots }: Props) {
   const [lost, setLost] = useState<LedOrder["lost"]>(before?.lost ?? "stop");
   const several = actors.filter((actor) => actor !== "").length > 1;
   const [wanted, want] = useState<boolean | null>(chosen.includes(CONDUCTED) ? true : null);
-  const led = wanted ?? several;
-  const offered = several || led || now.engines.some((robot) => robot.led);
+  const mayLead = now.engines.some((robot) => robot.led);
+  const waits = (marks.data?.length ?? 0) > 0;
+  const led = wanted ?? (several || (waits && mayLead));
+  const offered = several || led || mayLead;
   const cast = castOf(actors, picked, now.engines, may);
   const missing = led ? castObstacle(actors, cast) : null;
-  return { text, actors, several, led, want, offered, cast, pick, lost, setLost, missing };
+  const way = { text, marks, actors, several, led, want, offered };
+  return { ...way, cast, pick, lost, setLost, missing };
 }
 
 export function StartDialog(props: Props) {
@@ -309,9 +335,10 @@ export function StartDialog(props: Props) {
   const watch = useWatching(engines);
   const mayDrill = !led && engines.length === 1 && !engines.includes(SIMULATOR);
   const [drills, setDrills] = useState(false);
-  const said = { watching: watch.watching, drill: drills && mayDrill };
+  const breakpoints = way.marks.data;
+  const said = { watching: watch.watching, drill: drills && mayDrill, breakpoints };
   const { look, lookSoon, error: lookError } = useLook(moment, asked, behaviours, order, said);
-  const error = way.text.error ?? lookError;
+  const error = way.text.error ?? way.marks.error ?? lookError;
   const start = useStart(graph);
   const looks = look.data;
   const codes = [...new Set((looks ?? []).flatMap((each) => each.override))];
@@ -345,6 +372,7 @@ export function StartDialog(props: Props) {
       ...looked,
       behaviours,
       ...said,
+      breakpoints: breakpoints ?? [],
     };
     // Whoever starts says each time that they watch, and that it is for a drill.
     const onSettled = () => {

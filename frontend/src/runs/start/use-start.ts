@@ -10,6 +10,7 @@ import type { LedOrder } from "../../api/led-runs";
 import { useLive } from "../../api/page-link";
 import { type Started, type StartOrder, startRun, type Watching } from "../../api/runs";
 import { serverNow } from "../../clock/server-clock";
+import type { RunBreakpoint } from "../../graph/breakpoints";
 import { newAid } from "../../graph/document-keys";
 import { memberText } from "../../graph/json-members";
 import { isolated } from "../../words/isolated";
@@ -34,6 +35,8 @@ export interface StartInput {
   watching?: Watching;
   /** Set for a start by which a Stop drill is made. */
   drill?: boolean;
+  /** Where a led run waits. */
+  breakpoints?: readonly RunBreakpoint[];
 }
 
 /** A moment as a version, and its graph exactly as the editor wrote it. */
@@ -64,6 +67,7 @@ export function useStart(graph: string) {
     mutationFn: async (wanted: StartInput) => {
       const { seq, engines, led, digest, tree, script, behaviours, override, watching, drill } =
         wanted;
+      const { breakpoints } = wanted;
       if (runner === undefined) throw new Error("The address of the runner is not known yet.");
       const { version, umrf } = await publishedVersion(graph, await seq);
       void client.invalidateQueries({ queryKey: queryKeys.versions(graph) });
@@ -89,6 +93,7 @@ export function useStart(graph: string) {
         ...(override === undefined ? {} : { override }),
         ...(watching === undefined ? {} : { watching }),
         ...(drill === undefined ? {} : { drill }),
+        ...(breakpoints === undefined ? {} : { breakpoints }),
       });
       for (const run of started.runs) live?.learn(run);
       return started;

@@ -152,6 +152,7 @@ def _action(key: Key, name: str, own: Fields, position: object) -> Action:
         twin=own.get("twin") is True,
         extra=_extra(own, "x"),
         asks=_under(own, "ask/"),
+        breakpoint=_breakpoint(own),
     )
 
 
@@ -270,7 +271,13 @@ def _relation(ends: Ends, own: Fields, led: Mapping[str, JsonText]) -> Relation 
         parents_extra=_extra(own, "x/parents"),
         children_extra=_extra(own, "x/children"),
         waypoints=tuple((response, led[response]) for response in RESPONSES if response in led),
+        breakpoint=_breakpoint(own),
     )
+
+
+def _breakpoint(own: Fields) -> JsonText:
+    """Return the text of the breakpoint of an action or relation; "" for none."""
+    return values.json_text(own.get("breakpoint")) or ""
 
 
 def _remaps(own: Fields) -> tuple[Remap, ...]:
@@ -397,6 +404,8 @@ def _action_fields(action: Action, order: float) -> dict[str, object]:
         fields.update(_parameter_fields(f"{key}|{side}", parameters))
     fields.update(_extra_fields(f"{key}|x", action.extra))
     fields.update({f"{key}|ask/{path}": mark for path, mark in action.asks})
+    if action.breakpoint:
+        fields[f"{key}|breakpoint"] = action.breakpoint
     return fields
 
 
@@ -435,6 +444,8 @@ def _relation_fields(relation: Relation) -> dict[str, object]:
     extras = {"parents": relation.parents_extra, "children": relation.children_extra}
     for side, extra in extras.items():
         fields.update(_extra_fields(f"{head}|x/{side}", extra))
+    if relation.breakpoint:
+        fields[f"{head}|breakpoint"] = relation.breakpoint
     return fields
 
 

@@ -35,6 +35,8 @@ from action_assistant.umrf.json.places import places_of, pointer
 from action_assistant.umrf.model import Action, Graph, Key, Problem
 
 _ORDERS: Final = ("order", "po", "co")
+#: A field that no text has: it stays with its action or relation.
+_BREAKPOINT: Final = "breakpoint"
 _WORSE: Final = 20  # problems that are told
 _Wanted: TypeAlias = dict[tuple[str, str], object]
 
@@ -233,7 +235,8 @@ def _fields(old: Graph, new: Graph) -> _Wanted:
     wanted: _Wanted = {}
     for root, fields in after.items():
         for key in before[root].keys() - fields.keys():
-            wanted[root, key] = UNSET
+            if key.partition("|")[2] != _BREAKPOINT or root == "meta":
+                wanted[root, key] = UNSET
         for key, value in fields.items():
             if key.rpartition("|")[2] in _ORDERS and not key.startswith("x/"):
                 continue

@@ -678,9 +678,7 @@ def breakpoint_items(breakpoints: Sequence[Breakpoint], *, is_led: bool) -> tupl
     number = counted(len(breakpoints), "breakpoint")
     if is_led:
         return (Item(code="breakpoints", verdict="passed", text=f"The run waits at {number}."),)
-    text = (
-        f"The whole graph is handed over: {number} of it will hold nothing. Lead it step by step."
-    )
+    text = f"The whole graph is handed over at once: {number} of it will hold nothing."
     return (Item(code="breakpoints", verdict="warned", text=text),)
 
 

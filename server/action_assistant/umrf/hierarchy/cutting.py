@@ -418,6 +418,7 @@ def _into(
             parent_order=min(way.parent_order for way in ways),
             child_order=min(way.child_order for way in ways),
             waypoints=(),
+            breakpoint="",
         )
 
 
@@ -443,6 +444,7 @@ def _out(
             parent_order=min(way.parent_order for way in ways),
             child_order=min(way.child_order for way in ways),
             waypoints=(),
+            breakpoint="",
         )
 
 

@@ -64,6 +64,7 @@ def ways_out(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[Jo
                 remap=_out_remap(place, end, relation),
                 parents_extra=merged_extra(relation.parents_extra, end.parents_extra),
                 waypoints=(),
+                breakpoint="",
             )
             yield JoinedArrow(arrow, relation, number)
 
@@ -266,6 +267,7 @@ def _into(place: SubGraphPlace, relations: Sequence[Relation]) -> Iterator[Joine
                 remap=remap,
                 children_extra=merged_extra(relation.children_extra, entry.children_extra),
                 waypoints=(),
+                breakpoint="",
             )
             yield JoinedArrow(arrow, relation, number)
 
