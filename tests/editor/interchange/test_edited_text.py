@@ -185,12 +185,19 @@ def test_an_edited_text_leaves_breakpoints_where_they_are() -> None:
     moment.maps["actions"][f"{go}|breakpoint"] = '{"visit":2}'
     moment.maps["actions"][f"{back}|breakpoint"] = "{}"
     marked = ReadGraph(2, moment.maps, document.read_maps(moment.maps))
-    file["actions"][0]["name"] = "Move"
+    text = codec.write(marked.graph)
+    renamed = applied(
+        marked.maps, text_edit(marked, text.replace('"name": "Go"', '"name": "Move"').encode())
+    )
+    assert [(each.name, each.breakpoint) for each in renamed.actions] == [
+        ("Move", '{"visit":2}'),
+        ("Back", "{}"),
+    ]
     file["graph_exit"] = []
     del file["actions"][1], file["actions"][0]["children"]
-    left = applied(marked.maps, text_edit(marked, json.dumps(file).encode()))
-    assert [(each.name, each.breakpoint) for each in left.actions] == [("Move", '{"visit":2}')]
-    assert codec.write(marked.graph) == codec.write(nav()[0].graph)
+    answer = text_edit(marked, json.dumps(file).encode())
+    assert [each.breakpoint for each in applied(marked.maps, answer).actions] == ['{"visit":2}']
+    assert (f"{back}|breakpoint", UNSET) in {(each.key, each.after) for each in answer.changes}
 
 
 def test_a_breakpoint_is_in_no_file_and_no_digest_and_changes_nothing_that_a_robot_does() -> None:
