@@ -14,15 +14,7 @@ import {
   whyNoBreakpoint,
 } from "./breakpoints";
 import { mapsOf, relationId } from "./document-keys";
-import {
-  addAction,
-  connect,
-  removeActions,
-  retarget,
-  setExit,
-  setResponse,
-  undoOf,
-} from "./edit";
+import { addAction, connect, removeActions, retarget, setExit, setResponse, undoOf } from "./edit";
 import { setBreakpoint } from "./edit/breakpoints";
 import { clipOf, paste } from "./edit/clip";
 import { readGraph } from "./read";
